@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.runtime.test_executors import dies_once
-from tpjb_ident.runtime.executors import in_order, local_workers
+from tpjb_ident.runtime.executors import local_workers, map_ordered
 from tpjb_ident.runtime.workers import ClusterError, dask_workers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,7 +94,7 @@ def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_pat
         # and with a job in its hands: the second worker kills itself, nobody is left, a new one takes over
         cluster.workers.append(cluster._start("worker", "--nthreads", "1", "--no-nanny"))
         jobs = [(str(tmp_path), i) for i in range(6)]
-        assert list(in_order(workers, dies_once, jobs)) == [3 * i for i in range(6)]
+        assert list(map_ordered(workers, dies_once, jobs)) == [3 * i for i in range(6)]
     assert cluster.workers[0].poll() is not None
     assert (6, 12) in seen
     with local_workers(2) as processes:

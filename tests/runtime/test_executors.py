@@ -19,8 +19,8 @@ from tpjb_ident.runtime.executors import (
     LostJobsError,
     PoolWorkers,
     background_job,
-    in_order,
     local_workers,
+    map_ordered,
 )
 from tpjb_ident.runtime.threads import _loaded, limited_threads
 from tpjb_ident.runtime.workers import open_workers
@@ -95,22 +95,22 @@ class Backwards(Executor):
 def test_answers_stand_in_order_even_if_they_end_in_another():
     workers = PoolWorkers(Backwards, 2)
     assert [index for index, _ in workers.outcomes(doubled, jobs(8))] != list(range(8))
-    assert list(in_order(workers, doubled, jobs(8))) == [2 * i for i in range(8)]
+    assert list(map_ordered(workers, doubled, jobs(8))) == [2 * i for i in range(8)]
 
 
 @pytest.mark.slow
 def test_here_and_in_processes_alike(two):
     shared = {"offset": 100}
     for workers in (InProcessWorkers(), two):
-        assert list(in_order(workers, doubled, jobs(9))) == [2 * i for i in range(9)]
-        assert list(in_order(workers, with_shared, jobs(3), shared)) == [100, 101, 102]
-        assert list(in_order(workers, doubled, [])) == []
+        assert list(map_ordered(workers, doubled, jobs(9))) == [2 * i for i in range(9)]
+        assert list(map_ordered(workers, with_shared, jobs(3), shared)) == [100, 101, 102]
+        assert list(map_ordered(workers, doubled, [])) == []
 
 
 @pytest.mark.slow
 def test_the_first_error_in_order_is_raised_where_it_stands(two):
     for workers in (InProcessWorkers(), two):
-        answers = in_order(workers, refused, jobs(8))
+        answers = map_ordered(workers, refused, jobs(8))
         assert [next(answers) for _ in range(3)] == [0, 1, 2]
         with pytest.raises(ValueError, match="no 3"):
             next(answers)
@@ -118,25 +118,27 @@ def test_the_first_error_in_order_is_raised_where_it_stands(two):
 
 def test_a_warning_on_a_worker_is_a_warning_here(two):
     with pytest.warns(RuntimeWarning, match="mind 7"):
-        assert list(in_order(two, warned, [(7,)])) == [7]
+        assert list(map_ordered(two, warned, [(7,)])) == [7]
 
 
 def test_an_error_that_cannot_travel_comes_as_its_text(two):
     with pytest.raises(RuntimeError, match="Odd"):
-        list(in_order(two, has_own_class, [()]))
+        list(map_ordered(two, has_own_class, [()]))
 
 
 @pytest.mark.slow
 def test_a_killed_process_loses_nothing(tmp_path):
     with local_workers(2) as workers:
-        assert list(in_order(workers, dies_once, [(str(tmp_path), i) for i in range(12)])) == [3 * i for i in range(12)]
+        assert list(map_ordered(workers, dies_once, [(str(tmp_path), i) for i in range(12)])) == [
+            3 * i for i in range(12)
+        ]
     assert (tmp_path / "died").exists()
 
 
 @pytest.mark.slow
 def test_a_job_that_kills_every_worker_is_given_up():
     with local_workers(2) as workers, pytest.raises(LostJobsError, match=r"3 times in a row.*memory"):
-        list(in_order(workers, dies, jobs(1)))
+        list(map_ordered(workers, dies, jobs(1)))
 
 
 def test_one_worker_is_this_process():
@@ -153,7 +155,7 @@ def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers_and_beside_th
     """Processes that are forked have numpy already: the environment does not reach it."""
     with limited_threads(2):
         with local_workers(2, start="fork") as workers:
-            assert set(next(in_order(workers, _threads, [()]))) == {1}
+            assert set(next(map_ordered(workers, _threads, [()]))) == {1}
             assert set(_threads()) == {1}
         assert set(_threads()) == {2}
 

@@ -17,7 +17,7 @@ import numpy as np
 from tests.rigs.estimator_cases import H_TRUE, OMEGA, Case, draw
 from tests.studies.results import table, write_section
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
-from tpjb_ident.runtime.executors import in_order, local_workers
+from tpjb_ident.runtime.executors import local_workers, map_ordered
 
 METHODS = ("ols", "rlm:huber", "rlm:tukey", "mm", "iv", "mm-eiv")
 CASES = (
@@ -92,7 +92,7 @@ def study(replicates: int, seed: int, count: int) -> list[Row]:
     jobs = [(case, replicates, seed) for case in CASES]
     rows = []
     with local_workers(count) as workers:
-        for row in in_order(workers, score_case, jobs):
+        for row in map_ordered(workers, score_case, jobs):
             print(f"| {row.case} | " + " | ".join(str(row.scores[m]) for m in METHODS) + " |", flush=True)
             rows.append(row)
     return rows

@@ -50,12 +50,12 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
 
 def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
     """Give a set-up's physics to the virtual rig."""
-    world = _World(setup)
+    solved = _SolvedSetup(setup)
     return RigTruth(
-        stiffness=world.stiffness,
-        position=world.position,
-        temperature=world.temperature,
-        pivot_deflection=world.pivot_deflection,
+        stiffness=solved.stiffness,
+        position=solved.position,
+        temperature=solved.temperature,
+        pivot_deflection=solved.pivot_deflection,
         pivot_angles=tuple(pad.pivot_angle for pad in setup.bearing.pads),
         clearance=tuple(pad.assembled_clearance for pad in setup.bearing.pads),
         bearing_name="bearing.toml",
@@ -72,7 +72,7 @@ def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> I
     return instruments
 
 
-class _World:
+class _SolvedSetup:
     """Answers of one set-up, each static point solved once."""
 
     def __init__(self, setup: Setup) -> None:

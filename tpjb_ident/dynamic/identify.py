@@ -45,7 +45,7 @@ from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.runs.synchronous import without_synchronous
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.runtime.executors import InProcessWorkers, Workers, in_order
+from tpjb_ident.runtime.executors import InProcessWorkers, Workers, map_ordered
 
 
 def identify(
@@ -151,7 +151,7 @@ def assemble(
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     sweeps = swept_probes(campaign)
     tell("estimating", 0, len(sources))
-    first = list(in_order(workers, _first, [(source,) for source in sources], settings))
+    first = list(map_ordered(workers, _first, [(source,) for source in sources], settings))
     mains = [digest.mains for digest in digests]
     in_cells = [digest.mains_force for digest in digests]
     corrections = find_corrections(sources, mains, axes, first, cell_zero_uncertainty(campaign), in_cells)
@@ -167,7 +167,7 @@ def assemble(
         checked,
     )
     points, changes = [], []
-    for point, change in in_order(workers, _finished, list(zip(sources, corrections)), work):
+    for point, change in map_ordered(workers, _finished, list(zip(sources, corrections)), work):
         points.append(point)
         changes.append(change)
         tell("estimating", len(points), len(sources))

@@ -25,13 +25,16 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.drawing.picture import new_picture
-from tpjb_ident.runtime.executors import cores, in_order, local_workers
+from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
 PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
 _SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
+_USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
+_POINTS_PER_INCH = 72.0
+#: Markers are found again by their place in the drawing [points].
+_NEAR = 0.05
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 
@@ -57,9 +60,9 @@ def shape(svg: str) -> str:
 
     Or "".
     """
-    found = _SIZE.search(svg)
-    assert found is not None
-    width, height = float(found[1]), float(found[2])
+    size = _SIZE.search(svg)
+    assert size is not None
+    width, height = float(size[1]), float(size[2])
     if width > 1.35 * height and width > 6.5 * 72.0:
         return "wide"
     return "tall" if height > 0.8 * width else ""
@@ -80,10 +83,10 @@ def panel(name: str, title: str, figure: Figure | Callable[[], Figure], group: s
 def svg_text(figure: Figure, name: str) -> str:
     """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
     buffer = io.StringIO()
-    spots = mark_lines(figure)
+    points = hover_points(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return with_titles(buffer.getvalue(), spots)
+    return with_titles(buffer.getvalue(), points)
 
 
 def inline_svg(text: str, name: str, title: str) -> str:
@@ -105,13 +108,6 @@ def prefixed_ids(svg: str, prefix: str) -> str:
     return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
 
 
-def make_ready() -> None:
-    """Draw a picture for nobody: fonts and both ways to write are loaded, also for processes forked from this one."""
-    figure, _ = new_picture("x", "y")
-    svg_text(figure, "x")
-    _save_png(figure, io.BytesIO())
-
-
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name."""
     folder.mkdir(exist_ok=True)
@@ -122,7 +118,7 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
         alone = len(panels) < TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
         with local_workers(1 if alone else min(cores(), MOST_HANDS), start="fork") as opened:
             jobs = [(number, index, folder) for index in range(len(panels))]
-            texts = list(in_order(opened, _save_panel, jobs))
+            texts = list(map_ordered(opened, _save_panel, jobs))
     finally:
         del _drawn[number]
     return {panel.name: text for panel, text in zip(panels, texts, strict=True)}
@@ -151,14 +147,8 @@ def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
     opaque.save(path, format="PNG", dpi=(PNG_DPI, PNG_DPI), compress_level=4)
 
 
-_USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
-_POINTS_PER_INCH = 72.0
-#: Markers are found again by their place in the drawing [points].
-_NEAR = 0.05
-
-
 @dataclass(frozen=True)
-class Spots:
+class HoverPoints:
     """Markers of one line: where they are drawn and what they say."""
 
     gid: str
@@ -166,9 +156,9 @@ class Spots:
     texts: tuple[str, ...]
 
 
-def mark_lines(figure: Figure) -> tuple[Spots, ...]:
+def hover_points(figure: Figure) -> tuple[HoverPoints, ...]:
     """Give every line with markers a name that the SVG keeps, and work out what its points say."""
-    found = []
+    lines = []
     for i, axes in enumerate(figure.axes):
         axes.get_xlim(), axes.get_ylim()  # limits are set late: asking settles them
         axes.apply_aspect()
@@ -177,8 +167,9 @@ def mark_lines(figure: Figure) -> tuple[Spots, ...]:
             if line.get_marker() in ("", "None", " ", None) or len(np.asarray(line.get_xdata())) > 400:
                 continue
             line.set_gid(f"spots-{i}-{j}")
-            found.append(_spots(figure, axes, line, labels.get(line, str(line.get_label())), halves.get(line)))
-    return tuple(found)
+            label = labels.get(line, str(line.get_label()))
+            lines.append(_points_of_line(figure, axes, line, label, halves.get(line)))
+    return tuple(lines)
 
 
 def _errorbars(axes: Axes) -> tuple[dict[Line2D, str], dict[Line2D, np.ndarray]]:
@@ -194,7 +185,7 @@ def _errorbars(axes: Axes) -> tuple[dict[Line2D, str], dict[Line2D, np.ndarray]]
     return labels, halves
 
 
-def _spots(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarray | None) -> Spots:
+def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarray | None) -> HoverPoints:
     x = np.asarray(line.get_xdata(), dtype=float)
     y = np.asarray(line.get_ydata(), dtype=float)
     shown = axes.transData.transform(np.column_stack([x, y])) * _POINTS_PER_INCH / figure.dpi
@@ -206,7 +197,7 @@ def _spots(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarra
     for k in range(len(x)):
         spread = f" ± {half[k]:.2g}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
         texts.append(f"{name}{_with_unit(yl, y[k], spread)} at {_with_unit(xl, x[k])}")
-    return Spots(str(line.get_gid()), places, tuple(texts))
+    return HoverPoints(str(line.get_gid()), places, tuple(texts))
 
 
 def _with_unit(label: str, value: float, spread: str = "") -> str:
@@ -216,14 +207,14 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
     return f"{name} {value:.4g}{spread} {unit}".strip()
 
 
-def with_titles(svg: str, spots: tuple[Spots, ...]) -> str:
-    """Put a title into every marker of the drawing that `mark_lines` knows."""
-    for line_spots in spots:
-        start = svg.find(f'<g id="{line_spots.gid}"')
+def with_titles(svg: str, lines: tuple[HoverPoints, ...]) -> str:
+    """Put a title into every marker of the drawing that `hover_points` knows."""
+    for points in lines:
+        start = svg.find(f'<g id="{points.gid}"')
         if start < 0:
             continue
         end = _end_of_group(svg, start)
-        svg = svg[:start] + _USE.sub(functools.partial(_titled, line_spots), svg[start:end]) + svg[end:]
+        svg = svg[:start] + _USE.sub(functools.partial(_titled, points), svg[start:end]) + svg[end:]
     return svg
 
 
@@ -236,13 +227,13 @@ def _end_of_group(svg: str, start: int) -> int:
     return len(svg)
 
 
-def _titled(line_spots: Spots, match: re.Match[str]) -> str:
+def _titled(points: HoverPoints, match: re.Match[str]) -> str:
     place = np.array([float(match[1]), float(match[2])])
     with np.errstate(invalid="ignore"):  # a spot off the axes has no place, and NaN is never near
-        away = np.abs(line_spots.places - place).max(axis=1)
+        away = np.abs(points.places - place).max(axis=1)
     if not np.isfinite(away).any():
         return match[0]
     best = int(np.nanargmin(away))
     if away[best] > _NEAR:
         return match[0]
-    return f"{match[0][:-2]}><title>{html.escape(line_spots.texts[best])}</title></use>"
+    return f"{match[0][:-2]}><title>{html.escape(points.texts[best])}</title></use>"

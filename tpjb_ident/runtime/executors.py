@@ -1,11 +1,11 @@
 """Where jobs run: here, in processes of this machine, on a Dask cluster. The answers are the same everywhere.
 
 A job is a module-level function and its arguments. It depends on nothing else, so that it may run anywhere, and
-once more where a worker was lost with it. Whoever has work to spread takes a `Workers` and asks `in_order`:
+once more where a worker was lost with it. Whoever has work to spread takes a `Workers` and asks `map_ordered`:
 
 ```python
 with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(scheduler="tcp://host:8786")
-    for answer in in_order(workers, task, [(argument,), ..]):
+    for answer in map_ordered(workers, task, [(argument,), ..]):
         ...
 ```
 """
@@ -89,7 +89,7 @@ class Workers(Protocol):
         """
 
 
-def in_order(
+def map_ordered(
     workers: Workers,
     task: Task,
     jobs: Sequence[Job],
@@ -105,7 +105,7 @@ def in_order(
             due += 1
 
 
-def each_finished(
+def as_completed(
     workers: Workers, task: Task, jobs: Sequence[Job], finished: Callable[[int, Any], None], shared: Any = None
 ) -> None:
     """Hand every value to ``finished(index, value)`` as its job ends; nothing is held back to be put in order.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tpjb_ident.diagnosis.forward.forward import ForwardModel
-from tpjb_ident.runtime.executors import Workers, cores, in_order, local_workers
+from tpjb_ident.runtime.executors import Workers, cores, local_workers, map_ordered
 
 #: What the workers of this process share: they are forked from it and have it from there. Sent with every job it would
 #: be megabytes of equilibria each time.
@@ -37,7 +37,7 @@ class Map:
 
     def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
         """Yield ``task(forward, problem, argument, ..)`` for every job, in order."""
-        return in_order(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
+        return map_ordered(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
 
     def together(self, tasks: Sequence[Callable[[], Answer]]) -> list[Answer]:
         """Do several things that each wait for workers now and then: while one waits, they work for another."""

@@ -27,7 +27,7 @@ from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRu
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
-from tpjb_ident.runtime.executors import InProcessWorkers, Workers, each_finished
+from tpjb_ident.runtime.executors import InProcessWorkers, Workers, as_completed
 
 Progress = Callable[[str, int, int], None]
 #: A channel whose lines are below this share of the vector's may be dead.
@@ -67,7 +67,7 @@ def all_runs(
 
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
-        each_finished(workers or InProcessWorkers(), unless_known, list(jobs), finished)
+        as_completed(workers or InProcessWorkers(), unless_known, list(jobs), finished)
         kept.leave_out_dead_accelerometers()
         if runs and not kept.places:
             raise kept.left_out[0].error

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from tpjb_ident.arrays import FloatArray
 from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
@@ -48,3 +51,9 @@ def constant_along(series: pd.DataFrame, axis: str) -> str:
 def point_label(p: PointResult) -> str:
     """Load and excitation of a point, in words."""
     return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
+
+
+def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:
+    """Values (n,) of a column, and the lengths (2, n) of their intervals below and above."""
+    value, low, high = (rows[f"{column}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+    return value, np.abs([value - low, high - value])

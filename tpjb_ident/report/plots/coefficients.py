@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import add_legend, label, new_picture, new_pictures
-from tpjb_ident.report.drawing.series import AXES, DIRECT, as_table, longest_series
+from tpjb_ident.report.drawing.series import AXES, DIRECT, as_table, longest_series, with_errors
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, STATIC_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
@@ -65,9 +65,9 @@ def coefficient(
         rows = series[series["pivots"] == variant].sort_values(column)
         _draw_predicted(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
     measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
-    value, low, high = (measured[f"{key}{end}"].to_numpy(float) / scale for end in ("", "_lo", "_hi"))
+    value, errors = with_errors(measured, key, scale)
     axes.errorbar(
-        measured[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), fmt="o", color=INK,
+        measured[column] / axis_scale, value, yerr=errors, fmt="o", color=INK,
         markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
     )  # fmt: skip
     axes.margins(x=0.06, y=0.1)
@@ -149,9 +149,9 @@ def direct_coefficients(
         for entry in entries:
             marker, dashes, face = _ENTRY_STYLE[entry]
             key = kind.column(entry)
-            value, low, high = (rows[f"{key}{end}"].to_numpy(float) / kind.display_scale for end in ("", "_lo", "_hi"))
+            value, errors = with_errors(rows, key, kind.display_scale)
             axes.errorbar(
-                rows[column] / axis_scale, value, yerr=np.abs([value - low, high - value]), marker=marker,
+                rows[column] / axis_scale, value, yerr=errors, marker=marker,
                 markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour], linestyle=dashes,
                 linewidth=1.3, capsize=3, label=f"{name}, {part}{entry}",
             )  # fmt: skip
@@ -278,9 +278,9 @@ def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _Fit
 
 def _draw_measured(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
     colour, marker = _FRF_STYLE[entry]
-    value, low, high = (table[f"{column}{end}"].to_numpy(float) / 1e6 for end in ("", "_lo", "_hi"))
+    value, errors = with_errors(table, column, 1e6)
     axes.errorbar(
-        table["excitation_Hz"], value, yerr=np.abs([value - low, high - value]), fmt=marker, color=LIGHT[colour],
+        table["excitation_Hz"], value, yerr=errors, fmt=marker, color=LIGHT[colour],
         markersize=3, capsize=1.5, linewidth=0.8, linestyle="none", label=f"h{entry}, 95 %",
     )  # fmt: skip
 
