@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tpjb_ident.arrays import FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
