@@ -11,18 +11,21 @@ import typer
 from typer.testing import CliRunner
 
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.cli.common.errors import guarded
+from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 
 def run(error):
-    app = typer.Typer()
-
-    @app.command()
-    @guarded
-    def fail() -> None:
+    @command()
+    def fail(c: Command) -> None:
         raise error
 
+    return result_of(fail)
+
+
+def result_of(function):
+    app = typer.Typer()
+    app.command()(function)
     return CliRunner().invoke(app, [])
 
 
@@ -70,14 +73,11 @@ def test_markup_in_messages_is_text():
 
 
 def test_warnings_are_shown_not_swallowed():
-    app = typer.Typer()
-
-    @app.command()
-    @guarded
-    def warn() -> None:
+    @command()
+    def warn(c: Command) -> None:
         warnings.simplefilter("always")
         warnings.warn("something odd", RuntimeWarning, stacklevel=1)
 
-    result = CliRunner().invoke(app, [])
+    result = result_of(warn)
     assert result.exit_code == 0
     assert "RuntimeWarning: something odd" in result.stderr

@@ -129,20 +129,3 @@ def test_a_known_delay_turns_the_phases(small_campaign, plain, tmp_path):
         h.append(row["kyy_N_per_m"] + 2j * np.pi * 25 * row["cyy_Ns_per_m"])
     # what the runs' missed set points do is learnt for k and c apart, and differs a little between the two
     assert np.angle(h[1] / h[0]) == pytest.approx(2 * np.pi * 25 * 1e-3, rel=0.015)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--delay", "forces=1 ms"), "Did you mean 'force'"),
-        (("--delay", "force=1 mm"), "--delay 'force=1 mm'"),
-        (("--lines", "25"), "--lines"),
-        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:9"), "exclude each other"),
-        (("--method", "mm-eve"), "Did you mean 'mm-eiv'"),
-    ],
-)
-def test_wrong_options_are_answered(small_campaign, tmp_path, options, message):
-    result = tpjb("identify", small_campaign, "--out", tmp_path / "out", *options)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert not (tmp_path / "out").exists()

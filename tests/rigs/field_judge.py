@@ -39,7 +39,8 @@ class Outcome:
 
 def judge(path: Path, rig: Rig) -> Outcome:
     """Identify one campaign and hold it against the truth."""
-    from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted
+    from tpjb_ident.cli.common.command import Command
+    from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted
     from tpjb_ident.dynamic.identify import identify
 
     outcome = Outcome()
@@ -47,7 +48,7 @@ def judge(path: Path, rig: Rig) -> Outcome:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             campaign = load_campaign(path)
-            result = identify(campaign, identify_settings(campaign, "mm-eiv", None))
+            result = identify(campaign, identify_settings(Command("identify", {}), campaign, "mm-eiv", None))
             result.to_frame()
     except (BadInputError, RigDataError) as error:
         outcome.told, outcome.names = 1, [str(error).splitlines()[0][:80]]

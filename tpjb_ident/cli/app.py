@@ -22,7 +22,7 @@ from tpjb_ident.cli.commands.simulate import simulate
 from tpjb_ident.cli.commands.verify import verify
 from tpjb_ident.cli.commands.view import view
 from tpjb_ident.cli.commands.watch import watch
-from tpjb_ident.cli.common.registration import add_command
+from tpjb_ident.cli.common.options import GroupedHelp
 
 #: What is written outside --out.
 CACHES = (
@@ -42,8 +42,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(wanted: bool) -> None:
+    if wanted:
         from tpjb_ident import __version__
 
         typer.echo(f"tpjb-ident {__version__}")
@@ -62,4 +62,5 @@ COMMANDS = (
     watch, verify,
 )  # fmt: skip
 for command in COMMANDS:
-    add_command(app, command)
+    lines = "\n".join(f"  {example}" for example in command.examples)  # type: ignore[attr-defined]
+    app.command(command.__name__, cls=GroupedHelp, epilog=f"\b\nExamples:\n{lines}")(command)

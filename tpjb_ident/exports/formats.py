@@ -12,16 +12,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rigdata.arrays import BoolArray, FloatArray
 from rigdata.near_names import nearest_name
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # numpy too is imported late: the command line asks for the names of the formats
     import pandas as pd
+
+    from rigdata.arrays import BoolArray, FloatArray
 
 
 class ExportError(TpjbError):
@@ -29,6 +28,12 @@ class ExportError(TpjbError):
 
 
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
+
+
+def _no_frequencies() -> BoolArray:
+    import numpy as np
+
+    return np.zeros(0, bool)
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class StaticPoint:
     low: dict[str, FloatArray] = field(repr=False)
     high: dict[str, FloatArray] = field(repr=False)
     quality: tuple[str, ...] = ()
-    trusted: BoolArray = field(repr=False, default_factory=lambda: np.zeros(0, bool))
+    trusted: BoolArray = field(repr=False, default_factory=_no_frequencies)
 
     @property
     def tag(self) -> str:
@@ -96,6 +101,8 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise ExportError(f"the table has no column {missing[0]}. Give a coefficients.csv or prediction.csv of tpjb.")
+    import numpy as np
+
     finite = np.isfinite(frame[needed].to_numpy(dtype=float)).all(axis=1)
     left_out = tuple(_place(row) for _, row in frame[~finite].iterrows())
     if not finite.any():
@@ -132,6 +139,8 @@ def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint
 
 def _coefficients(table: pd.DataFrame, end: str) -> dict[str, FloatArray]:
     """Columns of K and C with an ending, NaN where the table has none."""
+    import numpy as np
+
     empty = np.full(len(table), np.nan)
     columns = {short: name + end for short, name in COLUMNS.items()}
     return {s: table[name].to_numpy(dtype=float) if name in table else empty for s, name in columns.items()}

@@ -1,49 +1,42 @@
-"""`tpjb compare`: prediction beside measurement for rigid, Kirk and measured pivots, with a report."""
+"""`tpjb compare`: prediction compared with measurement for rigid, Kirk and measured pivots, with a report."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tpjb_ident.cli.commands.identify import identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.commands.predict import model_settings
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import Data, open_data, refuse_impossible
+from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted, write_identification
+from tpjb_ident.cli.common.model_inputs import model_settings, open_source, parse_share, refuse_impossible
 from tpjb_ident.cli.common.options import (
+    DEMO,
     BearingOption,
     Coefficients,
     EffectsFile,
     MaybeCampaign,
     Method,
     Norm,
-    Out,
     ReadingError,
     Thermal,
-    as_given,
     named,
-    out_folder,
     refuse_unknown,
 )
-from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import command_line, print_line, progress, table
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.runtime.output_folder import output_folder
-from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import CompareSettings, Comparison
+    from tpjb_ident.compare.comparison import Comparison
 
 Pivots = Annotated[
     str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
 ]
 
 
-@guarded
+@command(f"tpjb compare {DEMO}", f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd')
 def compare(
+    c: Command,
     campaign: MaybeCampaign = None,
     bearing: BearingOption = None,
     pivots: Pivots = "rigid, kirk, measured",
@@ -53,64 +46,48 @@ def compare(
     reading_error: ReadingError = None,
     method: Method = "mm-eiv",
     norm: Norm = None,
-    out: Out = None,
 ) -> None:
     """Compare prediction and measurement, with a report.
 
     With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
     pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
     """
-    options = as_given(locals())
-    options["pivots"] = list(variants := _variants(pivots))
-    model = model_settings("kirk", thermal, effects)
-    from tpjb_ident.compare.comparison import CompareSettings
+    variants = _variants(pivots)
+    c.options["pivots"] = list(variants)
+    model = model_settings(c, "kirk", thermal, effects)
+    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, comparison_frame, model_side
     from tpjb_ident.compare.measured_pivots import counts_from_measured
-
-    settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
-    data = open_data("compare", campaign, coefficients, bearing, reading_error)
-    refuse_impossible(settings.effects, effects, data.bearing)
-    options["bearing"] = data.bearing_name
-    inputs = data.inputs | ({effects.name: sha256(effects)} if effects else {})
-    target = out_folder(out, "compare")
-    with output_folder(target, "compare", (data.path,)) as folder:
-        result, then = _compared(data, settings, options, inputs, folder)
-        write_record(folder, target, "compare", options, inputs)
-    show_comparison(result, then)
-    print_line(f"Report: {target / 'report.html'}")
-    refuse_comparison(result)
-
-
-def _compared(
-    data: Data, settings: CompareSettings, options: dict[str, Any], inputs: dict[str, str], folder: Path
-) -> tuple[Comparison, str]:
-    """Compare, and write everything into the folder; also the command that comes next."""
-    from tpjb_ident.compare.coefficient_table import TableSource
-
-    source = data.source
-    if isinstance(source, TableSource):
-        from tpjb_ident.compare.comparison import compare_table, comparison_frame
-        from tpjb_ident.report.comparison_page import write_report
-
-        with progress("comparing") as show:
-            result = compare_table(data.path, data.bearing, settings, data.reading_error, show)
-        write_table(folder, "comparison", comparison_frame(result))
-        then = next_command(result, data.typed, data.given)
-        write_report(folder, result, options, inputs, then)
-        return result, then
-    from tpjb_ident.compare.comparison import compare_campaign, model_side
     from tpjb_ident.runtime.executors import background_job
 
-    with background_job(model_side, source, data.bearing, settings) as model, progress("comparing") as show:
-        from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
+    settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
+    source, drawing = open_source(c, campaign, coefficients, bearing)
+    refuse_impossible(settings.effects, effects, drawing)
+    typed = str(campaign or f"--coefficients {coefficients}")
+    with c.results() as folder:
+        if coefficients is not None:
+            from tpjb_ident.compare.comparison import compare_table
+            from tpjb_ident.report.comparison_page import write_report
 
-        settings = replace(settings, identify=identify_settings(source, options["method"], options["norm"]))
-        result = compare_campaign(source, data.bearing, settings, show, model)
-        then = next_command(result, data.typed, data.given)
-        show("writing tables", 0, 2)
-        write_comparison(folder, result)
-        show("drawing figures", 1, 2)
-        write_report(folder, result, named(options), inputs, then)
-    return result, then
+            with c.progress("comparing") as show:
+                error = parse_share(reading_error, "--reading-error")
+                result = compare_table(coefficients, drawing, settings, error, show)
+            c.table("comparison", comparison_frame(result))
+            following = next_command(result, typed, bearing)
+            write_report(folder, result, c.options, c.inputs, following)
+        else:
+            with background_job(model_side, source, drawing, settings) as ahead, c.progress("comparing") as show:
+                from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
+
+                settings = replace(settings, identify=identify_settings(c, source, method, norm))
+                result = compare_campaign(source, drawing, settings, show, ahead)
+                following = next_command(result, typed, bearing)
+                show("writing tables", 0, 2)
+                write_comparison(c, result)
+                show("drawing figures", 1, 2)
+                write_report(folder, result, named(c.options), c.inputs, following)
+    show_comparison(c, result, following)
+    c.print(f"Report: {c.target / 'report.html'}")
+    refuse_comparison(result)
 
 
 def _variants(text: str) -> tuple[str, ...]:
@@ -124,43 +101,42 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(folder: Path, result: Comparison) -> None:
+def write_comparison(c: Command, result: Comparison) -> None:
     """Write every table and pivots.toml."""
     from tpjb_ident.compare.comparison import comparison_frame, locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
 
-    write_identification(folder, result.identification)
-    write_table(folder, "comparison", comparison_frame(result))
+    write_identification(c, result.identification)
+    c.table("comparison", comparison_frame(result))
     if result.curves:
-        formula = printed_formula(result.bearing)
-        write_table(folder, "pivot_curves", pivot_table(result.curves, formula=formula))
-        write_pivots(folder / "pivots.toml", result.curves, result.campaign.id)
+        c.table("pivot_curves", pivot_table(result.curves, formula=printed_formula(result.bearing)))
+        write_pivots(c.folder / "pivots.toml", result.curves, result.campaign.id)
     if result.clearance is not None:
-        write_table(folder, "clearance", result.clearance.to_frame())
+        c.table("clearance", result.clearance.to_frame())
     if result.locus is not None:
-        write_table(folder, "locus", result.locus.to_frame())
-        write_table(folder, "locus_comparison", locus_frame(result))
+        c.table("locus", result.locus.to_frame())
+        c.table("locus_comparison", locus_frame(result))
 
 
-def show_comparison(result: Comparison, then: str = "") -> None:
+def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
     """Print what to conclude, the command that comes next, and the median deviations with what belongs to them."""
     from tpjb_ident.compare.comparison import comparison_frame
     from tpjb_ident.compare.summary import deviations, summary_sentences
     from tpjb_ident.rounding import percent
 
     frame = comparison_frame(result)
-    found = deviations(result, frame)
-    first, *more = summary_sentences(result, frame)
-    print_line(first)
-    if then:
-        command_line(then)
-    rows = [
-        [v.name, *(percent(d.median) for d in found if d.pivots == v.name)] for v in result.variants
-    ]  # fmt: skip
-    table(f"{result.campaign.id}: predicted / measured - 1, median", ["pivots", "kxx", "kyy", "cxx", "cyy"], rows)
-    for sentence in more:
-        print_line(sentence)
+    medians = {variant.name: [variant.name] for variant in result.variants}
+    for deviation in deviations(result, frame):
+        medians[deviation.pivots].append(percent(deviation.median))
+    conclusion, *more = summary_sentences(result, frame)
+    c.print(conclusion)
+    if following:
+        c.next(following)
+    columns = ["pivots", "kxx", "kyy", "cxx", "cyy"]
+    c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, list(medians.values()))
+    for line in more:
+        c.print(line)
 
 
 def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
@@ -178,9 +154,9 @@ def refuse_comparison(result: Comparison) -> None:
 
     if not isinstance(result.campaign, TableSource):
         refuse_untrusted(result.identification)
-    bad = [
-        f"{v.name}, {p.point.static_load / 1e3:g} kN" for v in result.variants for p in v.points
-        if not p.prediction.converged
-    ]  # fmt: skip
+    bad = []
+    for variant in result.variants:
+        points = [p for p in variant.points if not p.prediction.converged]
+        bad += [f"{variant.name}, {p.point.static_load / 1e3:g} kN" for p in points]
     if bad:
         raise NotTrustedError(f"the model did not converge at {len(bad)} points ({'; '.join(bad[:5])}).")

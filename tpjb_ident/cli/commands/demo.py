@@ -8,20 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.options import Out, named, out_folder
-from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import print_line, progress
+from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.options import named
 from tpjb_ident.rounding import counted
-from tpjb_ident.runtime.output_folder import output_folder
-from tpjb_ident.runtime.tables import write_table, write_text
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
 
 
-@guarded
-def demo(out: Out = None) -> None:
+@command("tpjb demo", "tpjb demo --out /tmp/look")
+def demo(c: Command) -> None:
     """Run the main job on a bundled campaign, with its report.
 
     End to end: check, identify, pivot, locus, predict, compare, report.
@@ -29,62 +25,60 @@ def demo(out: Out = None) -> None:
     The campaign is computed (docs/make_demo_campaign.py): the paper's rocker-backed bearing with pivots softer than the
     printed formula, recorded with noise and glitches.
     """
-    from model.bearing_file import parse_bearing
-    from rigdata import load_campaign
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import prediction_frame
     from tpjb_ident.runtime.executors import background_job
 
-    path = sample("demo.h5")
-    target = out_folder(out, "demo")
-    options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
-    with output_folder(target, "demo") as folder:
-        campaign = load_campaign(path)
-        bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
-        with background_job(model_side, campaign, bearing, CompareSettings()) as model, progress("demo") as show:
+    path = _sample("demo.h5")
+    c.options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
+    with c.results() as folder:
+        campaign = c.open(path)
+        bearing = c.bearing_of(campaign)
+        with background_job(model_side, campaign, bearing, CompareSettings()) as model, c.progress("demo") as show:
             from tpjb_ident.check.campaign import check_campaign  # loaded while the model is at work
             from tpjb_ident.report.comparison_page import write_report
 
             show("reading and checking every record", 0, 1)
-            summary = check_summary(path, check_campaign(path), campaign)
-            write_text(folder / "check.json", json.dumps(summary, indent=1, ensure_ascii=False) + "\n")
+            summary = check_summary(c, campaign.id, check_campaign(path), campaign)
+            c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
-            write_table(folder, "prediction", prediction_frame(result.variant("measured").points))
+            c.table("prediction", prediction_frame(result.variant("measured").points))
             show("writing tables", 0, 2)
-            write_comparison(folder, result)
+            write_comparison(c, result)
             show("drawing figures", 1, 2)
-            write_report(folder, result, named(options), campaign.fingerprint())
-        write_record(folder, target, "demo", options, summary["files_sha256"])
+            write_report(folder, result, named(c.options), c.inputs)
     counts = summary["counts"]
-    print_line(
+    c.print(
         f"Read {len(campaign.runs)} records of {path.name}: {counted(counts['error'], 'error')}, "
         f"{counted(counts['warning'], 'warning')}."
     )
-    show_comparison(result)
-    print_line(_truth_sentence(result, json.loads(sample("demo.truth.json").read_text(encoding="utf-8"))))
-    print_line(f"Report: {(target / 'report.html').resolve()}")
-    print_line("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
+    show_comparison(c, result)
+    truth = json.loads(_sample("demo.truth.json").read_text(encoding="utf-8"))
+    c.print(
+        f"The records are computed, so the truth is known: the largest error of an identified direct coefficient is "
+        f"{100 * _largest_error(result, truth):.2f} %."
+    )
+    c.print(f"Report: {(c.target / 'report.html').resolve()}")
+    c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     refuse_comparison(result)
 
 
-def sample(name: str) -> Path:
+def _sample(name: str) -> Path:
     """Path of a bundled file."""
     import rigdata
 
     return Path(rigdata.__path__[0]) / "samples" / name
 
 
-def _truth_sentence(result: Comparison, truth: dict[str, Any]) -> str:
-    """Say how far the identified direct coefficients are from what was put into the computed records."""
+def _largest_error(result: Comparison, truth: dict[str, Any]) -> float:
+    """How far the identified direct coefficients are from what was put into the computed records, as a share."""
     import numpy as np
 
-    known = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}
-    off = []
+    points = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}
+    largest = 0.0
     for p in result.identification.points:
-        true = known[(p.point.static_load, p.point.excitation_hz)]
-        for found, key in ((p.stiffness.k, "K_apparent"), (p.stiffness.c, "C_apparent")):
-            off.append(np.diagonal(found) / np.diagonal(np.array(true[key])) - 1.0)
-    return (
-        f"The records are computed, so the truth is known: the largest error of an identified direct coefficient is "
-        f"{100 * np.max(np.abs(off)):.2f} %."
-    )
+        true = points[(p.point.static_load, p.point.excitation_hz)]
+        for matrix, key in ((p.stiffness.k, "K_apparent"), (p.stiffness.c, "C_apparent")):
+            errors = np.diagonal(matrix) / np.diagonal(np.array(true[key])) - 1.0
+            largest = max(largest, float(np.max(np.abs(errors))))
+    return largest

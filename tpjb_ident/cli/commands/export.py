@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_campaign
-from tpjb_ident.cli.common.options import Method, Norm, Out, one_of, out_folder
-from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import note_line, print_line, progress
+from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.identification import identify_settings
+from tpjb_ident.cli.common.options import DEMO, Method, Norm, one_of
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, export_format
 from tpjb_ident.rounding import counted
-from tpjb_ident.runtime.output_folder import output_folder
-from tpjb_ident.runtime.provenance import sha256
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,14 +28,18 @@ Force = Annotated[
 ]
 
 
-@guarded
+@command(
+    "tpjb export tpjb-identify-out --to ross",
+    "tpjb export tpjb-predict-out --to excel",
+    f"tpjb export {DEMO} --to mat",
+)
 def export(
+    c: Command,
     source: Source,
     to: Annotated[str, typer.Option("--to", help=f"{', '.join(FORMATS)}.", autocompletion=one_of(*FORMATS))],
     method: Method = "mm-eiv",
     norm: Norm = None,
     force: Force = False,
-    out: Out = None,
 ) -> None:
     """Write coefficients as other programs read them.
 
@@ -49,19 +49,16 @@ def export(
     beside it does. Points that are not to be trusted stay behind (exit code 3).
     """
     from tpjb_ident.exports.write import export as write_export
-    from tpjb_ident.exports.write import result_table
 
     form = export_format(to)
-    frame, name, inputs = _coefficients(source, method, norm)
-    target = out_folder(out, "export")
-    with output_folder(target, f"export {to}", (source,) if not result_table(source) else ()) as folder:
+    frame, name = _coefficients(c, source, method, norm)
+    with c.results(f"export {to}") as folder:
         written = write_export(frame, to, folder, force=force, name=name)
-        options = {"source": source, "to": to, "method": method, "norm": norm, "force": force}
-        write_record(folder, target, f"export {to}", options, inputs, written.chosen.doubtful)
-    print_line(str(written))
-    print_line(f"Results: {target}")
+        c.remarks = written.chosen.doubtful
+    c.print(str(written))
+    c.print(f"Results: {c.target}")
     if form.note:
-        note_line("note", form.note)
+        c.note(form.note)
     _refuse_doubtful(written.chosen, force)
 
 
@@ -70,25 +67,25 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
     parts = []
     if chosen.left_out:
         parts.append(f"left out, because their coefficients are not finite: {'; '.join(chosen.left_out[:5])}")
-    if chosen.doubtful:
-        what = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
-        more = [f"... and {len(chosen.doubtful) - 5} more"] if len(chosen.doubtful) > 5 else []
-        parts.append("\n".join([f"{counted(len(chosen.doubtful), 'point')}, {what}:", *chosen.doubtful[:5], *more]))
+    if doubtful := chosen.doubtful:
+        action = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
+        parts += [f"{counted(len(doubtful), 'point')}, {action}:", *doubtful[:5]]
+        if len(doubtful) > 5:
+            parts.append(f"... and {len(doubtful) - 5} more")
     if parts:
         raise NotTrustedError("\n".join(parts))
 
 
-def _coefficients(source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str, dict[str, str]]:
+def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str]:
+    """Table of coefficients of a results folder, or of a campaign that is identified for it, and its name."""
     from tpjb_ident.exports.write import read_result_table, result_table
 
     path = result_table(source)
     if path is not None:
-        return read_result_table(path), path.parent.resolve().name, {path.name: sha256(path)}
-    from tpjb_ident.cli.commands.identify import identify_settings
+        return read_result_table(c.file(path)), path.parent.resolve().name
     from tpjb_ident.dynamic.identify import identify as run_identification
 
-    campaign = open_campaign(source)
-    settings = identify_settings(campaign, method, norm)
-    with progress("identifying") as show:
-        result = run_identification(campaign, settings, show)
-    return result.to_frame(), campaign.id, campaign.fingerprint()
+    campaign = c.open(source)
+    settings = identify_settings(c, campaign, method, norm)
+    with c.progress("identifying") as show:
+        return run_identification(campaign, settings, show).to_frame(), campaign.id

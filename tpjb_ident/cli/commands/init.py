@@ -1,4 +1,4 @@
-"""`tpjb init`: look at a folder of exports and draft its manifest."""
+"""`tpjb init`: survey a folder of exports and draft its manifest."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import model
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.output import command_output
-from tpjb_ident.cli.common.terminal import command_line, note_line, print_line, progress, table
+from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from rigdata.problem import Problem
     from rigdata.survey.draft import Survey
     from rigdata.survey.exports import Export
 
 MANIFEST = "campaign.toml"
-#: What a draft of the bearing is called, and where its text lies in the model's package.
+#: What a draft of the bearing is called, and its text in the model's package.
 BEARING, DRAFT = "bearing.toml", "bearing_draft.toml"
+#: Records that are listed; the manifest has all of them.
+MOST_RECORDS = 20
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the records of a logger.")]
 Bearing = Annotated[
     str | None, typer.Option("--bearing", metavar="NAME", help="Bearing file in that folder [default: looked for].")
@@ -32,13 +31,14 @@ Bearing = Annotated[
 Update = Annotated[
     bool, typer.Option("--update", help="Carry on a campaign.toml that was edited: new records, guesses made anew.")
 ]
-Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the draft [default: beside the records].")
-]
 
 
-@guarded
-def init(folder: Folder, bearing: Bearing = None, update: Update = False, out: Out = None) -> None:
+@command(
+    "tpjb init exports",
+    "tpjb init exports --bearing rocker.toml",
+    out_help="Folder for the draft [default: beside the records].",
+)
+def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = False) -> None:
     """Draft the campaign.toml of a folder of exports.
 
     And its bearing.toml, where there is none. Channels, units, rates and kinds of run are guessed from names and
@@ -48,109 +48,114 @@ def init(folder: Folder, bearing: Bearing = None, update: Update = False, out: O
     """
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")
-    target = out if out is not None else folder
+    c.target = c.out or folder
     if update:
-        _update(folder, target)
-        return
-    if (target / MANIFEST).exists():
-        raise BadInputError(
-            f"{target / MANIFEST}: is there already and stays as it is. Give --update to carry it on, another --out, "
-            "or move the file away."
-        )
+        _update(c, folder)
+    else:
+        _draft(c, folder, bearing)
+    c.next(f"tpjb check {folder}")
+
+
+def _draft(c: Command, folder: Path, bearing: str | None) -> None:
     from rigdata.survey.draft import draft_manifest, survey
 
-    exports, problems = looked_at(folder, ())
-    found = survey(exports)
+    manifest = c.target / MANIFEST
+    if manifest.exists():
+        raise BadInputError(
+            f"{manifest}: is there already and stays as it is. Give --update to carry it on, another --out, "
+            "or move the file away."
+        )
+    exports, problems = _read_exports(c, folder, ())
+    guesses = survey(exports)
     name = re.sub(r"[^\w.+=@-]+", "-", folder.resolve().name) or "campaign"
-    given = bearing or bearing_file(folder)
-    text = draft_manifest(found, name, given or BEARING)
-    target.mkdir(parents=True, exist_ok=True)
-    write_text(target / MANIFEST, text)
-    command_output().add_files(target, (MANIFEST,))
-    _show_survey(found, folder.name)
+    bearing = bearing or _bearing_file(folder)
+    text = draft_manifest(guesses, name, bearing or BEARING)
+    c.target.mkdir(parents=True, exist_ok=True)
+    write_text(manifest, text)
+    c.wrote(MANIFEST)
+    _show_survey(c, guesses, folder.name)
     for problem in problems:
-        note_line("warning", f"left out: {problem}")
-    print_line(f"{target / MANIFEST}: {_marks(text)} lines are marked ??; only you can fill them in.")
-    if given is None and not (target / BEARING).exists():
-        draft = _bearing_draft(found)
-        write_text(target / BEARING, draft)
-        command_output().add_files(target, (BEARING,))
-        print_line(f"{target / BEARING}: {_marks(draft)} more, from drawing and data sheet; `identify` needs none.")
-    command_line(f"tpjb check {folder}")
+        c.warn(f"left out: {problem}")
+    c.print(f"{manifest}: {_open_lines(text)} lines are marked ??; only you can fill them in.")
+    draft = c.target / BEARING
+    if bearing is None and not draft.exists():
+        text = _bearing_draft(guesses)
+        write_text(draft, text)
+        c.wrote(BEARING)
+        c.print(f"{draft}: {_open_lines(text)} more, from drawing and data sheet; `identify` needs none.")
 
 
-def _update(folder: Path, target: Path) -> None:
+def _update(c: Command, folder: Path) -> None:
     from rigdata.survey.update import column_names, updated_manifest
 
-    place = target / MANIFEST
-    if not place.is_file():
-        raise BadInputError(f"{place}: is not there, so there is nothing to carry on. Leave --update out.")
-    before = place.read_text("utf-8-sig")
-    exports, problems = looked_at(folder, column_names(before))
+    manifest = c.target / MANIFEST
+    if not manifest.is_file():
+        raise BadInputError(f"{manifest}: is not there, so there is nothing to carry on. Leave --update out.")
+    before = manifest.read_text("utf-8-sig")
+    exports, problems = _read_exports(c, folder, column_names(before))
     text, changes = updated_manifest(before, exports)
     for problem in problems:
-        note_line("warning", f"left out: {problem}")
+        c.warn(f"left out: {problem}")
     for change in changes:
-        print_line(change)
-    if text.split() != before.split():
-        write_text(place.with_suffix(".toml.bak"), before)
-        write_text(place, text)
-        command_output().add_files(target, (MANIFEST,))
-        print_line(f"{place}: {len(changes)} changes (before: {place.name}.bak), {_marks(text)} lines are marked ??.")
-    else:
-        print_line(f"{place}: nothing to change, {_marks(text)} lines are marked ??.")
-    command_line(f"tpjb check {folder}")
+        c.print(change)
+    marks = f"{_open_lines(text)} lines are marked ??."
+    if text.split() == before.split():
+        c.print(f"{manifest}: nothing to change, {marks}")
+        return
+    backup = manifest.with_suffix(".toml.bak")
+    write_text(backup, before)
+    write_text(manifest, text)
+    c.wrote(MANIFEST)
+    c.print(f"{manifest}: {len(changes)} changes (before: {backup.name}), {marks}")
 
 
-def _marks(text: str) -> int:
+def _open_lines(text: str) -> int:
     return sum("??" in line.partition("#")[0] for line in text.splitlines())
 
 
-def looked_at(folder: Path, names: Sequence[str]) -> tuple[list[Export], list[Problem]]:
+def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[Export], list[str]]:
     """Read all records of a folder; what is wrong with those that cannot be read."""
+    from rigdata.problem import Problem
     from rigdata.survey.exports import read_exports, record_files
     from rigdata.survey.update import renamed
 
     problems: list[Problem] = []
     exports: list[Export] = []
-    with progress(f"looking at {folder.name}") as show:
+    with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
         for export in read_exports(folder, problems):
             exports.append(renamed(export, names) if names and export.nameless else export)
             show(export.name, len(exports), total)
     if not exports:
         raise BadInputError("\n".join(str(p) for p in problems[:5]))
-    return exports, problems
+    return exports, [str(p) for p in problems]
 
 
-def _bearing_draft(found: Survey) -> str:
+def _bearing_draft(guesses: Survey) -> str:
     """Text of a bearing file with every entry explained; the pads' angles where dry load steps tell them."""
     text = (Path(model.__file__).parent / DRAFT).read_text("utf-8")
-    steps = {run.pad: run.direction for run in found.runs if run.kind == "dry_pivot" and run.pad}
-    count = len(steps)
-    if count > 1 and sorted(steps) == list(range(1, count + 1)) and all(math.isfinite(a) for a in steps.values()):
-        angles = ", ".join(f'"{steps[pad]:g} deg"' for pad in sorted(steps))
+    steps = {run.pad: run.direction for run in guesses.runs if run.kind == "dry_pivot" and run.pad}
+    pads = list(range(1, len(steps) + 1))
+    if len(pads) > 1 and sorted(steps) == pads and all(math.isfinite(angle) for angle in steps.values()):
+        angles = ", ".join(f'"{steps[pad]:g} deg"' for pad in pads)
         text = text.replace('["?? deg"]          #', f"[{angles}]\n# (guess) where the dry steps pull;")
     return text
 
 
-def bearing_file(folder: Path) -> str | None:
+def _bearing_file(folder: Path) -> str | None:
     """Name of the one bearing file in a folder; None if there is none, or several."""
-    found = [
-        p.name for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]
-    ]
-    return found[0] if len(found) == 1 else None
+    files = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
+    return files[0].name if len(files) == 1 else None
 
 
-def _show_survey(found: Survey, name: str) -> None:
+def _show_survey(c: Command, guesses: Survey, name: str) -> None:
     """Print what the channels and the files may be."""
-    rows = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in found.channels.items()]
-    table(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], rows, words=range(5))
-    runs = [
-        [export, run.kind or "?", f"{rate:g}" if rate > 0 else "?",
-         ", ".join(f"{x.frequency:.4g}" for x in run.lines[:3]) or "-", run.why]
-        for export, rate, run in zip(found.exports[:20], found.rates, found.runs, strict=False)
-    ]  # fmt: skip
-    table(f"{name}: records, guessed", ["file", "kind", "rate Hz", "lines Hz", "why"], runs, words=(0, 1, 3, 4))
-    if len(found.exports) > len(runs):
-        print_line(f"... and {len(found.exports) - len(runs)} more records")
+    channels = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in guesses.channels.items()]
+    c.show(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], channels, words=range(5))
+    runs = []
+    for export, rate, run in zip(guesses.exports[:MOST_RECORDS], guesses.rates, guesses.runs, strict=False):
+        lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3]) or "-"
+        runs.append([export, run.kind or "?", f"{rate:g}" if rate > 0 else "?", lines, run.why])
+    c.show(f"{name}: records, guessed", ["file", "kind", "rate Hz", "lines Hz", "why"], runs, words=(0, 1, 3, 4))
+    if len(guesses.exports) > len(runs):
+        c.print(f"... and {len(guesses.exports) - len(runs)} more records")

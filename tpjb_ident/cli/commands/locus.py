@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import open_bearing, open_campaign
-from tpjb_ident.cli.common.options import BearingOption, CampaignPath, Out, out_folder
-from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import note_line, print_line, progress, table
+from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.runtime.output_folder import output_folder
-from tpjb_ident.runtime.tables import write_table
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
@@ -23,98 +16,103 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.static_tests import StaticTests
 
 
-@guarded
-def locus(campaign: CampaignPath, bearing: BearingOption = None, out: Out = None) -> None:
+@command(f"tpjb locus {DEMO}")
+def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> None:
     """Measure the shaft centre locus and the clearance polygon by pad.
 
     Writes locus and clearance (.csv, .parquet) and a figure; positions count from the centre of the polygon. With
     several sweeps (hot and cold, two push loads) also clearance_runs and clearance_pairs.
     """
-    source = open_campaign(campaign)
+    source = c.open(campaign)
     if not (source.of_kind("locus") or source.of_kind("clearance")):
         raise BadInputError(f"campaign {source.id}: has neither locus nor clearance runs; there is nothing to measure.")
-    drawn, given = open_bearing(source, bearing)
+    drawing = c.bearing_of(source, bearing)
     import numpy as np
 
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.figure import save_panels
     from tpjb_ident.report.panels import position_panels
 
-    target = out_folder(out, "locus")
-    with output_folder(target, "locus", (campaign,)) as folder:
-        with progress("measuring positions"):
-            static = measure_static(source, drawn)
-            polygon, found = static.clearance, static.locus
-            others, refused = _other_polygons(source, drawn, static)
-        if polygon is None and found is None:
-            raise BadInputError("; ".join(c.detail for c in static.left_out))
-        if found is not None:
-            write_table(folder, "locus", found.to_frame())
-        if polygon is not None:
-            write_table(folder, "clearance", polygon.to_frame())
-        if polygon is not None and others:
-            _write_pairs(folder, polygon, others)
-        pads = (np.array([p.pivot_angle for p in drawn.pads]), np.array([p.assembled_clearance for p in drawn.pads]))
-        save_panels(position_panels(polygon, pads, found, {}, others), folder / "figures")
-        write_record(folder, target, "locus", {"campaign": campaign, "bearing": bearing or source.bearing_name},
-                     source.fingerprint() | given)  # fmt: skip
-    if polygon is not None:
-        _show_clearance(polygon, drawn, source.id)
-    if found is not None:
-        print_line(f"locus: {found}")
-    for condition in polygon.status if polygon is not None else ():  # those of the locus stand in its line
-        note_line("note", condition.sentence())
-    for sentence in dict.fromkeys([*(c.sentence() for c in static.left_out), *refused]):
-        if found is None or sentence not in sentences(found.status):
-            note_line("note", sentence)
-    for other in others:
-        print_line(str(other))
-    print_line(f"Results: {target}")
-    if polygon is None and source.of_kind("clearance"):
+    with c.results() as folder:
+        with c.progress("measuring positions"):
+            static = measure_static(source, drawing)
+            polygons, refused = _other_polygons(source, drawing, static)
+        if static.clearance is None and static.locus is None:
+            raise BadInputError("; ".join(condition.detail for condition in static.left_out))
+        _write_tables(c, static, polygons)
+        angles = np.array([pad.pivot_angle for pad in drawing.pads])
+        clearances = np.array([pad.assembled_clearance for pad in drawing.pads])
+        panels = position_panels(static.clearance, (angles, clearances), static.locus, {}, polygons)
+        save_panels(panels, folder / "figures")
+    _show(c, static, drawing, source.id, refused)
+    for polygon in polygons:
+        c.print(str(polygon))
+    c.print(f"Results: {c.target}")
+    if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."
         )
-    bad = [c.sentence() for part in (polygon, found) if part is not None for c in untrusted(part.status)]
+    bad = []
+    for part in (static.clearance, static.locus):
+        if part is not None:
+            bad += [condition.sentence() for condition in untrusted(part.status)]
     if bad:
         raise NotTrustedError("; ".join(bad))
 
 
 def _other_polygons(
-    source: Campaign, drawn: Bearing, static: StaticTests
-) -> tuple[tuple[ClearancePolygon, ...], tuple[str, ...]]:
-    """Polygons of the sweeps beside the one that counts, and what is wrong with those that cannot be used."""
+    source: Campaign, drawing: Bearing, static: StaticTests
+) -> tuple[tuple[ClearancePolygon, ...], list[str]]:
+    """Polygons of the sweeps besides the one that counts, and what is wrong with those that cannot be used."""
     from rigdata.problem import RigDataError
     from tpjb_ident.clearance.measure import measure_run
 
-    angles = [pad.pivot_angle for pad in drawn.pads]
-    first = static.clearance
-    found, refused = [], []
+    angles = [pad.pivot_angle for pad in drawing.pads]
+    polygons: list[ClearancePolygon] = []
+    refused: list[str] = []
     for run in source.of_kind("clearance"):
-        if first is None or run.id == first.run:
+        if static.clearance is None or run.id == static.clearance.run:
             continue
         try:
-            found.append(measure_run(run, angles, static.curves or None))
+            polygons.append(measure_run(run, angles, static.curves or None))
         except RigDataError as error:
             refused.append(f"runs-refused: {run.id} ({error.problems[0]})")
-    return tuple(found), tuple(refused)
+    return tuple(polygons), refused
 
 
-def _write_pairs(folder: Path, polygon: ClearancePolygon, others: Sequence[ClearancePolygon]) -> None:
-    """Write all polygons, and each beside the one that counts."""
-    import pandas as pd
+def _write_tables(c: Command, static: StaticTests, polygons: tuple[ClearancePolygon, ...]) -> None:
+    """Write the locus and all polygons, and each of the others with the one that counts."""
+    if static.locus is not None:
+        c.table("locus", static.locus.to_frame())
+    if static.clearance is None:
+        return
+    c.table("clearance", static.clearance.to_frame())
+    if polygons:
+        import pandas as pd
 
-    from tpjb_ident.clearance.measure import pairs_frame
+        from tpjb_ident.clearance.measure import pairs_frame
 
-    frames = [one.to_frame() for one in (polygon, *others)]
-    write_table(folder, "clearance_runs", pd.concat(frames, ignore_index=True))
-    write_table(folder, "clearance_pairs", pairs_frame(polygon, others))
+        frames = [polygon.to_frame() for polygon in (static.clearance, *polygons)]
+        c.table("clearance_runs", pd.concat(frames, ignore_index=True))
+        c.table("clearance_pairs", pairs_frame(static.clearance, polygons))
 
 
-def _show_clearance(polygon: ClearancePolygon, bearing: Bearing, name: str) -> None:
-    """Print the clearance per pad beside the drawing's."""
-    rows = [
-        [f"#{k + 1}", f"{1e6 * pad.assembled_clearance:.1f}", f"{1e6 * polygon.clearance[k]:.2f}",
-         f"{1.96e6 * polygon.clearance_se[k]:.2f}", f"{1e6 * polygon.clearance_pushed[k]:.2f}"]
-        for k, pad in enumerate(bearing.pads)
-    ]  # fmt: skip
-    table(f"{name}: clearance, µm", ["pad", "drawing", "measured", "± (95 %)", "pushed"], rows)
+def _show(c: Command, static: StaticTests, bearing: Bearing, name: str, refused: list[str]) -> None:
+    """Print the clearance per pad and the drawing's, the locus, and what is wrong with either."""
+    polygon = static.clearance
+    if polygon is not None:
+        rows = []
+        for k, pad in enumerate(bearing.pads):
+            measured = (polygon.clearance[k], 1.96 * polygon.clearance_se[k], polygon.clearance_pushed[k])
+            drawn = f"{1e6 * pad.assembled_clearance:.1f}"
+            rows.append([f"#{k + 1}", drawn, *(f"{1e6 * value:.2f}" for value in measured)])
+        c.show(f"{name}: clearance, µm", ["pad", "drawing", "measured", "± (95 %)", "pushed"], rows)
+    printed: tuple[str, ...] = ()
+    if static.locus is not None:
+        c.print(f"locus: {static.locus}")
+        printed = sentences(static.locus.status)
+    for condition in polygon.status if polygon is not None else ():
+        c.note(condition.sentence())
+    for text in dict.fromkeys([*(condition.sentence() for condition in static.left_out), *refused]):
+        if text not in printed:
+            c.note(text)

@@ -8,38 +8,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tpjb_ident.cli.commands.predict import operating_points, pivot_choice
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import refuse_special
-from tpjb_ident.cli.common.options import (
-    BearingPath,
-    LoadDirections,
-    Loads,
-    Out,
-    PivotChoice,
-    Speeds,
-    as_given,
-    out_folder,
-)
-from tpjb_ident.cli.common.run_record import write_record
-from tpjb_ident.cli.common.terminal import print_line, progress, table
-from tpjb_ident.compare.effect_words import UNITS, label_in_words
+from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice
+from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Speeds
 from tpjb_ident.rounding import signed
-from tpjb_ident.runtime.output_folder import output_folder
-from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.runtime.tables import write_table, write_text
+from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from model.effects.kind import Parameter
     from model.setup import Setup
     from tpjb_ident.diagnosis.observations.observe import Layout
     from tpjb_ident.diagnosis.plan import CampaignPlan
 
 
-@guarded
+@command(
+    f"tpjb plan {ROCKER}",
+    f'tpjb plan {ROCKER} --load "5, 10 kN" --excitation "20..60:10 Hz" --locus 0',
+)
 def plan(
+    c: Command,
     bearing: BearingPath,
     pivots: PivotChoice = "kirk",
     load: Loads = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
@@ -51,7 +38,6 @@ def plan(
     push: Annotated[float, typer.Option(min=0.0, help="Push load of the clearance sweep [N]; 0: none.")] = 200.0,
     temperatures: Annotated[bool, typer.Option(help="A temperature sensor in every pad.")] = True,
     data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
-    out: Out = None,
 ) -> None:
     """Tell which effects a planned campaign could see.
 
@@ -62,74 +48,66 @@ def plan(
     (A), all of h (B), with locus and polygon (C), everything planned (D) and a second speed beside it (E) could tell,
     and a matrix and a picture of each.
     """
-    options = as_given(locals())
-    refuse_special(bearing)
-    from model.bearing_file import load_bearing
+    drawing = c.bearing(bearing)
     from model.pivots import pivot_laws
     from model.setup import Setup
     from tpjb_ident.diagnosis.from_python import planned_layout
-    from tpjb_ident.diagnosis.plan import plan as work_out
+    from tpjb_ident.diagnosis.plan import plan as plan_campaign
     from tpjb_ident.report.panels import save_isolability
 
-    drawn = load_bearing(bearing)
     points = operating_points(load, load_direction, speed, excitation)
-    tests = planned_layout(drawn, points, (locus, dry, push, temperatures))
-    target = out_folder(out, "plan")
-    with output_folder(target, "plan") as folder:
-        with progress("planning") as show:
+    tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
+    with c.results() as folder:
+        with c.progress("planning") as show:
             show("every effect of the library", 0, 1)
-            setup = Setup(drawn, pivot_laws(pivot_choice(pivots), drawn))
-            found = work_out(setup, tests)
-            plans = {"isolability": found}
+            setup = Setup(drawing, pivot_laws(pivot_choice(c, pivots), drawing))
+            result = plan_campaign(setup, tests)
+            plans = {"isolability": result}
             if data_sets:
                 show("parts of the campaign", 1, 2)
-                plans |= _parts(folder, setup, tests)
-        frame = found.to_frame()
-        write_table(folder, "effects", frame)
-        for name, one in plans.items():
-            write_table(folder, name, one.matrix())
+                plans |= _data_sets(c, setup, tests)
+        c.table("effects", result.to_frame())
+        for name, part in plans.items():
+            c.table(name, part.matrix())
         save_isolability(folder, plans)
-        write_text(folder / "plan.json", json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n")
-        write_record(folder, target, "plan", options, {bearing.name: sha256(bearing)})
-    _show(found)
-    print_line(f"Results: {target}")
+        write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
+    _show(c, result)
+    c.print(f"Results: {c.target}")
 
 
-def _parts(folder: Path, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
+def _data_sets(c: Command, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
     """Write the table of data sets; what each could tell with calibration errors free, by file name."""
     import pandas as pd
 
     from tpjb_ident.diagnosis.plan import data_sets
 
-    found = data_sets(setup, tests)
-    write_table(folder, "data_sets", pd.DataFrame([one.to_row() for one in found]))
-    return {f"isolability_{one.name}": one.free for one in found}
+    sets = data_sets(setup, tests)
+    c.table("data_sets", pd.DataFrame([data_set.to_row() for data_set in sets]))
+    return {f"isolability_{data_set.name}": data_set.free for data_set in sets}
 
 
-def _seen_from(at: float, parameter: Parameter) -> str:
+def _detected_from(size: float, parameter: Parameter) -> str:
     """The size from which an effect is seen; a factor as its distance from one."""
-    if math.isnan(at):
+    from tpjb_ident.compare.effect_words import UNITS
+
+    if math.isnan(size):
         return "never"
     unit, scale = UNITS.get(parameter.unit, (parameter.unit, 1.0))
     if unit == "%" and parameter.neutral == 1.0:
-        return f"{signed(100 * (at - 1.0))} %"
-    return f"{float(f'{at / scale:.3g}'):g} {unit}".replace(" °", "°")
+        return f"{signed(100 * (size - 1.0))} %"
+    return f"{float(f'{size / scale:.3g}'):g} {unit}".replace(" °", "°")
 
 
-def _show(found: CampaignPlan) -> None:
+def _show(c: Command, result: CampaignPlan) -> None:
+    from tpjb_ident.compare.effect_words import label_in_words
+
     rows = []
-    for row, candidate in zip(found.to_frame().to_dict("records"), found.candidates, strict=True):
+    for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates, strict=True):
+        size = _detected_from(float(row["seen_from"]), candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
-        rows.append(
-            [
-                label_in_words(row["effect"]),
-                f"{row['typical_size_sigma']:.1f}",
-                _seen_from(float(row["seen_from"]), candidate.parameter),
-                like,
-            ]
-        )
-    table("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, (0, 3))
-    print_line("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
-    blind = [label_in_words(name) for name in found.below_floor]
-    print_line(f"Below the floor at a size that would not surprise: {', '.join(blind) if blind else 'nothing'}.")
-    print_line(f"Pairs it could not tell apart at d' = 6: {len(found.confusable)} of {found.pairs}.")
+        rows.append([label_in_words(row["effect"]), f"{row['typical_size_sigma']:.1f}", size, like])
+    c.show("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, words=(0, 3))
+    c.print("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
+    blind = ", ".join(label_in_words(name) for name in result.below_floor)
+    c.print(f"Below the floor at a size that would not surprise: {blind or 'nothing'}.")
+    c.print(f"Pairs it could not tell apart at d' = 6: {len(result.confusable)} of {result.pairs}.")

@@ -8,33 +8,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tpjb_ident.cli.common.errors import guarded
-from tpjb_ident.cli.common.inputs import campaign_place, open_bearing, open_campaign
-from tpjb_ident.cli.common.options import BearingOption
-from tpjb_ident.cli.common.terminal import note_line, print_line
+from tpjb_ident.cli.common.command import Command, campaign_place, command
+from tpjb_ident.cli.common.options import DEMO, BearingOption
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import former_runs
 
 if TYPE_CHECKING:
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
     from tpjb_ident.view.server import Session
 
 Source = Annotated[Path, typer.Argument(metavar="CAMPAIGN|DIR", help="A campaign, or an output folder of tpjb.")]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0: any free one.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in your browser.")]
 Seconds = Annotated[float | None, typer.Option(min=0.1, help="Stop after this time [default: at Ctrl-C].")]
-Out = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Not used: looking writes nothing.", hidden=False)
-]
 
 
-@guarded
+@command(f"tpjb view {DEMO}", "tpjb view tpjb-compare-out", out_help="Not used: looking writes nothing.")
 def view(
+    c: Command,
     source: Source,
     bearing: BearingOption = None,
     port: Port = 0,
     browser: Browser = True,
     seconds: Seconds = None,
-    out: Out = None,
 ) -> None:
     """Open a local page with records, points and model.
 
@@ -42,11 +39,17 @@ def view(
 
     The page is served on 127.0.0.1 only and loads nothing from anywhere else. Stop with Ctrl-C.
     """
-    session = _session(source, bearing)
+    from tpjb_ident.view.server import Session
+
+    place = campaign_place(source)
+    if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
+        session = Session(name=place.resolve().name, tables=_tables(place))
+    else:
+        session = _campaign_session(c, source, bearing)
     from tpjb_ident.view.server import serve
 
     def ready(address: str) -> None:
-        print_line(f"{session.name}: {address}   (Ctrl-C ends it)")
+        c.print(f"{session.name}: {address}   (Ctrl-C ends it)")
         if browser:
             import webbrowser
 
@@ -55,16 +58,13 @@ def view(
     try:
         serve(session, port, ready, seconds)
     except KeyboardInterrupt:
-        note_line("note", "closed.")
+        c.note("closed.")
 
 
-def _session(source: Path, bearing: Path | None) -> Session:
+def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session:
     from tpjb_ident.view.server import Session
 
-    place = campaign_place(source)
-    if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
-        return Session(name=place.resolve().name, tables=_tables(place))
-    campaign = open_campaign(source)
+    campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
         from tpjb_ident.dynamic.identify import identify
@@ -72,36 +72,37 @@ def _session(source: Path, bearing: Path | None) -> Session:
 
         session.identify = lambda: identify(campaign, IdentifySettings())
         if bearing is not None or campaign.bearing_text:
-            drawn, _ = open_bearing(campaign, bearing)
-            session.bearing = drawn
-            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured(campaign, drawn)}
+            drawing = c.bearing_of(campaign, bearing)
+            session.bearing = drawing
+            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, drawing)}
     return session
 
 
 def _tables(folder: Path) -> dict[str, Any]:
+    """Tables of a results folder, and the problems that `check` found."""
     import pandas as pd
 
-    found: dict[str, Any] = {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
-    for path in sorted(folder.glob("*.json")):
-        if path.name == "check.json":
-            problems = json.loads(path.read_text(encoding="utf-8")).get("problems", [])
-            found["problems"] = pd.DataFrame(problems or [{"what": "none"}])
-    if not found:
+    tables: dict[str, Any] = {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
+    findings = folder / "check.json"
+    if findings.exists():
+        problems = json.loads(findings.read_text(encoding="utf-8")).get("problems", [])
+        tables["problems"] = pd.DataFrame(problems or [{"what": "none"}])
+    if not tables:
         raise BadInputError(f"{folder}: holds no tables. Give a campaign, or the --out folder of another command.")
-    return found
+    return tables
 
 
-def _measured(campaign: Any, drawn: Any) -> dict[str, Any]:
+def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str, Any]:
     """Measured pivot laws, where every pad has a usable dry test."""
-    runs = campaign.of_kind("dry_pivot")
-    if {r.pad for r in runs} < set(range(1, len(drawn.pads) + 1)):
+    pads = set(range(1, len(bearing.pads) + 1))
+    if {run.pad for run in campaign.of_kind("dry_pivot")} < pads:
         return {}
     from tpjb_ident.compare.measured_pivots import measured_laws
     from tpjb_ident.pivot import fit_pivots
 
     try:
-        curves = fit_pivots(campaign, [pad.pivot_angle for pad in drawn.pads])
-        return {"measured": measured_laws(curves, len(drawn.pads), campaign.id)}
+        curves = fit_pivots(campaign, [pad.pivot_angle for pad in bearing.pads])
+        return {"measured": measured_laws(curves, len(bearing.pads), campaign.id)}
     except ValueError as error:  # one of our own refusals: the page is of use without these curves
-        note_line("warning", f"no measured pivots: {error}")
+        c.warn(f"no measured pivots: {error}")
         return {}

@@ -1,4 +1,4 @@
-"""Options and arguments that several commands share."""
+"""Options and arguments that several commands share, and their order in the help."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.errors import BadInputError
+
+#: Bundled files that the examples use, from the folder of the sources.
+DEMO, ROCKER = "rigdata/samples/demo.h5", "model/bearings/rocker.toml"
 
 
 def one_of(*names: str) -> Callable[[str], list[str]]:
@@ -35,10 +39,6 @@ ReadingError = Annotated[
     str | None, typer.Option("--reading-error", metavar="SHARE", help="How far values of the table hold, such as 5%.")
 ]
 BearingPath = Annotated[Path, typer.Argument(metavar="BEARING.toml", help="Bearing file (tpjb-bearing/1).")]
-Out = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", help="Folder for the results [default: tpjb-COMMAND-out here]."),
-]
 BearingOption = Annotated[
     Path | None,
     typer.Option("--bearing", metavar="FILE", help="Bearing file [default: the one that the campaign names]."),
@@ -95,11 +95,6 @@ Scheduler = Annotated[
 ]
 
 
-def as_given(arguments: Mapping[str, Any], *without: str) -> dict[str, Any]:
-    """What a command was called with, for its record: ``as_given(locals())`` before anything else has a name."""
-    return {k: v for k, v in arguments.items() if k not in {"out", "workers", "scheduler", *without}}
-
-
 def named(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options as a report shows them: files by their names."""
     return {name: getattr(value, "name", value) for name, value in options.items()}
@@ -114,6 +109,38 @@ def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool 
         raise BadInputError(f"{option}: {value!r} is not known. {hint}")
 
 
-def out_folder(out: Path | None, command: str) -> Path:
-    """Return the folder for the results of `command`."""
-    return out if out is not None else Path(f"tpjb-{command}-out")
+#: Parameters from which on headings help more than they cost.
+MANY = 11
+#: Headings of the help with the parameters under them, in their order; others stand under "Options".
+HEADINGS = {
+    "Arguments": "",
+    "Operating points": "load load_direction speed excitation",
+    "Model": "bearing pivots thermal effects physics housing_temperature model_tolerance tolerance library",
+    "A table in place of records": "coefficients reading_error",
+    "Estimation": "method norm lines delay",
+    "Tests": "plan locus dry push temperatures repeats noise fault",
+    "Options": "",
+    "Running": "workers scheduler seed",
+    "Output": "name layout plain keep_r window data_sets out as_json quiet help",
+}
+
+
+class GroupedHelp(TyperCommand):
+    """A command whose help lists its options under headings, in plain text, where there are many."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments, then options by heading; what every command has stands last."""
+        parameters = self.get_params(ctx)
+        groups: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
+        for parameter in parameters:
+            heading = next((h for h, names in HEADINGS.items() if parameter.name in names.split()), "Options")
+            if parameter.param_type_name == "argument":
+                heading = "Arguments"
+            elif len(parameters) < MANY:
+                heading = "Options"
+            if record := parameter.get_help_record(ctx):
+                groups[heading].append(record)
+        for heading, records in groups.items():
+            if records:
+                with formatter.section(heading):
+                    formatter.write_dl(records)

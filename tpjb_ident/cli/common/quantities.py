@@ -57,6 +57,14 @@ def parse_value(text: str, dimension: str, option: str) -> float:
     return values[0]
 
 
+def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
+    """Read one quantity in the words of a manifest; `place` says where it was typed, `example` how it is written."""
+    try:
+        return parse_quantity(text, dimension)
+    except UnitError as error:
+        raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
+
+
 def _example(dimension: str) -> str:
     return _EXAMPLES.get(dimension, "1 (with a unit)")
 

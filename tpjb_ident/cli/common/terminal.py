@@ -1,16 +1,15 @@
-"""What the person at the terminal sees: short tables, messages, progress. Results go to stdout, the rest to stderr."""
+"""What the person at the terminal sees: results on standard output, messages and progress on standard error."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import shutil
+import textwrap
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.output import command_output
-from tpjb_ident.cli.common.table_layout import table_lines, wrapped
 from tpjb_ident.runtime.tables import printable, readable
 
 if TYPE_CHECKING:
@@ -22,117 +21,115 @@ LINE_EVERY = 30.0
 LOG_WIDTH = 100
 #: Rows of a table that are printed where a file has them all.
 MOST_ROWS = 40
-#: Share of a step from which its speed is known well enough to tell the time left.
+#: Share of a step from which its speed is known well enough to tell the remaining time.
 FORETELLS = 0.02
+#: Columns between two columns of a table.
+SPACE = 2
+#: A column of words is not made narrower than this; what needs less room than it has is printed below the row instead.
+NARROWEST = 14
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
 
-def _console(stderr: bool = False) -> Console:
-    from rich.console import Console
+class Terminal:
+    """What a command prints, all of it or, with ``--quiet``, warnings and errors alone; collected for ``--json``."""
 
-    class Patient(Console):
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError  # `guarded` ends the command well; rich would say 1
+    def __init__(self, as_json: bool = False, quiet: bool = False) -> None:
+        self.as_json = as_json
+        self._silent = as_json or quiet
+        self.lines: list[str] = []
+        self.messages: list[dict[str, str]] = []
+        self.tables: list[dict[str, Any]] = []
 
-    console = Patient(stderr=stderr, highlight=False, soft_wrap=True)
-    return console
+    def print(self, text: str) -> None:
+        """Print one line; text from outside is shown as it is, less its control characters."""
+        self.lines.append(printable(text))
+        if not self._silent:
+            _console().print(_fitted(text), markup=False)
 
+    def next(self, command: str) -> None:
+        """Print the command that comes next, unbroken, so that it can be copied."""
+        line = f"Next: {printable(command)}"
+        self.lines.append(line)
+        if not self._silent:
+            _console().print(line, markup=False)
 
-def width() -> int:
-    """Columns that a table may take: the terminal's, or what COLUMNS says, or a log file's."""
-    return max(40, shutil.get_terminal_size((LOG_WIDTH, 24)).columns)
+    def error(self, kind: str, text: str) -> None:
+        """Print a message to stderr, its lines kept."""
+        lines = "\n".join(printable(line) for line in text.splitlines())
+        self.messages.append({"kind": kind, "text": lines})
+        _print_message(kind, lines)
 
+    def warn(self, text: str) -> None:
+        """Print a warning to stderr."""
+        self.messages.append({"kind": "warning", "text": printable(text)})
+        _print_message("warning", printable(text))
 
-def print_line(text: str) -> None:
-    """Print one line; text from outside is shown as it is, less its control characters."""
-    command_output().sentences.append(printable(text))
-    if command_output().silent:
-        return
-    _console().print(_fitted(text), markup=False)
+    def note(self, text: str) -> None:
+        """Print a remark to stderr; not of a quiet command."""
+        self.messages.append({"kind": "note", "text": printable(text)})
+        if not self._silent:
+            _print_message("note", printable(text))
 
+    def doing(self, text: str) -> None:
+        """Print to stderr what the command is at."""
+        if not self._silent:
+            _print_message("doing", printable(text))
 
-def _fitted(text: str, stderr: bool = False) -> str:
-    """Lines with whole words on a terminal; as they are in a log, which has no edge, and for who searches messages."""
-    lines = [readable(line) for line in text.split("\n")]
-    if _console(stderr).is_terminal or ("COLUMNS" in os.environ and not stderr):
-        lines = [part for line in lines for part in wrapped(line, width())]
-    return "\n".join(lines)
+    def show(
+        self,
+        title: str,
+        columns: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        words: Collection[int] = (0,),
+        file: str = "",
+    ) -> None:
+        """Print a table that fits the terminal, its columns of words to the left; of a long one the `file` with all."""
+        self.tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
+        if self._silent:
+            return
+        head = rows[:MOST_ROWS] if file else rows
+        cells = [[readable(cell) for cell in row] for row in head]
+        lines = table_lines([readable(column) for column in columns], cells, words, _width())
+        for line in ("", printable(title), *lines, ""):
+            _console().print(line, markup=False)
+        if len(head) < len(rows):
+            _console().print(f"{len(rows) - len(head)} more rows: {file} has all {len(rows)}", markup=False)
 
+    @contextlib.contextmanager
+    def progress(self, activity: str) -> Iterator[Progress]:
+        """Show a bar with the remaining time on a terminal while the block runs; elsewhere a line now and then."""
+        console = _console(stderr=True)
+        if self._silent or not console.is_terminal:
+            self.doing(activity)
+            yield ProgressLines(activity, self.doing).show
+            return
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bar
 
-def command_line(text: str) -> None:
-    """Print a command to type, unbroken, so that it can be copied."""
-    line = f"Next: {printable(text)}"
-    command_output().sentences.append(line)
-    if not command_output().silent:
-        _console().print(line, markup=False)
+        text = TextColumn("{task.description}", markup=False)
+        columns = (text, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+        with Bar(*columns, TextColumn("left"), console=console, transient=True, speed_estimate_period=120.0) as bar:
+            task = bar.add_task(activity, total=1.0)
 
+            def show(step: str, done: int, total: int) -> None:
+                # a step that cannot be counted pulses; a full bar would stop the clock
+                share, whole = (min(done / total, 0.999), 1.0) if total > 1 else (0.0, None)
+                bar.update(task, total=whole, completed=share, description=f"{activity}: {printable(step)}")
 
-def error_line(kind: str, text: str) -> None:
-    """Print a message to stderr, its lines kept."""
-    lines = "\n".join(printable(line) for line in text.splitlines())
-    command_output().remarks.append({"kind": kind, "text": lines})
-    style = "bold red" if kind == "bug" else None
-    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {lines}", stderr=True), markup=False, style=style)
-
-
-def note_line(kind: str, text: str) -> None:
-    """Print a remark to stderr; of a quiet command only warnings."""
-    if kind != "doing":
-        command_output().remarks.append({"kind": kind, "text": printable(text)})
-    if command_output().silent and kind != "warning":
-        return
-    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {printable(text)}", stderr=True), markup=False)
-
-
-def table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = (0,), whole: str = ""
-) -> None:
-    """Print a table that fits the terminal; columns of words stand left, numbers right."""
-    command_output().tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
-    if command_output().silent:
-        return
-    shown = rows[:MOST_ROWS] if whole else rows
-    lines = table_lines([readable(c) for c in columns], [[readable(c) for c in r] for r in shown], words, width())
-    for line in ("", printable(title), *lines, ""):
-        _console().print(line, markup=False)
-    if len(shown) < len(rows):
-        _console().print(f"{len(rows) - len(shown)} more rows: {whole} has all {len(rows)}", markup=False)
-
-
-@contextlib.contextmanager
-def progress(what: str) -> Iterator[Progress]:
-    """Show a bar with the time left on a terminal while the block runs; elsewhere a line now and then."""
-    console = _console(stderr=True)
-    if command_output().silent or not console.is_terminal:
-        note_line("doing", what)
-        yield _Lines(what)
-        return
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    text, left = TextColumn("{task.description}", markup=False), TextColumn("left")
-    columns = (text, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), left)
-    with Bar(*columns, console=console, transient=True, speed_estimate_period=120.0) as bar:
-        task = bar.add_task(what, total=1.0)
-
-        def show(text: str, done: int, total: int) -> None:
-            # a step that cannot be counted pulses; a full bar would stop the clock
-            share = min(done / total, 0.999) if total > 1 else 0.0
-            known = 1.0 if total > 1 else None
-            bar.update(task, total=known, completed=share, description=f"{what}: {printable(text)}")
-
-        yield show
+            yield show
 
 
-class _Lines:
-    """Progress for a log file: a line with the time left every half minute, none for what is quickly done."""
+class ProgressLines:
+    """Progress for a log file: a line with the remaining time every half minute, none for what is quickly done."""
 
-    def __init__(self, what: str) -> None:
-        self._what, self._step, self._first = what, 0, 0
+    def __init__(self, activity: str, report: Callable[[str], None]) -> None:
+        self._activity, self._report = activity, report
+        self._step, self._first = 0, 0
         self._began = self._last = time.monotonic()
 
-    def __call__(self, text: str, done: int, total: int) -> None:
+    def show(self, text: str, done: int, total: int) -> None:
+        """Print a line if it is time for one."""
         now = time.monotonic()
         # Another step has begun to count, or its first one is done, which also compiled, loaded and started workers.
         if done <= self._step or done == 1:
@@ -141,11 +138,11 @@ class _Lines:
         if now - self._last < LINE_EVERY or not 0 < done < total:
             return
         self._last = now
-        left = ""
+        remaining = ""
         counted = done - self._first
         if counted > 0 and done >= FORETELLS * total:
-            left = f", about {_duration((now - self._began) * (total - done) / counted)} left"
-        note_line("doing", f"{self._what}: {done} of {total}{left} ({text})")
+            remaining = f", about {_duration((now - self._began) * (total - done) / counted)} left"
+        self._report(f"{self._activity}: {done} of {total}{remaining} ({text})")
 
 
 def _duration(seconds: float) -> str:
@@ -153,3 +150,103 @@ def _duration(seconds: float) -> str:
     if minutes < 1:
         return f"{max(1, round(seconds))} s"
     return f"{minutes} min" if minutes < 120 else f"{minutes / 60:.1f} h"
+
+
+def _console(stderr: bool = False) -> Console:
+    from rich.console import Console
+
+    class PipeConsole(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # the command then ends well; rich would say 1
+
+    return PipeConsole(stderr=stderr, highlight=False, soft_wrap=True)
+
+
+def _print_message(kind: str, text: str) -> None:
+    style = "bold red" if kind == "bug" else None
+    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {text}", stderr=True), markup=False, style=style)
+
+
+def _width() -> int:
+    """Columns that a table may take: the terminal's, or what COLUMNS says, or a log file's."""
+    return max(40, shutil.get_terminal_size((LOG_WIDTH, 24)).columns)
+
+
+def _fitted(text: str, stderr: bool = False) -> str:
+    """Lines with whole words on a terminal; as they are in a log, which has no edge, and for who searches messages."""
+    lines = [readable(line) for line in text.split("\n")]
+    if _console(stderr).is_terminal or ("COLUMNS" in os.environ and not stderr):
+        lines = [part for line in lines for part in wrapped(line, _width())]
+    return "\n".join(lines)
+
+
+def cell_len(text: str) -> int:
+    """Columns that a text takes on a terminal; wide letters take two."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len as measured  # only where it is needed: help shall be instant
+
+    return measured(text)
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Break a sentence at spaces; words that are longer than a line, as paths are, stay whole."""
+    lines = textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return lines or [""]
+
+
+def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
+    """Lay out a table: numbers are never broken, words wrap, what has no room is printed below its row."""
+    cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
+    sizes = [max(cell, cell_len(column)) for cell, column in zip(cells, columns, strict=True)]
+    if _total(sizes) > width:  # headings break at spaces first
+        longest = [max((cell_len(word) for word in column.split()), default=0) for column in columns]
+        sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
+    below = _narrow(sizes, words, width)
+    beside = [i for i in range(len(columns)) if i not in below]
+    layout = [(i, sizes[i], i in words) for i in beside]
+    lines = _row_lines(columns, layout, bottom=True)
+    lines.append("-" * min(width, _total([sizes[i] for i in beside])))
+    for row in rows:
+        lines += _row_lines(row, layout)
+        for i in below:
+            if row[i].strip():
+                text = f"{columns[i]}: {row[i]}".lstrip(": ")
+                lines += [f"    {line}" for line in wrapped(text, width - 4)]
+    return lines
+
+
+def _narrow(sizes: list[int], words: Collection[int], width: int) -> list[int]:
+    """Make columns of words narrower until the table fits; those that cannot be are to be printed below their row."""
+    below: list[int] = []
+    while True:
+        over = _total([size for i, size in enumerate(sizes) if i not in below]) - width
+        candidates = [i for i in words if i not in below]
+        wide = [i for i in candidates if sizes[i] > NARROWEST]
+        if over > 0 and wide:
+            widest = max(wide, key=lambda i: sizes[i])
+            sizes[widest] = max(NARROWEST, sizes[widest] - over)
+        elif over > 0 and max(candidates, default=0) > 0:
+            below.append(max(candidates))
+        else:
+            return sorted(below)  # or numbers alone are wider than the terminal: nothing is lost by a long line
+
+
+def _total(sizes: Sequence[int]) -> int:
+    return sum(sizes) + SPACE * (len(sizes) - 1)
+
+
+def _row_lines(row: Sequence[str], layout: Sequence[tuple[int, int, bool]], bottom: bool = False) -> list[str]:
+    """Lines of one row, of (column, its size, whether it holds words) each; headings end at the bottom of theirs."""
+    blocks = []
+    for column, size, is_text in layout:
+        parts = [row[column]]
+        if cell_len(row[column]) > size:
+            parts = textwrap.wrap(row[column], max(size, 1), break_on_hyphens=False) or [""]
+        pads = [" " * max(0, size - cell_len(part)) for part in parts]
+        blocks.append((size, [part + pad if is_text else pad + part for part, pad in zip(parts, pads, strict=True)]))
+    height = max((len(block) for _, block in blocks), default=1)
+    for size, block in blocks:
+        missing = [" " * size] * (height - len(block))
+        block[:] = [*missing, *block] if bottom else [*block, *missing]
+    return [(" " * SPACE).join(cells).rstrip() for cells in zip(*(block for _, block in blocks), strict=True)]

@@ -1,4 +1,4 @@
-"""Tables fit the terminal: numbers stay whole, words wrap, what has no room stands below its row."""
+"""Tables fit the terminal; progress without one is a line now and then, with the remaining time once it is known."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tpjb_ident.cli.common.identification_display import cross_coupling_matters, with_half
-from tpjb_ident.cli.common.table_layout import cell_len, table_lines, wrapped
+from tests.command_line import tpjb
+from tpjb_ident.cli.common import terminal
+from tpjb_ident.cli.common.identification import cross_coupling_matters, with_half
+from tpjb_ident.cli.common.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]
 FLAGS = "large-amplitude; mains-on-excitation-line; methods-disagree"
@@ -72,11 +74,11 @@ def test_cross_coupling_is_shown_when_it_is_beyond_doubt():
 
 def test_notes_of_one_sort_are_counted():
     from rigdata.problem import Problem
-    from tpjb_ident.cli.commands.check import gathered
+    from tpjb_ident.cli.commands.check import problem_lines
 
     alike = [Problem("note", f"run{i}.csv", "time", f"the clock has {i} steps", "none", f"r{i}") for i in range(39)]
     error = [Problem("error", f"run{i}.csv", "time", "is empty", "mend it", f"r{i}") for i in range(5)]
-    sentences = gathered([*error, *alike])
+    sentences = problem_lines([*error, *alike])
     assert len(sentences) == 6
     assert "the like 38 more times" in sentences[-1]
 
@@ -88,3 +90,62 @@ def test_a_verdict_leads_to_a_command():
     consistent = SimpleNamespace(effects=(), verdict="consistent")
     assert next_command("k.h5", "", named, "o") == "tpjb compare k.h5 --effects o/updated.effects.toml"
     assert next_command("k.h5", "b.toml", consistent, "o") == "tpjb export o --to ross"
+
+
+@pytest.mark.parametrize("file", ["", "coefficients.csv"])
+def test_a_long_table_ends_with_the_file_that_has_all_of_it(capsys, file):
+    rows = [[f"row {i}", str(i)] for i in range(MOST_ROWS + 25)]
+    terminal = Terminal()
+    terminal.show("points", ["name", "value"], rows, file=file)
+    printed = capsys.readouterr().out
+    assert ("row 64" in printed) is (file == "")
+    assert ("25 more rows: coefficients.csv has all 65" in printed) is (file != "")
+    assert f"row {MOST_ROWS - 1}" in printed
+    assert terminal.tables[-1]["rows"] == rows  # --json repeats every row
+    terminal.show("points", ["name", "value"], rows[:MOST_ROWS], file="coefficients.csv")
+    assert "more rows" not in capsys.readouterr().out
+
+
+@pytest.fixture
+def lines(monkeypatch):
+    clock, printed = [0.0], []
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
+    progress = terminal.ProgressLines("identifying", printed.append)
+
+    def at(seconds: float, done: int, total: int) -> list[str]:
+        clock[0] = seconds
+        progress.show("d-1", done, total)
+        return printed
+
+    return at
+
+
+def test_what_is_quickly_done_says_nothing(lines):
+    for done in range(1, 20):
+        assert lines(done, done, 20) == []
+
+
+def test_time_left_is_told_from_the_speed_of_this_step(lines):
+    lines(0.0, 0, 1000)
+    assert lines(40.0, 100, 1000) == ["identifying: 100 of 1000, about 6 min left (d-1)"]
+    lines(400.0, 0, 100)  # the next step
+    assert lines(440.0, 80, 100)[-1] == "identifying: 80 of 100, about 10 s left (d-1)"
+
+
+def test_the_first_of_many_foretells_nothing(lines):
+    lines(0.0, 0, 334)
+    assert lines(100.0, 1, 334) == ["identifying: 1 of 334 (d-1)"]
+
+
+def test_what_the_first_one_had_to_compile_is_not_foretold_of_the_rest(lines):
+    lines(0.0, 0, 14)
+    assert lines(60.0, 1, 14) == ["identifying: 1 of 14 (d-1)"]
+    assert lines(92.0, 5, 14)[-1] == "identifying: 5 of 14, about 1 min left (d-1)"
+
+
+@pytest.mark.slow
+def test_a_check_tells_how_many_runs_it_has_read(small_campaign, tmp_path, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_EVERY", 0.0)
+    result = tpjb("check", small_campaign, "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "tpjb: doing: reading small.h5: 9 of 10" in result.stderr

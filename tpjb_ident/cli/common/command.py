@@ -1,0 +1,330 @@
+"""One object for one run of a command, and the decorator that makes a command of a function.
+
+A command is a function in a file of `tpjb_ident.cli.commands`, decorated with ``@command(..)`` and listed in
+`tpjb_ident.cli.app`. Its first argument is the `Command`: it opens what the user gave, takes tables, messages and the
+next command, and at the end writes run.json, prints the document of ``--json`` and turns errors into exit codes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import functools
+import inspect
+import json
+import os
+import sys
+import tempfile
+import traceback
+import typing
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rigdata.problem import RigError
+from tpjb_ident.cli.common.terminal import Terminal
+from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
+from tpjb_ident.runtime.output_folder import RECORD, former_runs, output_folder, record_text
+from tpjb_ident.runtime.provenance import sha256, versions
+from tpjb_ident.runtime.tables import write_table, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from model.bearing import Bearing
+    from rigdata.campaign import Campaign
+
+BUG, BAD_INPUT, NOT_TRUSTED, INTERRUPTED = 1, 2, 3, 130
+#: A result table of more rows is named in the document of ``--json``, not repeated in it.
+MOST_ROWS = 5000
+HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
+#: Options that change how a command runs, not what it computes.
+UNRECORDED = ("workers", "scheduler")
+
+
+class Command(Terminal):
+    """One run of a command: its options, what it opened, its output folder, what it prints, and how it ends."""
+
+    folder: Path  #: the temporary one that is filled inside `results`
+
+    def __init__(
+        self,
+        name: str,
+        options: Mapping[str, Any],
+        out: Path | None = None,
+        as_json: bool = False,
+        quiet: bool = False,
+    ) -> None:
+        super().__init__(as_json, quiet)
+        self.name, self.out = name, out
+        self.options = dict(options)  #: as run.json records them
+        self.remarks: Sequence[str] = ()  #: flags that run.json repeats
+        self.target = out or Path(f"tpjb-{name}-out")
+        self._sources: list[Path] = []
+        self._opened: list[Campaign | Path] = []
+        self._outputs: list[str] = []
+
+    def open(self, path: Path) -> Campaign:
+        """Open a campaign; a folder with one campaign in it stands for that."""
+        from rigdata import load_campaign
+
+        self._sources.append(path)
+        campaign = load_campaign(campaign_place(path))
+        self._opened.append(campaign)
+        return campaign
+
+    def file(self, path: Path) -> Path:
+        """Note an ordinary file that the command reads; devices and pipes are refused."""
+        refuse_special(path)
+        self._opened.append(path)
+        return path
+
+    def bearing(self, path: Path) -> Bearing:
+        """Load a bearing file."""
+        from model.bearing_file import load_bearing
+
+        return load_bearing(self.file(path))
+
+    def bearing_of(self, campaign: Campaign, path: Path | None = None) -> Bearing:
+        """Load the bearing that a campaign carries, or the file in its place."""
+        from model.bearing_file import parse_bearing
+
+        if "bearing" in self.options:
+            self.options["bearing"] = path or campaign.bearing_name
+        if path is not None:
+            return self.bearing(path)
+        if not campaign.bearing_text:
+            raise BadInputError(
+                f"campaign {campaign.id}: carries no bearing file ({campaign.bearing_name or 'none is named'}). "
+                "Give one with --bearing FILE."
+            )
+        return parse_bearing(campaign.bearing_text, campaign.bearing_name)
+
+    @functools.cached_property
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 of everything that was opened, by file; worked out when it is first asked for."""
+        hashes: dict[str, str] = {}
+        for source in self._opened:
+            hashes |= {source.name: sha256(source)} if isinstance(source, Path) else source.fingerprint()
+        return hashes
+
+    @contextlib.contextmanager
+    def results(self, entry: str = "") -> Iterator[Path]:
+        """Give a temporary folder; when the block ends well it gets a run.json and moves to the output folder."""
+        entry = entry or self.name
+        with output_folder(self.target, entry, tuple(self._sources)) as self.folder:
+            yield self.folder
+            names = write_record(self.folder, self.target, entry, self.options, self.inputs, self.remarks)
+        self.wrote(*names)
+
+    def table(self, name: str, frame: pd.DataFrame) -> None:
+        """Write a table of the results as CSV and Parquet."""
+        write_table(self.folder, name, frame)
+
+    def json(self, name: str, document: Mapping[str, Any]) -> None:
+        """Write a JSON file of the results."""
+        write_text(self.folder / name, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+
+    def wrote(self, *names: str) -> None:
+        """Note files that are in the output folder now."""
+        self._outputs = list(dict.fromkeys([*self._outputs, *names]))
+
+    def run(self, function: Callable[..., None], options: Mapping[str, Any]) -> int:
+        """Run the command; any end of it is a result, one clear message, or a named bug, never a traceback."""
+        try:
+            with warnings.catch_warnings():
+                warnings.showwarning = self._show_warning  # type: ignore[assignment]
+                function(self, **options)
+        except NotTrustedError as error:
+            self.error("not to be trusted", str(error))
+            return NOT_TRUSTED
+        except KeyboardInterrupt:
+            self.error("interrupted", "nothing was written.")
+            return INTERRUPTED
+        except BrokenPipeError:  # the reader of our output went away, as `| head` does
+            sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
+        except Exception as error:
+            message = _bad_input_message(error)
+            if message is None:
+                self.error("bug", _bug_report(error))
+                return BUG
+            self.error("error", message)
+            return BAD_INPUT
+        return 0
+
+    def _show_warning(
+        self, message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
+    ) -> None:
+        self.warn(f"{category.__name__}: {message} ({filename}:{lineno})")
+
+    def document(self, exit_code: int) -> dict[str, Any]:
+        """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
+        data: dict[str, Any] = {}
+        for name in self._outputs:
+            path = self.target / name
+            if path.suffix == ".parquet":
+                data[path.stem] = _rows(path)
+            elif path.suffix == ".json" and name != RECORD:
+                data[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+        return {
+            "schema": "tpjb-command/1",
+            "command": self.name,
+            "exit_code": exit_code,
+            "results": str(self.target) if self._outputs else None,
+            "outputs": self._outputs,
+            "said": self.lines,
+            "remarks": self.messages,
+            "tables": self.tables,
+            "data": data,
+        }
+
+
+def command(
+    *examples: str, out_help: str = "Folder for the results [default: tpjb-COMMAND-out here]."
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function that takes a `Command` and then its options: --out, --json, --quiet come with it.
+
+    The examples are printed below its help.
+    """
+
+    def decorate(function: Callable[..., None]) -> Callable[..., None]:
+        name = function.__name__
+        hints = typing.get_type_hints(function, include_extras=True) | {
+            "out": Annotated[Path | None, typer.Option("--out", metavar="DIR", help=out_help)],
+            "as_json": Annotated[
+                bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")
+            ],
+            "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")],
+        }
+
+        @functools.wraps(function)
+        def run(out: Path | None = None, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
+            recorded = {key: options[key] for key in own if key not in UNRECORDED}
+            c = Command(name, recorded, out, as_json, quiet)
+            exit_code = c.run(function, options)
+            if as_json:
+                _print_document(c.document(exit_code))
+            if exit_code:
+                raise typer.Exit(exit_code)
+
+        common = inspect.signature(run, follow_wrapped=False).parameters
+        _, *own = inspect.signature(function).parameters
+        parameters = []
+        for parameter in (*inspect.signature(function).parameters.values(), *common.values()):
+            if parameter.name in hints and parameter.name != "c":
+                keyword = inspect.Parameter.KEYWORD_ONLY
+                parameters.append(parameter.replace(annotation=hints[parameter.name], kind=keyword))
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = hints
+        run.examples = examples  # type: ignore[attr-defined]
+        return run
+
+    return decorate
+
+
+def _print_document(document: Mapping[str, Any]) -> None:
+    from tpjb_ident.presentation import json_data
+
+    # escapes where standard output is not UTF-8, which every program that reads JSON expects
+    ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
+    typer.echo(json.dumps(json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
+
+
+def _rows(path: Path) -> Any:
+    import pyarrow.parquet as pq
+
+    table = pq.ParquetFile(path)
+    count = table.metadata.num_rows
+    return table.read().to_pylist() if count <= MOST_ROWS else {"rows": count, "file": path.name}
+
+
+def _bad_input_message(error: Exception) -> str | None:
+    """Say what is wrong with the input; None if `error` is no fault of the input."""
+    model = sys.modules.get("model.errors")  # not loaded: then it is none of the model's
+    refusals = (TpjbError, RigError, *((model.ModelError,) if model else ()))
+    if isinstance(error, refusals) or (isinstance(error, ImportError) and "named 'model'" in str(error)):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{error.strerror}. Check the path, its rights and the room on the disk."
+    if isinstance(error, MemoryError):
+        return "not enough memory for this campaign. Close other programs or split the campaign."
+    return None
+
+
+def _bug_report(error: Exception) -> str:
+    """Write the traceback to a temporary file and say where it is."""
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="tpjb-traceback-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
+    ) as file:
+        file.write(" ".join(sys.argv) + "\n\n")
+        file.writelines(traceback.format_exception(error))
+    return (
+        f"{type(error).__name__}: {str(error)[:300]}. This is a fault of tpjb-ident, not of your data; nothing was "
+        f"written. Please report it with the traceback in {file.name}"
+    )
+
+
+def campaign_place(path: Path) -> Path:
+    """Return `path`, or the one campaign that is in it, as in the output folder of `tpjb simulate`."""
+    refuse_special(path)
+    if not path.is_dir() or (path / "campaign.toml").exists():
+        return path
+    inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in HDF5 or (p / "campaign.toml").is_file()]
+    return inside[0] if len(inside) == 1 else path
+
+
+def refuse_special(path: Path) -> None:
+    """Let ordinary files, folders and names of nothing pass; refuse devices and pipes."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise BadInputError(f"{path}: is a device or a pipe, not a file. Give an ordinary file.")
+
+
+def write_record(
+    staging: Path,
+    target: Path,
+    entry: str,
+    settings: Mapping[str, Any],
+    inputs: Mapping[str, str],
+    remarks: Sequence[str] = (),
+) -> list[str]:
+    """Write run.json into the temporary folder of a command, last; the files that it lists.
+
+    Commands that share an output folder share its run.json: one entry each.
+    """
+    outputs = sorted(p.relative_to(staging).as_posix() for p in staging.rglob("*") if p.is_file())
+    record = {
+        "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "settings": {name: _plain(value) for name, value in settings.items()},
+        "versions": versions(),
+        "inputs_sha256": dict(inputs),
+        "outputs": outputs,
+        "outputs_sha256": {name: sha256(staging / name) for name in outputs},
+        "inputs_at": _places(settings, target),
+        **({"remarks": list(remarks)} if remarks else {}),
+    }
+    write_text(staging / RECORD, record_text({**former_runs(target), entry: record}))
+    return outputs
+
+
+def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
+    """Where files and folders among `settings` are, as seen from the output folder; only those that exist."""
+    places = {}
+    for name, value in settings.items():
+        if isinstance(value, Path) and value.exists():
+            with contextlib.suppress(ValueError):  # another drive: there is no relative way
+                places[name] = Path(os.path.relpath(value.resolve(), target.resolve())).as_posix()
+    return places
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return value.name  # its place is of no use elsewhere; its SHA-256 says what it was
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)

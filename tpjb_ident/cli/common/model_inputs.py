@@ -1,0 +1,109 @@
+"""What commands with a model are given: operating points, pivots, effects, or a table in place of a campaign."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigdata.near_names import nearest_name
+from tpjb_ident.cli.common.command import Command
+from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
+from tpjb_ident.errors import BadInputError
+
+if TYPE_CHECKING:
+    from model.bearing import Bearing
+    from model.effects import Effect
+    from rigdata.operating_point import OperatingPoint
+    from tpjb_ident.compare.predictions import ModelSettings
+
+PIVOTS = ("rigid", "kirk", "kirk-secant")
+THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
+
+
+def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[OperatingPoint]:
+    """Every combination of the four options, SI."""
+    loads = parse_values(load, "force", "--load")
+    directions = parse_values(load_direction, "angle", "--load-direction")
+    speeds = parse_values(speed, "speed", "--speed")
+    frequencies = parse_values(excitation, "speed", "--excitation") if excitation else (0.0,)
+    _refuse_negative(loads, "--load", "Give the direction of the load with --load-direction.")
+    _refuse_negative(speeds, "--speed", "The shaft turns counter-clockwise.")
+    if excitation:
+        _refuse_negative(frequencies, "--excitation", "Leave the option out for synchronous coefficients.")
+    if len(loads) * len(directions) * len(speeds) * len(frequencies) > MAX_VALUES:
+        raise BadInputError(f"more than {MAX_VALUES} operating points. Take larger steps.")
+    from rigdata.operating_point import OperatingPoint
+
+    return list(itertools.starmap(OperatingPoint, itertools.product(loads, directions, speeds, frequencies)))
+
+
+def _refuse_negative(values: Sequence[float], option: str, remedy: str) -> None:
+    if min(values) <= 0:
+        raise BadInputError(f"{option}: must be positive. {remedy}")
+
+
+def pivot_choice(c: Command, text: str) -> str | float | Path:
+    """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
+    if text in PIVOTS:
+        return text
+    path = Path(text)
+    if path.is_file():
+        return c.file(path)
+    if text[:1].isdigit():
+        return parse_value(text, "stiffness", "--pivots")
+    near = nearest_name(text, PIVOTS)
+    hint = f"Did you mean {near!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
+    raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {hint}")
+
+
+def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects: Path | None) -> ModelSettings:
+    """Build `ModelSettings` from options."""
+    refuse_unknown(thermal, THERMAL, "--thermal")
+    from tpjb_ident.compare.predictions import ModelSettings
+
+    if effects is None:
+        return ModelSettings(pivots, thermal)
+    from model.effects import load_effects
+
+    return ModelSettings(pivots, thermal, load_effects(c.file(effects)))
+
+
+def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing) -> None:
+    """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks."""
+    if path is None:
+        return
+    from model.effects import EffectError, apply_effects
+    from model.pivots import pivot_laws
+    from model.setup import Setup
+
+    try:
+        apply_effects(Setup(bearing, pivot_laws("rigid", bearing)), effects)
+    except EffectError as error:
+        raise BadInputError(f"--effects {path.name}: {error}") from error
+
+
+def open_source(c: Command, campaign: Path | None, table: Path | None, bearing: Path | None) -> tuple[Any, Bearing]:
+    """Open a campaign with its bearing, or in its place a `TableSource` of coefficients with the bearing file."""
+    if table is None and campaign is not None:
+        source = c.open(campaign)
+        return source, c.bearing_of(source, bearing)
+    if table is None or campaign is not None:
+        raise BadInputError(f"{c.name}: give a campaign, or --coefficients TABLE.csv with --bearing FILE; one of them.")
+    from tpjb_ident.compare.coefficient_table import TableSource
+
+    c.file(table)
+    if not table.is_file():
+        raise BadInputError(f"{table}: no such file. Give the table of coefficients as CSV.")
+    if bearing is None:
+        raise BadInputError(f"{c.name} --coefficients: a table names no bearing. Add --bearing FILE.")
+    return TableSource(table.stem), c.bearing(bearing)
+
+
+def parse_share(text: str | None, option: str) -> float | None:
+    """Read a share such as 5 %."""
+    from rigdata.units import parse_quantity
+
+    return None if text is None else float(parse_quantity(text, "ratio", option))
