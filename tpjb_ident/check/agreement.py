@@ -53,16 +53,22 @@ class RunResponse:
         return to_plane(self.channels, self.readings)
 
 
-def response_of(seen: Observation, mass: float) -> RunResponse | None:
+def response_of(observation: Observation, mass: float) -> RunResponse | None:
     """Take the phasors of a run; None where it does not show them, or its force is in doubt already."""
-    where = seen.pick("displacement")
-    force = oil_force(seen, mass)
-    if len(where) != 2 or force is None or seen.lines is None or "force" in seen.report.doubts or not excited(seen):
+    where = observation.pick("displacement")
+    force = oil_force(observation, mass)
+    if (
+        len(where) != 2
+        or force is None
+        or observation.lines is None
+        or "force" in observation.report.doubts
+        or not excited(observation)
+    ):
         return None
-    readings = seen.lines.phasor[where]
-    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * seen.lines.floor[where]):
+    readings = observation.lines.phasor[where]
+    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * observation.lines.floor[where]):
         return None
-    return RunResponse(seen, force, readings, tuple(seen.channels[i] for i in where))
+    return RunResponse(observation, force, readings, tuple(observation.channels[i] for i in where))
 
 
 def _solve_stiffness(responses: Sequence[RunResponse]) -> ComplexArray | None:
@@ -119,10 +125,10 @@ def _apart(group: Sequence[RunResponse], known: set[int]) -> set[int]:
     """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
     apart: set[int] = set(known)
     while len(apart) + 1 <= _MOST * len(group):
-        left = [i for i in range(len(group)) if i not in apart]
-        if len(left) < _MIN_RUNS:
+        remaining = [i for i in range(len(group)) if i not in apart]
+        if len(remaining) < _MIN_RUNS:
             break
-        tried = [(_distance(group[i], [group[j] for j in left if j != i]), i) for i in left]
+        tried = [(_distance(group[i], [group[j] for j in remaining if j != i]), i) for i in remaining]
         (ratio, misfit), worst = max(tried)
         if ratio < 1.0 or misfit < _LEAST:
             break
@@ -161,18 +167,18 @@ def _tell(response: RunResponse, stiffness: ComplexArray, gain: str) -> None:
     hint = _name_misfit(response, stiffness, misfit) or gain
     severity: Severity = "error" if misfit > 0.5 or (hint and misfit > 0.2) else "warning"
     share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
-    what = f"differs by {share} from the other runs at this operating point{hint}"
+    text = f"differs by {share} from the other runs at this operating point{hint}"
     cure = "Check this run's channels and set points; leave it out or repeat it"
-    response.seen.report.say("disagrees", severity, "displacement and force", what, cure)
+    response.seen.report.say("disagrees", severity, "displacement and force", text, cure)
 
 
 def _name_misfit(response: RunResponse, stiffness: ComplexArray, misfit: float) -> str:
     """Name the one wiring fault of probes or cells that explains a run apart from the others."""
     tried = [(misfit_of(response, stiffness, m), w) for w, m in repairs(response.channels, scales=True)]
-    seen, where = response.seen, response.seen.pick("force")
-    cells = [seen.channels[i] for i in where]
-    if len(cells) == 2 and seen.lines is not None:
-        phasors = seen.lines.phasor[where]
+    observation, where = response.seen, response.seen.pick("force")
+    cells = [observation.channels[i] for i in where]
+    if len(cells) == 2 and observation.lines is not None:
+        phasors = observation.lines.phasor[where]
         for words, matrix in repairs(cells, scales=True):
             # The inertia part of the force stays: only the cells are supposed to be at fault.
             force = response.force + to_plane(cells, matrix @ phasors - phasors)

@@ -50,26 +50,26 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         seen.append(observe(run))
         if progress is not None:
             progress(count, len(campaign.runs))
-    findings: list[Finding] = [f for one in judged(campaign, seen) for f in one.report.found]
+    findings: list[Finding] = [f for observation in judged(campaign, seen) for f in observation.report.found]
     merged = merge(findings, campaign.path.name, campaign.runs)
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
-def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]:
+def judged(campaign: Campaign, observations: Sequence[Observation]) -> list[Observation]:
     """Judge runs beside each other; what is found stands in the reports of the copies that are given back."""
-    seen = [replace(one, report=one.report.copy()) for one in seen]
-    of_kind = {k: [s for s in seen if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
+    observations = [replace(observation, report=observation.report.copy()) for observation in observations]
+    of_kind = {k: [s for s in observations if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
     dynamic = of_kind["dynamic"]
     # what is judged by one line of excitation says nothing of runs that are excited over a band
     of_kind["dynamic"] = [s for s in dynamic if s.run.excitation_kind == "sine"]
-    for one in seen:
-        check_speed(one)
-    if check_static_loads(seen):
-        check_load_ratios(seen)
-    check_positions(seen)
+    for observation in observations:
+        check_speed(observation)
+    if check_static_loads(observations):
+        check_load_ratios(observations)
+    check_positions(observations)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
     check_dry(of_kind["dry_pivot"])
-    _spread_doubts(seen)
+    _spread_doubts(observations)
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
     check_accelerometers(dynamic)
     check_housing(of_kind["dynamic"])
@@ -77,32 +77,32 @@ def judged(campaign: Campaign, seen: Sequence[Observation]) -> list[Observation]
     check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
-    _check_duplicates(seen)
-    return seen
+    _check_duplicates(observations)
+    return observations
 
 
-def _spread_doubts(seen: Sequence[Observation]) -> None:
+def _spread_doubts(observations: Sequence[Observation]) -> None:
     """Cells that are wired wrongly in many runs are so in all, also where the load does not show it."""
-    judged = [one for one in seen if one.run.kind in {"dynamic", "locus", "dry_pivot"}]
-    doubted = sum("force" in one.report.doubts for one in judged)
+    judged = [observation for observation in observations if observation.run.kind in {"dynamic", "locus", "dry_pivot"}]
+    doubted = sum("force" in observation.report.doubts for observation in judged)
     if doubted >= 3 and 3 * doubted >= len(judged):
-        for one in seen:
-            one.report.doubts.add("force")
+        for observation in observations:
+            observation.report.doubts.add("force")
 
 
-def _check_duplicates(seen: Sequence[Observation]) -> None:
+def _check_duplicates(observations: Sequence[Observation]) -> None:
     first: dict[str, Observation] = {}
-    for one in seen:
-        other = first.setdefault(one.digest, one) if one.digest else one
-        if other.run.id == one.run.id:  # itself, or another excitation in its record
+    for observation in observations:
+        other = first.setdefault(observation.digest, observation) if observation.digest else observation
+        if other.run.id == observation.run.id:  # itself, or another excitation in its record
             continue
-        if _shared_record(one.run, other.run):
-            what = f"shares its record with run {other.run.id}, at another excitation frequency"
-            one.report.say("shared", "note", "", what, "Nothing, if both lines were excited at once")
+        if _shared_record(observation.run, other.run):
+            text = f"shares its record with run {other.run.id}, at another excitation frequency"
+            observation.report.say("shared", "note", "", text, "Nothing, if both lines were excited at once")
             continue
-        what = f"holds the very samples of run {other.run.id} ({other.run.file})"
+        text = f"holds the very samples of run {other.run.id} ({other.run.file})"
         cure = "One of the two is a copy: find the right file, or delete the run"
-        one.report.say("duplicate", "error", "", what, cure)
+        observation.report.say("duplicate", "error", "", text, cure)
 
 
 def _shared_record(one: Run, other: Run) -> bool:
@@ -135,14 +135,14 @@ def _files(campaign: Campaign) -> list[str]:
     known = {p.resolve() for p in campaign.files.values()}
     records = [p for n, p in campaign.files.items() if n not in {"campaign.toml", campaign.bearing_name}]
     suffixes = {p.suffix.lower() for p in records}
-    found: list[Path] = []
+    sentences: list[Path] = []
     for folder in sorted({p.parent for p in records}):
         try:
             beside = list(itertools.islice(folder.iterdir(), _MAX_LOOKED_AT))
         except OSError:  # the folder is not there: the runs themselves say so
             continue
-        found += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
-    return sorted(p.name for p in found)
+        sentences += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
+    return sorted(p.name for p in sentences)
 
 
 def _groups(campaign: Campaign) -> list[str]:

@@ -42,48 +42,53 @@ _LIKE_RUNS, _STEP, _LEAST_STEP = 4, 6.0, 15e-6
 def check_load_ratios(runs: Sequence[Observation]) -> None:
     """Mean force over set point of every dynamic and locus run against that of all others."""
     shown: list[tuple[Observation, complex]] = []
-    for seen in runs:
-        stated = seen.run.point.static_load
-        if seen.run.kind not in {"dynamic", "locus"} or seen.lines is None or not stated > 0:
+    for observation in runs:
+        stated = observation.run.point.static_load
+        if observation.run.kind not in {"dynamic", "locus"} or observation.lines is None or not stated > 0:
             continue
-        mean = plane_vector(seen, "force", seen.lines.mean)
+        mean = plane_vector(observation, "force", observation.lines.mean)
         if mean is not None:
-            turn = complex(np.exp(1j * seen.run.point.static_load_direction))
-            shown.append((seen, complex(mean[0], mean[1]) / (stated * turn)))
+            turn = complex(np.exp(1j * observation.run.point.static_load_direction))
+            shown.append((observation, complex(mean[0], mean[1]) / (stated * turn)))
     if len(shown) < _MIN_RUNS:
         return
     ratios = np.array([r for _, r in shown])
     middle = complex(np.median(ratios.real), np.median(ratios.imag))
     off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
     allowed = max(_LOAD_OFF, _MANY * 1.4826 * float(np.median(off)))
-    for (seen, ratio), distance in zip(shown, off):
-        reported = any(f.key.startswith("load ") for f in seen.report.found)
+    for (observation, ratio), distance in zip(shown, off):
+        reported = any(f.key.startswith("load ") for f in observation.report.found)
         if distance > allowed and not reported:
             turned = math.degrees(np.angle(ratio / middle))
-            what = (
+            text = (
                 f"is {abs(ratio / middle) - 1:+.1%} in size and {turned:+.1f} deg in direction off what the set point "
                 "and the other runs of the campaign let one expect"
             )
             cure = "Check static_load and its direction in this run, and the gain of the cells"
-            seen.report.say("load ratio", "warning", "mean force", what, cure)
+            observation.report.say("load ratio", "warning", "mean force", text, cure)
 
 
 def check_housing(runs: Sequence[Observation]) -> None:
     """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
     groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
-    for seen in runs:
-        where = seen.pick("acceleration")
-        if seen.lines is None or len(where) != 2 or "force" in seen.report.doubts or not excited(seen):
+    for observation in runs:
+        where = observation.pick("acceleration")
+        if (
+            observation.lines is None
+            or len(where) != 2
+            or "force" in observation.report.doubts
+            or not excited(observation)
+        ):
             continue
-        force = plane_vector(seen, "force", seen.lines.phasor)
-        readings = seen.lines.phasor[where]
+        force = plane_vector(observation, "force", observation.lines.phasor)
+        readings = observation.lines.phasor[where]
         if force is None or not np.all(np.isfinite(readings)):
             continue
-        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(seen.lines.floor[where]):
+        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(observation.lines.floor[where]):
             continue
-        names = tuple(seen.channels[i].name for i in where)
-        key = (round(seen.run.point.excitation_hz, 6), names)
-        groups.setdefault(key, []).append((seen, force, np.asarray(readings)))
+        names = tuple(observation.channels[i].name for i in where)
+        key = (round(observation.run.point.excitation_hz, 6), names)
+        groups.setdefault(key, []).append((observation, force, np.asarray(readings)))
     for (_, names), group in groups.items():
         if len(group) >= _MIN_RUNS:
             _judge_housing(group, names)
@@ -116,39 +121,39 @@ def _judge_housing(group: Sequence[tuple[Observation, ComplexArray, ComplexArray
         return
     misfits = np.array([_misfit(f, r, matrix) for _, f, r in group])
     allowed = max(_ACCELERATION_OFF, _MANY * float(np.median(misfits)))
-    for (seen, force, readings), misfit in zip(group, misfits):
+    for (observation, force, readings), misfit in zip(group, misfits):
         if misfit <= allowed:
             continue
-        channels = [seen.channels[i] for i in seen.pick("acceleration")]
+        channels = [observation.channels[i] for i in observation.pick("acceleration")]
         tried = sorted((_misfit(force, m @ readings, matrix), words) for words, m in repairs(channels, scales=True))
         hint = f"; as if {tried[0][1]}" if tried[0][0] < min(misfit / 3, tried[1][0] / 2) else ""
-        what = f"differs by {misfit:.0%} from what the cell force and the other runs at this frequency foretell{hint}"
+        text = f"differs by {misfit:.0%} from what the cell force and the other runs at this frequency foretell{hint}"
         cure = "Check polarity, cables and sensitivity of the accelerometers in this run"
         place = f"channels {' and '.join(names)}"
-        seen.report.say("housing", "warning", place, what, cure)
+        observation.report.say("housing", "warning", place, text, cure)
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
     """Mean readings of the probes (gap voltage included) run against run, and their travel."""
     places: dict[tuple[str, str], list[tuple[Observation, float]]] = {}
-    for seen in runs:
-        for index in seen.pick("displacement"):
-            name = seen.channels[index].name
-            low, middle, high = seen.spread[:, index]
+    for observation in runs:
+        for index in observation.pick("displacement"):
+            name = observation.channels[index].name
+            low, middle, high = observation.spread[:, index]
             if not np.isfinite(middle):
                 continue
-            state = "running" if seen.run.kind in {"dynamic", "locus"} else "dry"
-            places.setdefault((name, state), []).append((seen, float(middle)))
+            state = "running" if observation.run.kind in {"dynamic", "locus"} else "dry"
+            places.setdefault((name, state), []).append((observation, float(middle)))
             if high - low > _MAX_TRAVEL:
-                what = f"the shaft travels {1e3 * (high - low):.2g} mm, more than a film bearing lets it"
+                text = f"the shaft travels {1e3 * (high - low):.2g} mm, more than a film bearing lets it"
                 cure = "Check the sensitivity of the probe, and for loose cables"
-                seen.report.say(f"travel {name}", "warning", f"channel {name}", what, cure)
+                observation.report.say(f"travel {name}", "warning", f"channel {name}", text, cure)
     for (name, state), means in places.items():
         _check_jumps(name, means, _MIN_JUMP[state])
         points: dict[object, list[tuple[Observation, float]]] = {}
-        for seen, middle in means:
-            if seen.run.kind == "dynamic":
-                points.setdefault(seen.run.point, []).append((seen, middle))
+        for observation, middle in means:
+            if observation.run.kind == "dynamic":
+                points.setdefault(observation.run.point, []).append((observation, middle))
         for like in points.values():
             _check_steps(name, like)
 
@@ -160,11 +165,11 @@ def _check_steps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
     values = np.array([m for _, m in means])
     off = values - np.median(values)
     allowed = max(_STEP * 1.4826 * float(np.median(np.abs(off))), _LEAST_STEP)
-    for (seen, _), distance in zip(means, off):
-        if abs(distance) > allowed and "displacement" not in seen.report.doubts:
-            what = f"reads {1e6 * distance:+.0f} um on average beside the other runs at this operating point"
+    for (observation, _), distance in zip(means, off):
+        if abs(distance) > allowed and "displacement" not in observation.report.doubts:
+            text = f"reads {1e6 * distance:+.0f} um on average beside the other runs at this operating point"
             cure = "Check probe and amplifier: moved, or another gain in this run?"
-            seen.report.say(f"step {name}", "warning", f"channel {name}", what, cure)
+            observation.report.say(f"step {name}", "warning", f"channel {name}", text, cure)
 
 
 def _check_jumps(name: str, means: Sequence[tuple[Observation, float]], least: float) -> None:
@@ -173,12 +178,12 @@ def _check_jumps(name: str, means: Sequence[tuple[Observation, float]], least: f
     values = np.array([m for _, m in means])
     low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
     allowed = max(_FAR * (high - low), least)
-    for seen, mean in means:
+    for observation, mean in means:
         if abs(mean - middle) > allowed:
-            what = (
+            text = (
                 f"reads {1e6 * mean:.0f} um on average, others of its kind {1e6 * low:.0f} to {1e6 * high:.0f} um; "
                 "the gap voltage is constant within a campaign"
             )
             cure = "Check the probe: moved, wrong sign, wrong sensitivity in this run?"
-            seen.report.say(f"position {name}", "error", f"channel {name}", what, cure)
-            seen.report.doubts.add("displacement")
+            observation.report.say(f"position {name}", "error", f"channel {name}", text, cure)
+            observation.report.doubts.add("displacement")

@@ -62,8 +62,8 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
             continue
         first = group[0]
         listed = ", ".join(concerned[:_LISTED]) + (", ..." if len(concerned) > _LISTED else "")
-        what = f"{first.what}; and so in {len(concerned)} runs ({listed})"
-        merged.append(Problem(first.severity, file, first.place, what, first.cure))
+        text = f"{first.what}; and so in {len(concerned)} runs ({listed})"
+        merged.append(Problem(first.severity, file, first.place, text, first.cure))
     return merged
 
 
@@ -81,11 +81,11 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     """Sort the findings of runs of one kind."""
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
     found = Verdicts()
-    for one in reports:
-        found.gains.update(one.gains)
-        for finding in one.found:
-            groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(one.run.id, finding.problem)
-    alike = len({one.run.id for one in reports})
+    for report in reports:
+        found.gains.update(report.gains)
+        for finding in report.found:
+            groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
+    alike = len({report.run.id for report in reports})
     for (_, severity), concerned in groups.items():
         for run, problem in concerned.items():
             if severity == "warning":

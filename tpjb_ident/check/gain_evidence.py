@@ -85,8 +85,8 @@ class Difference:
 
     def misfit(self, pattern: FloatArray, part: float) -> float:
         """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance."""
-        left = self.rest - part * pattern
-        return float(left @ np.linalg.solve(self.noise + self.honest, left)) / len(left)
+        remaining = self.rest - part * pattern
+        return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining)) / len(remaining)
 
     def widened(self, place: int, deviation: float) -> Difference:
         """The same with one equation less certain."""
@@ -167,8 +167,8 @@ def _bearing_wander(readings: PointReadings, runs: Sequence[int], stiffness: Com
     """Variances by which some runs' stiffness and damping, as shares, differ about the matrix fitted to them, (2,)."""
     shares = []
     for displacement, force in zip(readings.displacement[list(runs)], readings.force[list(runs)], strict=True):
-        rest = _stacked(force - stiffness @ displacement)
-        shares.append(np.linalg.lstsq(_bearing_changes(stiffness, displacement), rest, rcond=None)[0])
+        residual = _stacked(force - stiffness @ displacement)
+        shares.append(np.linalg.lstsq(_bearing_changes(stiffness, displacement), residual, rcond=None)[0])
     # the matrix took 8 of the 4 n equations along
     return np.asarray(np.mean(np.square(shares), axis=0) * len(runs) / (len(runs) - 2))
 
@@ -238,13 +238,13 @@ def static_difference(
     noise = more * (load_variance * by_load @ by_load.T + place_variance * by_place @ by_place.T)
     least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
     honest = (HONEST * size) ** 2 * by_load @ by_load.T + least
-    rest = np.concatenate(
+    residual = np.concatenate(
         [
             readings.probe_means[one] - readings.probe_means[rows].mean(axis=0),
             readings.cell_means[one] - readings.cell_means[rows].mean(axis=0),
         ]
     )
-    return Difference(rest, noise, honest, spare)
+    return Difference(residual, noise, honest, spare)
 
 
 def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:

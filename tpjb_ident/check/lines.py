@@ -61,16 +61,16 @@ def fit_lines(
     growing = [f for f in inexact if f in kept[1:] and all(abs(f - k) * span > _PARTED for k in kept if k != f)]
     design = line_design(time - time[0], np.array(kept), 1, np.array(growing))
     coefficients, used = _robust(design, values)
-    rest = np.where(used, values - design @ coefficients, 0.0)
+    residual = np.where(used, values - design @ coefficients, 0.0)
     counts = np.count_nonzero(used, axis=0)
     known = np.where(counts > 0, 1.0, np.nan)
-    scatter = np.sqrt(np.sum(rest**2, axis=0) / np.maximum(counts, 1)) * known
+    scatter = np.sqrt(np.sum(residual**2, axis=0) / np.maximum(counts, 1)) * known
     mean = coefficients[2 * len(kept)]
     if not kept:
         missing = np.full(values.shape[1], np.nan)
         return RecordLines(mean, missing + 0j, missing, scatter)
     phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * kept[0] * time[0])
-    floor = _floor(time, rest, kept[0], span) * len(time) / np.maximum(counts, 1) * known
+    floor = _floor(time, residual, kept[0], span) * len(time) / np.maximum(counts, 1) * known
     return RecordLines(mean, phasor, floor, scatter)
 
 
@@ -89,8 +89,8 @@ def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArr
     scale = 1.4826 * np.median(size[:: max(1, len(size) // _SCALED)], axis=0)
     clean = size.max(axis=0) <= np.maximum(GLITCH_LIMIT * scale, 1e-10 * np.abs(coefficients).sum(axis=0))
     for k in np.flatnonzero(~(complete & clean)):
-        found = fit_without_glitches(design, values[:, k : k + 1], np.array([np.inf]))
-        coefficients[:, k], used[:, k] = found.coefficients[0], found.kept
+        robust_lines = fit_without_glitches(design, values[:, k : k + 1], np.array([np.inf]))
+        coefficients[:, k], used[:, k] = robust_lines.coefficients[0], robust_lines.kept
     return coefficients, used
 
 
@@ -137,12 +137,12 @@ def band_lines(
     `values` (n, m).
     """
     none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan)
-    known = np.isfinite(values)
-    if run.band is None or not len(force) or len(values) < 64 or not known.any(axis=0).all():
+    finite = np.isfinite(values)
+    if run.band is None or not len(force) or len(values) < 64 or not finite.any(axis=0).all():
         return none
     middle = np.nanmedian(values, axis=0)
     window = np.hanning(len(values))
-    spectrum = np.fft.rfft(np.where(known, values - middle, 0.0) * window[:, None], axis=0) * (2 / window.sum())
+    spectrum = np.fft.rfft(np.where(finite, values - middle, 0.0) * window[:, None], axis=0) * (2 / window.sum())
     frequency = np.fft.rfftfreq(len(values), 1 / run.sample_rate)
     free = np.ones(len(frequency), dtype=bool)
     for line in disturbing:
@@ -163,8 +163,8 @@ def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines
     """
     count = min(len(time), _LONGEST)
     span = float(time[count - 1] - time[0])
-    known = np.isfinite(values[:count]).all(axis=0)
-    if stated <= 0 or count < 64 or span <= 0 or not known.any() or stated * span < _APART:
+    finite = np.isfinite(values[:count]).all(axis=0)
+    if stated <= 0 or count < 64 or span <= 0 or not finite.any() or stated * span < _APART:
         return stated
     padded = 4 * count
     step = (count - 1) / span / padded
@@ -173,7 +173,7 @@ def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines
     low, high = int(np.ceil((stated - reach) / step)), int((stated + reach) / step)
     if reach <= 0 or low < 1 or high - low < 4:
         return stated
-    columns = values[:count, known]
+    columns = values[:count, finite]
     spectrum = np.abs(np.fft.rfft((columns - columns.mean(axis=0)) * np.hanning(count)[:, None], padded, axis=0))
     wide = slice(max(1, low - 40), min(high + 40, len(spectrum)))
     level = np.median(spectrum[wide], axis=0)

@@ -206,9 +206,9 @@ def _spread(values: FloatArray) -> FloatArray:
     """Quantiles column by column; NaN where a column has no value."""
     spread = np.full((3, values.shape[1]), np.nan)
     for index, column in enumerate(values[:: max(1, len(values) // _SPREAD)].T):
-        known = column[np.isfinite(column)]
-        if len(known):
-            spread[:, index] = np.quantile(known, [0.02, 0.5, 0.98])
+        finite_values = column[np.isfinite(column)]
+        if len(finite_values):
+            spread[:, index] = np.quantile(finite_values, [0.02, 0.5, 0.98])
     return spread
 
 
@@ -224,8 +224,8 @@ def _other_line(
 
 
 def _range(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.std(known)) if len(known) else 0.0
+    finite_values = values[np.isfinite(values)]
+    return float(np.std(finite_values)) if len(finite_values) else 0.0
 
 
 def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:

@@ -68,19 +68,19 @@ class _Try:
 
 def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
     """Find runs with one wrong gain, the clearest first."""
-    count, apart, found = len(readings.probes), set(known), list[WrongGain]()
+    count, apart, gains = len(readings.probes), set(known), list[WrongGain]()
     while len(apart) + 1 <= _MOST * count:
-        left = [i for i in range(count) if i not in apart]
-        if len(left) < _MIN_RUNS:
+        remaining = [i for i in range(count) if i not in apart]
+        if len(remaining) < _MIN_RUNS:
             break
-        tried = [gain_of_run(readings, i, [j for j in left if j != i]) for i in left]
+        tried = [gain_of_run(readings, i, [j for j in remaining if j != i]) for i in remaining]
         clearest = min((t for t in tried if t is not None), key=lambda t: t.chance, default=None)
         # each run is tried with two cells and two probes, a probe with two zeros
-        if clearest is None or clearest.chance > _CHANCE / (6 * len(left)):
+        if clearest is None or clearest.chance > _CHANCE / (6 * len(remaining)):
             break
-        found.append(clearest)
+        gains.append(clearest)
         apart.add(clearest.run)
-    return found
+    return gains
 
 
 def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> WrongGain | None:
@@ -144,5 +144,5 @@ def _with_means(static: Difference | None, channel: int, lever: float | None, sl
         return _Try(channel, shown, False, widened.misfit(pattern, by_phasor.part))
     apart = abs(by_phasor.part - shown.part) / np.sqrt(1 / by_phasor.information + 1 / shown.information)
     joint = shown.joined(by_phasor)
-    left = widened.misfit(pattern, joint.part) if apart <= _AGREE else np.inf
-    return _Try(channel, joint, by_phasor.chance() < _PHASORS_SHOW, left)
+    remaining = widened.misfit(pattern, joint.part) if apart <= _AGREE else np.inf
+    return _Try(channel, joint, by_phasor.chance() < _PHASORS_SHOW, remaining)

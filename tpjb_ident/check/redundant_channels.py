@@ -83,8 +83,8 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
     # every run is one vote of its own size: beyond^T (gain * seen) = beyond^T phasor
     size = np.linalg.norm(seen, axis=1)
     design = np.concatenate([(beyond.T * (s / n)) for s, n in zip(seen, size)])
-    left = (phasors / size[:, None] @ beyond).ravel()
-    real, rest = np.concatenate([design.real, design.imag]), np.concatenate([left.real, left.imag])
+    remaining = (phasors / size[:, None] @ beyond).ravel()
+    real, rest = np.concatenate([design.real, design.imag]), np.concatenate([remaining.real, remaining.imag])
     inverse = np.linalg.pinv(real, rcond=1e-6)
     gains = inverse @ rest
     spread = float(np.sum((rest - real @ gains) ** 2)) / max(len(rest) - np.linalg.matrix_rank(real), 1)

@@ -32,14 +32,14 @@ _MAX_ANISOTROPY = 6.0
 def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[Observation] = ()) -> None:
     """Compare the dynamic runs of every operating point with each other and with what a film can do."""
     groups: dict[object, list[RunResponse]] = {}
-    for seen in runs:
-        point = seen.run.point
+    for observation in runs:
+        point = observation.run.point
         if shaft_order(point.excitation_hz, point.shaft_speed_hz):  # runout answers there too, as no film does
             continue
-        response = response_of(seen, mass)
+        response = response_of(observation, mass)
         if response is not None:
             names = tuple(c.name for c in response.channels)
-            groups.setdefault((seen.run.point, names), []).append(response)
+            groups.setdefault((observation.run.point, names), []).append(response)
     centres = probe_centres(sweeps)
     for group in groups.values():
         stiffness = robust_stiffness(group)
@@ -81,10 +81,10 @@ def _check_signs(group: Sequence[RunResponse], stiffness: ComplexArray) -> None:
     damping = float(np.linalg.eigvalsh((stiffness.imag + stiffness.imag.T) / 2)[0])
     kind = "damping" if definiteness(stiffness.real) > _DEFINITE else "stiffness"
     for response in group:
-        what = f"answer the force with negative {kind}, which a film does not have{hint}"
+        text = f"answer the force with negative {kind}, which a film does not have{hint}"
         cure = "Check axis, polarity and cables of the probes (and of the cells)"
         severity: Severity = "error" if hint or damping < 0 else "warning"
-        response.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", what, cure)
+        response.seen.report.say(f"signs {names}{hint}", severity, f"channels {names}", text, cure)
 
 
 def _check_scales(group: Sequence[RunResponse], stiffness: ComplexArray, names: str) -> None:
@@ -94,46 +94,46 @@ def _check_scales(group: Sequence[RunResponse], stiffness: ComplexArray, names: 
     if sizes.max() < _MAX_ANISOTROPY * sizes.min():
         return
     large, small = channels[int(np.argmin(sizes))].name, channels[int(np.argmax(sizes))].name
-    what = (
+    text = (
         f"{large} moves {sizes.max() / sizes.min():.0f} times more per force than {small}; "
         "as if one sensitivity were ten times off"
     )
     for response in group:
         cure = "Check the sensitivities of the two probes"
-        response.seen.report.say(f"scales {names}", "warning", f"channels {names}", what, cure)
+        response.seen.report.say(f"scales {names}", "warning", f"channels {names}", text, cure)
 
 
 def check_accelerometers(runs: Sequence[Observation]) -> None:
     """Housing acceleration against cell force: on springs, the two are in antiphase."""
     shown: dict[str, list[tuple[Observation, complex]]] = {}
-    for seen in runs:
-        for name, ratio in _accelerations(seen):
-            shown.setdefault(name, []).append((seen, ratio))
+    for observation in runs:
+        for name, ratio in _accelerations(observation):
+            shown.setdefault(name, []).append((observation, ratio))
     cure = "Check polarity, axis and sensitivity of the accelerometer"
     usual = {n: float(np.median([abs(r) for _, r in v])) for n, v in shown.items() if len(v) >= 3}
     for name, ratios in shown.items():
         directions = [r / abs(r) for _, r in ratios]
         if len(ratios) >= 3 and float(np.mean(np.real(directions))) > 0.7:
-            what = "moves in phase with the cell force; the housing on its springs should move against it"
-            for seen in {s.run.id: s for s, _ in ratios}.values():
-                seen.report.say(f"accelerometer {name}", "warning", f"channel {name}", what, cure)
+            text = "moves in phase with the cell force; the housing on its springs should move against it"
+            for observation in {s.run.id: s for s, _ in ratios}.values():
+                observation.report.say(f"accelerometer {name}", "warning", f"channel {name}", text, cure)
         least = min(usual.values(), default=math.nan)
         if name in usual and usual[name] > _MAX_ANISOTROPY * least:
-            what = f"shows {usual[name] / least:.0f} times the acceleration per force of the other direction"
-            for seen in {s.run.id: s for s, _ in ratios}.values():
-                seen.report.say(f"acceleration {name}", "warning", f"channel {name}", what, cure)
+            text = f"shows {usual[name] / least:.0f} times the acceleration per force of the other direction"
+            for observation in {s.run.id: s for s, _ in ratios}.values():
+                observation.report.say(f"acceleration {name}", "warning", f"channel {name}", text, cure)
 
 
-def _accelerations(seen: Observation) -> list[tuple[str, complex]]:
+def _accelerations(observation: Observation) -> list[tuple[str, complex]]:
     """Acceleration over cell force along each accelerometer that shows the line clearly."""
-    lines, where = seen.lines, seen.pick("force")
-    if lines is None or len(where) < 2 or "force" in seen.report.doubts or not excited(seen):
+    lines, where = observation.lines, observation.pick("force")
+    if lines is None or len(where) < 2 or "force" in observation.report.doubts or not excited(observation):
         return []
     found: list[tuple[str, complex]] = []
-    for row in seen.phasors:
-        force = to_plane([seen.channels[i] for i in where], row[where])
-        for index in seen.pick("acceleration"):
-            channel, phasor = seen.channels[index], row[index]
+    for row in observation.phasors:
+        force = to_plane([observation.channels[i] for i in where], row[where])
+        for index in observation.pick("acceleration"):
+            channel, phasor = observation.channels[index], row[index]
             axis = channel.axis or 0.0
             along = complex(force @ np.array([math.cos(axis), math.sin(axis)]))
             if abs(phasor) > 8 * lines.floor[index] and abs(along) > 0.3 * float(np.linalg.norm(force)):

@@ -23,8 +23,8 @@ _SECTORS, _MET = 36, 0.9
 
 def check_gains(group: Sequence[RunResponse], known_outliers: Collection[int], readings: PointReadings) -> None:
     """Name runs with one wrong gain."""
-    for found in wrong_gains(readings, known_outliers):
-        _tell(group[found.run], found, [group[0].names[i] for i in found.channels])
+    for gain in wrong_gains(readings, known_outliers):
+        _tell(group[gain.run], gain, [group[0].names[i] for i in gain.channels])
 
 
 def point_readings(group: Sequence[RunResponse], centres: dict[str, float]) -> PointReadings | None:
@@ -32,13 +32,17 @@ def point_readings(group: Sequence[RunResponse], centres: dict[str, float]) -> P
 
     None where they have not the same two cells, or no means.
     """
-    probes, seen = group[0].channels, [a.seen for a in group]
-    cells = _cells(seen[0])
+    probes, observations = group[0].channels, [a.seen for a in group]
+    cells = _cells(observations[0])
     names = [c.name for c in cells]
-    lines = [one.lines for one in seen if one.lines is not None]
-    if len(names) != 2 or len(lines) < len(group) or any([c.name for c in _cells(one)] != names for one in seen):
+    lines = [observation.lines for observation in observations if observation.lines is not None]
+    if (
+        len(names) != 2
+        or len(lines) < len(group)
+        or any([c.name for c in _cells(observation)] != names for observation in observations)
+    ):
         return None
-    places = [(one.pick("displacement"), one.pick("force")) for one in seen]
+    places = [(observation.pick("displacement"), observation.pick("force")) for observation in observations]
     cell_plane, cell_phasors = plane_of(cells), np.stack([f.phasor[c] for f, (_, c) in zip(lines, places, strict=True)])
     return PointReadings(
         probes=np.stack([a.readings for a in group]),
@@ -54,23 +58,28 @@ def point_readings(group: Sequence[RunResponse], centres: dict[str, float]) -> P
     )
 
 
-def _cells(seen: Observation) -> list[Channel]:
-    return [seen.channels[i] for i in seen.pick("force")]
+def _cells(observation: Observation) -> list[Channel]:
+    return [observation.channels[i] for i in observation.pick("force")]
 
 
 def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
     """What every probe reads at the bearing's centre [m], from clearance runs whose load goes around."""
-    found: dict[str, list[float]] = {}
-    for seen in sweeps:
-        cells, probes = seen.pick("force"), seen.pick("displacement")
-        if len(cells) != 2 or not probes or "force" in seen.report.doubts or "displacement" in seen.report.doubts:
+    table: dict[str, list[float]] = {}
+    for observation in sweeps:
+        cells, probes = observation.pick("force"), observation.pick("displacement")
+        if (
+            len(cells) != 2
+            or not probes
+            or "force" in observation.report.doubts
+            or "displacement" in observation.report.doubts
+        ):
             continue
-        load = to_plane([seen.channels[i] for i in cells], seen.samples[:, cells].T).T
+        load = to_plane([observation.channels[i] for i in cells], observation.samples[:, cells].T).T
         for index in probes:
-            centre = swept_centre(load, seen.samples[:, index])
+            centre = swept_centre(load, observation.samples[:, index])
             if centre is not None:
-                found.setdefault(seen.channels[index].name, []).append(centre)
-    return {name: float(np.median(values)) for name, values in found.items()}
+                table.setdefault(observation.channels[index].name, []).append(centre)
+    return {name: float(np.median(values)) for name, values in table.items()}
 
 
 def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
@@ -78,13 +87,13 @@ def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
 
     Sides and corners of the clearance polygon lie evenly around the centre.
     """
-    known = np.isfinite(load).all(axis=1) & np.isfinite(reading)
-    if not known.any():
+    finite = np.isfinite(load).all(axis=1) & np.isfinite(reading)
+    if not finite.any():
         return None
-    across = load[known] - np.median(load[known], axis=0)
+    across = load[finite] - np.median(load[finite], axis=0)
     turn = np.arctan2(across[:, 1], across[:, 0]) / (2 * math.pi) + 0.5
     sector = np.floor(turn * _SECTORS) % _SECTORS
-    middles = [float(np.median(reading[known][sector == s])) for s in range(_SECTORS) if np.any(sector == s)]
+    middles = [float(np.median(reading[finite][sector == s])) for s in range(_SECTORS) if np.any(sector == s)]
     return float(np.mean(middles)) if len(middles) >= _MET * _SECTORS else None
 
 

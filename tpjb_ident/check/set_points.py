@@ -34,12 +34,12 @@ def to_plane(channels: Sequence[Channel], readings: NDArray[Any]) -> NDArray[Any
     return np.asarray(plane_of(channels) @ readings)
 
 
-def plane_vector(seen: Observation, quantity: str, values: NDArray[Any]) -> NDArray[Any] | None:
+def plane_vector(observation: Observation, quantity: str, values: NDArray[Any]) -> NDArray[Any] | None:
     """X, Y of one value per channel of `quantity`; None where its channels do not span the plane; `values` (m,)."""
-    where = seen.pick(quantity)
+    where = observation.pick(quantity)
     if len(where) < 2:
         return None
-    vector = to_plane([seen.channels[i] for i in where], values[where])
+    vector = to_plane([observation.channels[i] for i in where], values[where])
     return vector if np.all(np.isfinite(vector)) else None
 
 
@@ -48,27 +48,29 @@ def angle_between(first: float, second: float, period: float = 360.0) -> float:
     return abs((first - second + period / 2) % period - period / 2)
 
 
-def check_static_loads(seen: Sequence[Observation]) -> bool:
+def check_static_loads(observations: Sequence[Observation]) -> bool:
     """Mean force of dynamic and locus runs against the stated static load and its direction.
 
     Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
     against them.
     """
     shown = []
-    for one in seen:
-        stated = one.run.point.static_load
-        if one.run.kind in {"dynamic", "locus"} and one.lines is not None and stated > 0:
-            mean = plane_vector(one, "force", one.lines.mean)
+    for observation in observations:
+        stated = observation.run.point.static_load
+        if observation.run.kind in {"dynamic", "locus"} and observation.lines is not None and stated > 0:
+            mean = plane_vector(observation, "force", observation.lines.mean)
             if mean is not None:
-                turn = np.exp(-1j * one.run.point.static_load_direction)
-                shown.append((one, mean, complex(complex(mean[0], mean[1]) / stated * turn)))
+                turn = np.exp(-1j * observation.run.point.static_load_direction)
+                shown.append((observation, mean, complex(complex(mean[0], mean[1]) / stated * turn)))
     if without_static_part(np.array([ratio for _, _, ratio in shown], dtype=complex)):
-        for one, _, _ in shown:
-            what = "is none, as of piezo-electric cells"
-            one.report.say("no static force", "note", "mean force", what, "Nothing; static loads are taken as set")
+        for observation, _, _ in shown:
+            text = "is none, as of piezo-electric cells"
+            observation.report.say(
+                "no static force", "note", "mean force", text, "Nothing; static loads are taken as set"
+            )
         return False
-    for one, mean, ratio in shown:
-        _check_static_load(one, mean, abs(ratio))
+    for observation, mean, ratio in shown:
+        _check_static_load(observation, mean, abs(ratio))
     return True
 
 
@@ -81,27 +83,27 @@ def without_static_part(ratios: ComplexArray) -> bool:
     return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))
 
 
-def _check_static_load(seen: Observation, mean: NDArray[Any], ratio: float) -> None:
-    run, place = seen.run, "mean force"
-    _check_size(seen, ratio)
-    if ratio < 0.02 or seen.lines is None:
+def _check_static_load(observation: Observation, mean: NDArray[Any], ratio: float) -> None:
+    run, place = observation.run, "mean force"
+    _check_size(observation, ratio)
+    if ratio < 0.02 or observation.lines is None:
         return
     points, says = math.degrees(math.atan2(mean[1], mean[0])), run.point.static_load_direction_deg
     off = angle_between(points, says)
     if off <= _ANGLE_WARNING:
         return
-    where = seen.pick("force")
+    where = observation.pick("force")
     wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
-    guess = guess_wiring([seen.channels[i] for i in where], seen.lines.mean[where], wanted)
+    guess = guess_wiring([observation.channels[i] for i in where], observation.lines.mean[where], wanted)
     severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
     if severity == "error":
-        seen.report.doubts.add("force")
-    what = f"points to {points:.0f} deg, static_load_direction is {says:g} deg{guess}"
+        observation.report.doubts.add("force")
+    text = f"points to {points:.0f} deg, static_load_direction is {says:g} deg{guess}"
     cure = "Check the cells' axis and polarity, their cables, and static_load_direction"
-    seen.report.say(f"load direction{guess}", severity, place, what, cure)
+    observation.report.say(f"load direction{guess}", severity, place, text, cure)
 
 
-def _check_size(seen: Observation, ratio: float) -> None:
+def _check_size(observation: Observation, ratio: float) -> None:
     off = abs(ratio - 1.0)
     if off <= 0.1:
         return
@@ -111,49 +113,51 @@ def _check_size(seen: Observation, ratio: float) -> None:
             if abs(ratio / times - 1.0) < 0.3:
                 hint = f"; as if the sensitivity in the manifest were {factor:g} times {word}"
     severity: Severity = "error" if ratio < 0.7 or ratio > 1.4 else "warning"
-    load = seen.run.point.static_load
-    what = f"is {ratio * load:.4g} N, static_load says {load:.4g} N ({ratio:.3g} times){hint}"
+    load = observation.run.point.static_load
+    text = f"is {ratio * load:.4g} N, static_load says {load:.4g} N ({ratio:.3g} times){hint}"
     cure = "Check sensitivity, full_scale and excitation of the cells, and static_load"
-    seen.report.say(f"load size{hint}", severity, "mean force", what, cure)
+    observation.report.say(f"load size{hint}", severity, "mean force", text, cure)
 
 
-def check_speed(seen: Observation) -> None:
+def check_speed(observation: Observation) -> None:
     """Speed channel against the stated shaft speed."""
-    stated, measured = seen.run.point.shaft_speed, seen.speed
+    stated, measured = observation.run.point.shaft_speed, observation.speed
     if math.isnan(measured):
         return
     stated_hz, measured_hz = stated / (2 * math.pi), measured / (2 * math.pi)
     if stated == 0.0:
         if abs(measured) > _SPEED_STILL:
-            what = f"shows {measured_hz:.3g} Hz in a run without rotation"
-            seen.report.say("speed", "warning", "speed channel", what, "Check the channel, kind and shaft_speed")
+            text = f"shows {measured_hz:.3g} Hz in a run without rotation"
+            observation.report.say("speed", "warning", "speed channel", text, "Check the channel, kind and shaft_speed")
         return
     off = abs(measured / stated - 1.0)
     if off > 0.03:
         severity: Severity = "error" if off > 0.1 else "warning"
-        what = f"shows {measured_hz:.4g} Hz, shaft_speed says {stated_hz:.4g} Hz"
-        seen.report.say("speed", severity, "speed channel", what, "Check shaft_speed and the channel's sensitivity")
+        text = f"shows {measured_hz:.4g} Hz, shaft_speed says {stated_hz:.4g} Hz"
+        observation.report.say(
+            "speed", severity, "speed channel", text, "Check shaft_speed and the channel's sensitivity"
+        )
 
 
-def oil_force(seen: Observation, mass: float) -> ComplexArray | None:
+def oil_force(observation: Observation, mass: float) -> ComplexArray | None:
     """Force phasor of the film on the housing, F_cell + m_h a_h, X and Y [N]; None where not measured."""
-    if seen.lines is None:
+    if observation.lines is None:
         return None
-    force = plane_vector(seen, "force", seen.lines.phasor)
+    force = plane_vector(observation, "force", observation.lines.phasor)
     if force is None:
         return None
-    acceleration = plane_vector(seen, "acceleration", seen.lines.phasor)
+    acceleration = plane_vector(observation, "acceleration", observation.lines.phasor)
     if math.isnan(mass):  # not stated: the housing's inertia stays in the force
         acceleration, mass = None, 0.0
     return film_force(force, acceleration, mass)
 
 
-def excited(seen: Observation) -> bool:
+def excited(observation: Observation) -> bool:
     """Whether the force shows the excitation line above its noise."""
-    if seen.lines is None:
+    if observation.lines is None:
         return False
-    where = seen.pick("force")
-    size, floor = np.abs(seen.lines.phasor[where]), seen.lines.floor[where]
+    where = observation.pick("force")
+    size, floor = np.abs(observation.lines.phasor[where]), observation.lines.floor[where]
     return bool(np.any(size > _LINE_OVER_FLOOR * floor) and np.any(size > 0))
 
 
@@ -167,24 +171,24 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
     }
     usual = float(np.median(list(relative.values()))) if relative else 0.0
     shown: list[tuple[Observation, ComplexArray]] = []
-    for seen in runs:
-        if id(seen) not in forces:
+    for observation in runs:
+        if id(observation) not in forces:
             continue
-        if id(seen) not in relative or (len(relative) > 3 and relative[id(seen)] < 0.1 * usual):
-            _missing_line(seen)
-        elif "force" not in seen.report.doubts:
-            shown.append((seen, forces[id(seen)]))
+        if id(observation) not in relative or (len(relative) > 3 and relative[id(observation)] < 0.1 * usual):
+            _missing_line(observation)
+        elif "force" not in observation.report.doubts:
+            shown.append((observation, forces[id(observation)]))
     _check_directions(shown)
 
 
-def _missing_line(seen: Observation) -> None:
-    point = seen.run.point
-    other = seen.other_line
+def _missing_line(observation: Observation) -> None:
+    point = observation.run.point
+    other = observation.other_line
     hint = f"; the strongest other line is near {other:.3g} Hz" if math.isfinite(other) else ""
-    what = f"the force shows no line at the excitation frequency of {point.excitation_hz:g} Hz{hint}"
+    text = f"the force shows no line at the excitation frequency of {point.excitation_hz:g} Hz{hint}"
     cure = "Check excitation_frequency, and whether the actuators ran; repeat the run"
-    seen.report.say("no excitation", "error", "force", what, cure)
-    seen.report.doubts.add("force")
+    observation.report.say("no excitation", "error", "force", text, cure)
+    observation.report.doubts.add("force")
 
 
 def _along(force: ComplexArray) -> float:
@@ -199,17 +203,17 @@ def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None
     ]
     off = [(s, f, d) for s, f, d in stated if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
     guess = _common_wiring([(s, d) for s, _, d in stated]) if len(off) > 2 else ""
-    for seen, _, _ in stated if guess else ():
-        seen.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
-    for seen, force, says in off:
+    for observation, _, _ in stated if guess else ():
+        observation.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
+    for observation, force, says in off:
         shows = _along(force)
         severity: Severity = "error" if guess or angle_between(shows, says, 180.0) > _ANGLE_ERROR else "warning"
         if severity == "error":
-            seen.report.doubts.add("force")
+            observation.report.doubts.add("force")
         near = round(says + (shows - says + 90.0) % 180.0 - 90.0)
-        what = f"the excitation shows along {near} deg, excitation_direction says {says:g} deg{guess}"
+        text = f"the excitation shows along {near} deg, excitation_direction says {says:g} deg{guess}"
         cure = "Check excitation_direction, and the cells' axes and cables"
-        seen.report.say(f"excitation direction{guess}", severity, "force", what, cure)
+        observation.report.say(f"excitation direction{guess}", severity, "force", text, cure)
 
 
 def _common_wiring(stated: Sequence[tuple[Observation, float]]) -> str:
@@ -220,11 +224,11 @@ def _common_wiring(stated: Sequence[tuple[Observation, float]]) -> str:
         return ""
     for words, matrix in repairs(channels):
         right = 0
-        for seen, says in stated:
-            where = seen.pick("force")
-            if seen.lines is None or [seen.channels[i].name for i in where] != [c.name for c in channels]:
+        for observation, says in stated:
+            where = observation.pick("force")
+            if observation.lines is None or [observation.channels[i].name for i in where] != [c.name for c in channels]:
                 continue
-            mended = to_plane(channels, matrix @ seen.lines.phasor[where])
+            mended = to_plane(channels, matrix @ observation.lines.phasor[where])
             right += angle_between(_along(mended), says, 180.0) <= _ANGLE_WARNING
         if right >= 0.8 * len(stated):
             return f"; as if {words}"

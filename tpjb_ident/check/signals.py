@@ -35,8 +35,8 @@ def check_signal(report: Reporter, channel: Channel, seen: ChannelStatistics, no
     grave: Severity = "error" if needed(report.run, channel) else "warning"
     place = f"channel {channel.name}"
     if seen.values == 0:
-        what = "holds no values at all"
-        report.say(f"empty {channel.name}", grave, place, what, "Check the channel's wiring and logger settings")
+        text = "holds no values at all"
+        report.say(f"empty {channel.name}", grave, place, text, "Check the channel's wiring and logger settings")
         return
     _missing(report, channel, seen, grave)
     if seen.constant and not noise_free:
@@ -48,9 +48,9 @@ def check_signal(report: Reporter, channel: Channel, seen: ChannelStatistics, no
     clipped = seen.clipped_share()
     if clipped > 0:
         limits = f"{seen.low:g} and {seen.high:g} {channel.unit}"
-        what = f"{clipped:.1%} of the samples sit flat at an extreme reading (limits {limits}): clipped"
+        text = f"{clipped:.1%} of the samples sit flat at an extreme reading (limits {limits}): clipped"
         severity: Severity = grave if clipped > 0.05 else "warning"
-        report.say(f"clipped {channel.name}", severity, place, what, "Widen the logger's range and repeat the run")
+        report.say(f"clipped {channel.name}", severity, place, text, "Widen the logger's range and repeat the run")
     if channel.quantity == "temperature":
         _temperature(report, channel, seen)
 
@@ -60,9 +60,9 @@ def _missing(report: Reporter, channel: Channel, seen: ChannelStatistics, grave:
     if share == 0:
         return
     severity: Severity = grave if share > 0.5 else ("warning" if share > 0.01 else "note")
-    what = f"{seen.missing} of {seen.samples} samples have no value ({share:.1%})"
+    text = f"{seen.missing} of {seen.samples} samples have no value ({share:.1%})"
     cure = "Repeat the run" if share > 0.5 else "They are left out"
-    report.say(f"missing {channel.name}", severity, f"channel {channel.name}", what, cure)
+    report.say(f"missing {channel.name}", severity, f"channel {channel.name}", text, cure)
 
 
 def _dead(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Severity, alone: bool) -> None:
@@ -71,12 +71,12 @@ def _dead(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Se
     still = channel.quantity == "speed" or (alone and channel.quantity in {"temperature", "pressure"})
     still = still or (channel.quantity == "acceleration" and report.run.kind != "dynamic")
     if not still:
-        what = f"is dead: it reads {value} throughout"
+        text = f"is dead: it reads {value} throughout"
         cure = "Check sensor, cable and amplifier; repeat the run, or set the channel to ignore"
-        report.say(f"dead {channel.name}", grave, place, what, cure)
+        report.say(f"dead {channel.name}", grave, place, text, cure)
     elif channel.quantity in {"temperature", "pressure"}:
-        what = f"reads {value} throughout"
-        report.say(f"constant {channel.name}", "note", place, what, "Check that it is alive")
+        text = f"reads {value} throughout"
+        report.say(f"constant {channel.name}", "note", place, text, "Check that it is alive")
 
 
 def _stuck(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Severity) -> None:
@@ -84,17 +84,17 @@ def _stuck(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: S
         return
     share = seen.longest_flat / seen.samples
     severity: Severity = grave if share > 0.25 else ("warning" if share > 0.05 else "note")
-    what = f"stands still for {seen.longest_flat} samples from sample {seen.flat_start} on ({share:.0%} of the run)"
+    text = f"stands still for {seen.longest_flat} samples from sample {seen.flat_start} on ({share:.0%} of the run)"
     cure = "Check sensor and logger; repeat the run if much of it is lost"
-    report.say(f"stuck {channel.name}", severity, f"channel {channel.name}", what, cure)
+    report.say(f"stuck {channel.name}", severity, f"channel {channel.name}", text, cure)
 
 
 def _temperature(report: Reporter, channel: Channel, seen: ChannelStatistics) -> None:
     ends = sorted((channel.slope * seen.low + channel.zero, channel.slope * seen.high + channel.zero))
     if ends[0] < _TEMPERATURES[0] or ends[1] > _TEMPERATURES[1]:
-        what = f"reads from {ends[0] - _CELSIUS:.0f} to {ends[1] - _CELSIUS:.0f} degC"
+        text = f"reads from {ends[0] - _CELSIUS:.0f} to {ends[1] - _CELSIUS:.0f} degC"
         cure = "Check sensitivity, zero and wiring"
-        report.say(f"temperature {channel.name}", "warning", f"channel {channel.name}", what, cure)
+        report.say(f"temperature {channel.name}", "warning", f"channel {channel.name}", text, cure)
 
 
 def check_clock(report: Reporter, time: FloatArray) -> None:
@@ -115,22 +115,22 @@ def check_clock(report: Reporter, time: FloatArray) -> None:
     if scatter > 0.02:
         cause = "the time column is rounded" if rounded else "the clock jitters"
         severity: Severity = "warning" if scatter > 0.2 and not rounded else "note"
-        what = f"{cause}: steps scatter by {scatter:.0%} of a sample"
+        text = f"{cause}: steps scatter by {scatter:.0%} of a sample"
         cure = "Times are used as they are; export more digits if you can"
-        report.say("jitter", severity, "time", what, cure)
+        report.say("jitter", severity, "time", text, cure)
 
 
 def _check_length(report: Reporter, samples: int, rate: float) -> None:
     excitation = report.run.point.excitation_hz
     if samples < 3:
-        what = f"the record holds only {samples} samples"
-        report.say("short", "error", "time", what, "Export the run again")
+        text = f"the record holds only {samples} samples"
+        report.say("short", "error", "time", text, "Export the run again")
     elif report.run.kind == "dynamic" and rate < 2.2 * excitation:
-        what = f"{rate:g} samples per second cannot show an excitation of {excitation:g} Hz"
-        report.say("nyquist", "error", "time", what, "Check sample_rate and excitation_frequency")
+        text = f"{rate:g} samples per second cannot show an excitation of {excitation:g} Hz"
+        report.say("nyquist", "error", "time", text, "Check sample_rate and excitation_frequency")
     elif report.run.kind == "dynamic" and excitation > 0 and samples < _MIN_CYCLES * rate / excitation:
-        what = f"the record holds only {samples * excitation / rate:.1f} cycles of the excitation"
-        report.say("short", "warning", "time", what, f"Record at least {_MIN_CYCLES:g} cycles")
+        text = f"the record holds only {samples * excitation / rate:.1f} cycles of the excitation"
+        report.say("short", "warning", "time", text, f"Record at least {_MIN_CYCLES:g} cycles")
 
 
 def _check_gaps(report: Reporter, steps: FloatArray, step: float) -> None:
@@ -141,7 +141,7 @@ def _check_gaps(report: Reporter, steps: FloatArray, step: float) -> None:
     longest = int(gaps[np.argmax(steps[gaps])])
     lost = float(np.sum(steps[gaps] - step)) / step
     severity: Severity = "warning" if lost > 0.005 * len(steps) else "note"
-    what = (
+    text = (
         f"{len(gaps)} gaps, about {lost:.0f} samples lost, the longest of {steps[longest]:.6g} s after sample {longest}"
     )
-    report.say("gap", severity, "time", what, "Times are used as they are; check the logger's buffer")
+    report.say("gap", severity, "time", text, "Times are used as they are; check the logger's buffer")

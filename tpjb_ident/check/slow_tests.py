@@ -31,49 +31,51 @@ _PADS = range(3, 13)
 Shown = tuple[Observation, float]
 
 
-def _planes(seen: Observation) -> tuple[FloatArray, FloatArray] | None:
+def _planes(observation: Observation) -> tuple[FloatArray, FloatArray] | None:
     """Force and displacement (n, 2) of the thinned samples, rows without a value left out."""
-    force, shaft = seen.pick("force"), seen.pick("displacement")
+    force, shaft = observation.pick("force"), observation.pick("displacement")
     if len(force) < 2 or len(shaft) != 2:
         return None
-    rows = np.isfinite(seen.samples[:, force + shaft]).all(axis=1)
+    rows = np.isfinite(observation.samples[:, force + shaft]).all(axis=1)
     if np.count_nonzero(rows) < 20:
         return None
-    samples = seen.samples[rows]
-    planes = (samples[:, own] @ np.linalg.pinv(_directions(seen, own)).T for own in (force, shaft))
+    samples = observation.samples[rows]
+    planes = (samples[:, own] @ np.linalg.pinv(_directions(observation, own)).T for own in (force, shaft))
     return next(planes), next(planes)
 
 
-def _directions(seen: Observation, where: Sequence[int]) -> FloatArray:
+def _directions(observation: Observation, where: Sequence[int]) -> FloatArray:
     """Unit vectors (m, 2) of some channels."""
-    return directions(np.array([seen.channels[i].axis for i in where]))
+    return directions(np.array([observation.channels[i].axis for i in where]))
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
     """Dry pivot runs: a load that rises, its direction, pads told apart."""
     directions: list[tuple[Observation, float]] = []
-    for seen in runs:
-        planes = _planes(seen)
+    for observation in runs:
+        planes = _planes(observation)
         if planes is None:
             continue
         push = _main_move(planes[0])
         if push is None:
-            seen.report.say("no load", "error", "force", "the load does not rise", "Check the cells; repeat the run")
+            observation.report.say(
+                "no load", "error", "force", "the load does not rise", "Check the cells; repeat the run"
+            )
             continue
         shows = math.degrees(math.atan2(push[1], push[0]))
-        directions.append((seen, shows))
-        if "static_load_direction" in seen.run.stated:
-            _check_push(seen, shows, push)
+        directions.append((observation, shows))
+        if "static_load_direction" in observation.run.stated:
+            _check_push(observation, shows, push)
     _check_labels(directions)
 
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
     """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
-    for seen in runs:
-        planes = _planes(seen)
-        push = None if planes is None or "force" in seen.report.doubts else _main_move(planes[0])
+    for observation in runs:
+        planes = _planes(observation)
+        push = None if planes is None or "force" in observation.report.doubts else _main_move(planes[0])
         if planes is not None and push is not None:
-            _check_follows(seen, planes, push)
+            _check_follows(observation, planes, push)
 
 
 def _main_move(force: FloatArray) -> FloatArray | None:
@@ -87,24 +89,25 @@ def _main_move(force: FloatArray) -> FloatArray | None:
     return move if float(np.hypot(*move)) > max(10 * noise, 1e-9) else None
 
 
-def _check_push(seen: Observation, shows: float, push: FloatArray) -> None:
-    says = seen.run.point.static_load_direction_deg
+def _check_push(observation: Observation, shows: float, push: FloatArray) -> None:
+    says = observation.run.point.static_load_direction_deg
     off = angle_between(shows, says)
     if off <= _ANGLE_WARNING:
         return
-    where = seen.pick("force")
-    channels = [seen.channels[i] for i in where]
+    where = observation.pick("force")
+    channels = [observation.channels[i] for i in where]
     wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
-    guess = guess_wiring(channels, _directions(seen, where) @ push, wanted)
+    guess = guess_wiring(channels, _directions(observation, where) @ push, wanted)
     severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
     if guess:
-        seen.report.doubts.add("force")
-    what = f"the load rises toward {shows:.0f} deg, static_load_direction of pad {seen.run.pad} is {says:g} deg{guess}"
+        observation.report.doubts.add("force")
+    stated = f"static_load_direction of pad {observation.run.pad} is {says:g} deg"
+    text = f"the load rises toward {shows:.0f} deg, {stated}{guess}"
     cure = "Check pad and static_load_direction of this run, and the cells' axes and cables"
-    seen.report.say(f"push direction{guess}", severity, "force", what, cure)
+    observation.report.say(f"push direction{guess}", severity, "force", text, cure)
 
 
-def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> None:
+def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> None:
     """The shaft must go toward the pad, mainly along the load."""
     unit = push / np.hypot(*push)
     load = planes[0] @ unit
@@ -113,47 +116,49 @@ def _check_follows(seen: Observation, planes: tuple[FloatArray, FloatArray], pus
     size = float(np.hypot(*slope))
     if size * float(np.ptp(load)) < _FIRM_MOVE or float(slope @ unit) > _FOLLOWS * size:
         return
-    where = seen.pick("displacement")
-    channels = [seen.channels[i] for i in where]
-    guess = guess_wiring(channels, _directions(seen, where) @ slope, unit, within=20.0)
+    where = observation.pick("displacement")
+    channels = [observation.channels[i] for i in where]
+    guess = guess_wiring(channels, _directions(observation, where) @ slope, unit, within=20.0)
     goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
-    what = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
+    text = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"
     names = " and ".join(c.name for c in channels)
-    seen.report.say(f"signs {names}{guess}", "error", f"channels {names}", what, cure)
+    observation.report.say(f"signs {names}{guess}", "error", f"channels {names}", text, cure)
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
     """Clearance runs: the shaft moves to the side to which the small load pushes it."""
-    for seen in runs:
-        planes = _planes(seen)
+    for observation in runs:
+        planes = _planes(observation)
         if planes is None:
             continue
         force, shaft = planes[0] - planes[0].mean(axis=0), planes[1] - planes[1].mean(axis=0)
         sizes = np.linalg.svd(force, compute_uv=False)
         if sizes[-1] < 0.3 * sizes[0]:
-            what = "the load does not sweep around all directions"
-            seen.report.say("sweep", "warning", "force", what, "A clearance run needs a rotating load")
+            text = "the load does not sweep around all directions"
+            observation.report.say("sweep", "warning", "force", text, "A clearance run needs a rotating load")
             continue
         gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
-        _judge_gain(seen, gain)
+        _judge_gain(observation, gain)
 
 
 def check_locus(runs: Sequence[Observation]) -> None:
     """Locus runs together: mean positions follow the directions of the loads."""
     groups: dict[object, list[Observation]] = {}
-    for seen in runs:
-        measured = len(seen.pick("displacement")) == 2 and len(seen.pick("force")) >= 2
-        if seen.lines is not None and measured and "force" not in seen.report.doubts:
-            groups.setdefault((seen.run.point.static_load, seen.run.point.shaft_speed), []).append(seen)
+    for observation in runs:
+        measured = len(observation.pick("displacement")) == 2 and len(observation.pick("force")) >= 2
+        if observation.lines is not None and measured and "force" not in observation.report.doubts:
+            groups.setdefault((observation.run.point.static_load, observation.run.point.shaft_speed), []).append(
+                observation
+            )
     for group in groups.values():
         loads: list[FloatArray] = []
         places: list[FloatArray] = []
-        for seen in group:
-            assert seen.lines is not None
+        for observation in group:
+            assert observation.lines is not None
             for quantity, into in (("force", loads), ("displacement", places)):
-                where = seen.pick(quantity)
-                into.append(to_plane([seen.channels[i] for i in where], seen.lines.mean[where]))
+                where = observation.pick(quantity)
+                into.append(to_plane([observation.channels[i] for i in where], observation.lines.mean[where]))
         force, shaft = np.array(loads), np.array(places)
         rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
         if np.count_nonzero(rows) < 4:
@@ -162,31 +167,31 @@ def check_locus(runs: Sequence[Observation]) -> None:
         sizes = np.linalg.svd(force, compute_uv=False)
         if sizes[-1] > 0.3 * sizes[0]:
             gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
-            for seen in group:
-                _judge_gain(seen, gain)
+            for observation in group:
+                _judge_gain(observation, gain)
             _judge_places([group[i] for i in np.flatnonzero(rows)], shaft, shaft - force @ gain.T)
 
 
 def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArray) -> None:
     """A position that lies elsewhere than the others of its load and speed let one expect."""
     size, misfit = float(np.median(np.hypot(*shaft.T))), np.hypot(*off.T)
-    for seen, distance in zip(group, misfit):
+    for observation, distance in zip(group, misfit):
         if len(group) >= 6 and distance > max(0.7 * size, 5 * float(np.median(misfit))):
-            what = f"the mean position lies {1e6 * distance:.0f} um from where the other directions let one expect it"
+            text = f"the mean position lies {1e6 * distance:.0f} um from where the other directions let one expect it"
             cure = "Check the probes of this run: sign, sensitivity, moved?"
-            seen.report.say("place", "warning", "displacement", what, cure)
+            observation.report.say("place", "warning", "displacement", text, cure)
 
 
-def _judge_gain(seen: Observation, gain: FloatArray) -> None:
+def _judge_gain(observation: Observation, gain: FloatArray) -> None:
     """`gain` (2, 2) [m/N] from force to displacement must be positive definite."""
-    if definiteness(gain) > _LEAST_DEFINITE or not np.any(gain) or "force" in seen.report.doubts:
+    if definiteness(gain) > _LEAST_DEFINITE or not np.any(gain) or "force" in observation.report.doubts:
         return
-    channels = [seen.channels[i] for i in seen.pick("displacement")]
+    channels = [observation.channels[i] for i in observation.pick("displacement")]
     hint = name_fault(channels, lambda repair: definiteness(mirrored(channels, repair) @ gain))
     names = " and ".join(c.name for c in channels)
-    what = f"the shaft does not go to the side to which the load pushes it{hint}"
+    text = f"the shaft does not go to the side to which the load pushes it{hint}"
     cure = "Check axis, polarity and cables of the probes (and of the cells)"
-    seen.report.say(f"signs {names}{hint}", "error" if hint else "warning", f"channels {names}", what, cure)
+    observation.report.say(f"signs {names}{hint}", "error" if hint else "warning", f"channels {names}", text, cure)
 
 
 def _check_labels(directions: Sequence[Shown]) -> None:
@@ -214,18 +219,18 @@ def _contradict(first: Shown, second: Shown) -> bool:
 
 def _tell(one: Shown, other: Shown, belongs: int | None) -> None:
     """Name a contradiction, at the run that is wrong where that is known."""
-    seen, shows = one
-    what = f"pad {seen.run.pad} is loaded toward {shows:.0f} deg"
-    if seen.run.pad == other[0].run.pad:
-        what += f" here, toward {other[1]:.0f} deg in run {other[0].run.id}"
+    observation, shows = one
+    text = f"pad {observation.run.pad} is loaded toward {shows:.0f} deg"
+    if observation.run.pad == other[0].run.pad:
+        text += f" here, toward {other[1]:.0f} deg in run {other[0].run.id}"
     else:
-        what += f", as is pad {other[0].run.pad} in run {other[0].run.id}"
+        text += f", as is pad {other[0].run.pad} in run {other[0].run.id}"
     cure = "One of the two runs names the wrong pad: correct it"
     if belongs is not None:
-        what += f"; by the directions of the other runs it is pad {belongs}"
+        text += f"; by the directions of the other runs it is pad {belongs}"
         cure = "Correct the pad number of this run"
-    if not any(f.key == "pad" for f in seen.report.found):
-        seen.report.say("pad", "error", "pad", what, cure)
+    if not any(f.key == "pad" for f in observation.report.found):
+        observation.report.say("pad", "error", "pad", text, cure)
 
 
 def _odd_ones(directions: Sequence[Shown]) -> dict[int, int]:
@@ -233,22 +238,22 @@ def _odd_ones(directions: Sequence[Shown]) -> dict[int, int]:
 
     Empty where fewer than three runs agree on one arrangement, or where two arrangements serve as many.
     """
-    largest = max((seen.run.pad or 0) for seen, _ in directions)
-    found: dict[frozenset[int], dict[int, int]] = {}
+    largest = max((observation.run.pad or 0) for observation, _ in directions)
+    table: dict[frozenset[int], dict[int, int]] = {}
     for count in _PADS:
         for sense in (1, -1):
             if count < largest:
                 continue
             step = 360.0 * sense / count
-            for seen, shows in directions:
-                first = shows - step * ((seen.run.pad or 1) - 1)
+            for observation, shows in directions:
+                first = shows - step * ((observation.run.pad or 1) - 1)
                 places = {id(s): _pad_at(d, first, step, count) for s, d in directions}
                 fit = frozenset(id(s) for s, _ in directions if places[id(s)] == s.run.pad)
                 rest = {id(s): places[id(s)] for s, _ in directions if id(s) not in fit}
                 if len(fit) >= 3 and None not in rest.values():
-                    found.setdefault(fit, {k: v for k, v in rest.items() if v is not None})
-    most = max((len(fit) for fit in found), default=0)
-    best = [rest for fit, rest in found.items() if len(fit) == most]
+                    table.setdefault(fit, {k: v for k, v in rest.items() if v is not None})
+    most = max((len(fit) for fit in table), default=0)
+    best = [rest for fit, rest in table.items() if len(fit) == most]
     return best[0] if len(best) == 1 and 2 * most > len(directions) else {}
 
 

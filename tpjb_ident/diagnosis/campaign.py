@@ -146,16 +146,20 @@ def measure_campaign(
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = IdentifySettings(clearance=least)
-    found = identify(campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total))
+    identification = identify(
+        campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total)
+    )
     tell("pivot curves, clearance and locus", 20, 100)
     static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
     curves, polygon, locus = static.curves, static.clearance, static.locus
-    found = replace(found, conditions=found.conditions + static.left_out)
+    identification = replace(identification, conditions=identification.conditions + static.left_out)
     housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
     certain = _stated_tolerances(campaign, bearing, known or Tolerances())
     if polygon is None and locus is not None:
         certain = replace(certain, centre=unknown_centre(locus))
-    return Measured(found, tuple(curves), polygon, locus, housing, certain, _sensor_positions(campaign, bearing))
+    return Measured(
+        identification, tuple(curves), polygon, locus, housing, certain, _sensor_positions(campaign, bearing)
+    )
 
 
 def _diagnose_measured(
@@ -169,14 +173,18 @@ def _diagnose_measured(
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
     settings = replace(settings, tolerances=measured.tolerances)
     tell = progress or (lambda text, done, total: None)
-    found, curves = measured.identification, measured.curves
-    given = baseline.pivots == "measured"
-    laws = measured_laws(curves, len(bearing.pads), found.campaign) if given else pivot_laws(baseline.pivots, bearing)
+    identification, curves = measured.identification, measured.curves
+    measured_pivots = baseline.pivots == "measured"
+    laws = (
+        measured_laws(curves, len(bearing.pads), identification.campaign)
+        if measured_pivots
+        else pivot_laws(baseline.pivots, bearing)
+    )
     plain = Setup(bearing, laws, baseline.thermal, instruments=measured.instruments)
     setup = apply_effects(plain, baseline.effects)
     # curves that the model was given cannot testify about it
     observations = observe(
-        found, () if given else curves, measured.locus, measured.polygon, settings.tolerance
+        identification, () if measured_pivots else curves, measured.locus, measured.polygon, settings.tolerance
     )  # fmt: skip
     observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
     result = diagnose(
@@ -185,7 +193,7 @@ def _diagnose_measured(
         settings,
         lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100),
     )
-    return CampaignDiagnosis(result, found, setup)
+    return CampaignDiagnosis(result, identification, setup)
 
 
 def diagnose_table(
@@ -218,25 +226,25 @@ def unknown_centre(locus: Locus) -> float:
 
 def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
     """Tolerances by the weight of their source: command line, bearing file, manifest, defaults."""
-    found = known.layered(bearing)
+    tolerances = known.layered(bearing)
     probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
     cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
     gains = [float(p.uncertainty) for p in probes if p.uncertainty]
-    if gains and found.stated["probe_gain"].source == "default":
-        found = found.states({"probe_gain": max(gains)}, "manifest")
+    if gains and tolerances.stated["probe_gain"].source == "default":
+        tolerances = tolerances.states({"probe_gain": max(gains)}, "manifest")
     if len(probes) == 2 and abs(math.sin(float(probes[0].axis or 0.0) - float(probes[1].axis or 0.0))) > 0.05:
-        found = replace(found, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
+        tolerances = replace(tolerances, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
     if cells:
         gain = max(float(c.uncertainty or 0.0) for c in cells)
-        found = replace(found, cell_gain=StatedTolerance(gain, "manifest"))
-    return found
+        tolerances = replace(tolerances, cell_gain=StatedTolerance(gain, "manifest"))
+    return tolerances
 
 
 def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]:
     """Fraction of the arc at which every pad carries its thermometer, as the manifest states it; else 0.75."""
-    given = {int(c.pad): float(c.position) for c in campaign.channels.values()
+    table = {int(c.pad): float(c.position) for c in campaign.channels.values()
              if c.quantity == "temperature" and c.pad is not None and c.position is not None}  # fmt: skip
-    return tuple(given.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))
+    return tuple(table.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))
 
 
 #: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
@@ -250,9 +258,9 @@ def with_housing(setup: Setup, campaign: Campaign) -> Setup:
     instruments = setup.instruments
     if math.isfinite(campaign.housing_mass):
         instruments = replace(instruments, housing_mass=campaign.housing_mass)
-    found = cell_stiffness(campaign)
-    if found is not None:
-        instruments = replace(instruments, cell_stiffness=found)
+    stiffness = cell_stiffness(campaign)
+    if stiffness is not None:
+        instruments = replace(instruments, cell_stiffness=stiffness)
     return setup.change(instruments=instruments)
 
 
@@ -269,14 +277,14 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
     for run in runs:
         try:
             band = None if run.excitation_kind == "sine" else run.band
-            found = run_phasors(run, mass) if band is None else _over_band(run, band, mass, campaign.mains)
+            phasors = run_phasors(run, mass) if band is None else _over_band(run, band, mass, campaign.mains)
         except RecordTooShortError:
             continue
-        if found.acceleration is None:
+        if phasors.acceleration is None:
             continue
-        lines = len(found.lines.excitation)
-        omega = 2 * np.pi * np.array([line.frequency for line in found.lines.excitation])
-        force, acceleration = found.cell_force.phasors[:, :lines], found.acceleration.phasors[:, :lines]
+        lines = len(phasors.lines.excitation)
+        omega = 2 * np.pi * np.array([line.frequency for line in phasors.lines.excitation])
+        force, acceleration = phasors.cell_force.phasors[:, :lines], phasors.acceleration.phasors[:, :lines]
         power = np.sum(np.abs(force) ** 2, axis=(0, 1))
         slope = np.sum((np.conj(force) * -acceleration / omega[:, None] ** 2).real, axis=(0, 1))
         # an axis that the run does not excite says nothing

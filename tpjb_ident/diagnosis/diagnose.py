@@ -75,12 +75,14 @@ def diagnose(
     forward = Forward(quick, observations.layout, observations.elements)
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
-        found = search(run, problem, settings, progress)
-        exact = _exact(forward, found)
-        verdict = decide(problem, found, settings, exact)
-        verdict = replace(verdict, next_test=_next_test(run, verdict, found, (quick, observations.layout), settings))
+        search_result = search(run, problem, settings, progress)
+        exact = _exact(forward, search_result)
+        verdict = decide(problem, search_result, settings, exact)
+        verdict = replace(
+            verdict, next_test=_next_test(run, verdict, search_result, (quick, observations.layout), settings)
+        )
     after = problem.base if not verdict.effects or exact is None else exact
-    return Diagnosis(verdict, problem, found, after)
+    return Diagnosis(verdict, problem, search_result, after)
 
 
 def _exact(forward: Forward, found: Search) -> FloatArray | None:
@@ -95,10 +97,10 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     """Set a campaign beside a model: baseline, nuisances, candidates."""
     base = forward()
     trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
-    known = nuisances(trusted.elements, forward.setup, settings.tolerances)
+    listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
     with workers(forward, base, settings.workers) as run:
-        columns = np.column_stack([np.zeros((len(base), 0)), *run(_column, [(known, i) for i in range(len(known))])])
-    return Problem(trusted, base, known, columns, candidates(forward.setup.bearing, settings.skip))
+        columns = np.column_stack([np.zeros((len(base), 0)), *run(_column, [(listed, i) for i in range(len(listed))])])
+    return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip))
 
 
 def _column(forward: ForwardModel, base: FloatArray, known: tuple[Nuisance, ...], index: int) -> FloatArray:
@@ -124,11 +126,11 @@ def _next_test(
         return ""
     count = len(options_for(setup, layout))
     tried = run(_separated, [(setup, i, (model, *others), settings.tolerances) for i in range(count)])
-    tests = ranked([one for one in tried if one is not None])
+    tests = ranked([separation for separation in tried if separation is not None])
     if not tests:
         return ""
-    told = say(suggested(tests), found.model.label, *(r.label for r in rivals))
-    return f"to confirm: {told}" if verdict.verdict == "named" else told
+    text = say(suggested(tests), found.model.label, *(r.label for r in rivals))
+    return f"to confirm: {text}" if verdict.verdict == "named" else text
 
 
 def _separated(
@@ -149,34 +151,34 @@ def _possible(setup: Setup, fitted: Fit):  # type: ignore[no-untyped-def]
 def _rivals(found: Search) -> list[Fit]:
     """The likeliest other explanations, one per name."""
     rows = sorted((r for row in found.rivals for r in row if not r.at_bound), key=lambda f: -f.evidence)
-    kept: dict[frozenset[str], Fit] = {}
+    by_names: dict[frozenset[str], Fit] = {}
     for r in rows:
         if r.names != found.model.names:
-            kept.setdefault(r.names, r)
-    return list(kept.values())[:IMPOSTORS]
+            by_names.setdefault(r.names, r)
+    return list(by_names.values())[:IMPOSTORS]
 
 
 def _thinned(observations: Observations) -> Observations:
     """Keep every second, third .. load direction of a locus that has more than `DIRECTIONS`."""
-    kept = set()
+    used_places = set()
     tests: dict[tuple[float, float], list[float]] = {}
-    for one in observations.layout.locus:
-        tests.setdefault((one.load, one.speed), []).append(one.direction)
+    for locus_test in observations.layout.locus:
+        tests.setdefault((locus_test.load, locus_test.speed), []).append(locus_test.direction)
     for (load, speed), directions in tests.items():
         around = sorted(set(directions), key=lambda a: a % (2 * np.pi))
         step = -(-len(around) // DIRECTIONS)
-        kept |= {(load, speed, a) for a in around[::step]}
-    mine = np.array([
-        e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in kept
+        used_places |= {(load, speed, a) for a in around[::step]}
+    selected = np.array([
+        e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in used_places
         for e in observations.elements
     ])  # fmt: skip
-    if mine.all():
+    if selected.all():
         return observations
-    locus = tuple(t for t in observations.layout.locus if (t.load, t.speed, t.direction) in kept)
+    locus = tuple(t for t in observations.layout.locus if (t.load, t.speed, t.direction) in used_places)
     return replace(
-        observations, layout=replace(observations.layout, locus=locus), value=observations.value[mine],
-        covariance=observations.covariance[np.ix_(mine, mine)], sigma=observations.sigma[mine],
-        elements=tuple(e for e, m in zip(observations.elements, mine, strict=True) if m),
+        observations, layout=replace(observations.layout, locus=locus), value=observations.value[selected],
+        covariance=observations.covariance[np.ix_(selected, selected)], sigma=observations.sigma[selected],
+        elements=tuple(e for e, m in zip(observations.elements, selected, strict=True) if m),
     )  # fmt: skip
 
 

@@ -282,7 +282,7 @@ def separated(
 ) -> Separation | None:
     """What one design would show; None where it cannot be or the model has no equilibrium."""
     if isinstance(design, Check):
-        return Separation(design, tuple(design.separation(one, other) for other in rivals))
+        return Separation(design, tuple(design.separation(one, rival) for rival in rivals))
     if not design.fits(one, *rivals):
         return None
     try:
@@ -297,9 +297,9 @@ def _each(
     seen = design.planned(setup)
     forward = design.forward(setup, seen)
     acting = design.acting(one)
-    mine = forward(acting)
-    columns = at_baseline(forward, acting, setup, known, mine)
-    return tuple(apart(seen, columns, mine - forward(design.acting(other))) for other in rivals)
+    prediction = forward(acting)
+    columns = at_baseline(forward, acting, setup, known, prediction)
+    return tuple(apart(seen, columns, prediction - forward(design.acting(rival))) for rival in rivals)
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
@@ -363,19 +363,19 @@ class Check:
 
     def separation(self, one: Sequence[Effect], other: Sequence[Effect]) -> float:
         """Distance of two explanations in standard deviations; 0 where neither has the effect."""
-        mine, theirs = self._sizes(one), self._sizes(other)
+        sizes, theirs = self._sizes(one), self._sizes(other)
         neutral = next(p.neutral for p in kind_of(self.effect).parameters if p.name == self.parameter)
-        places = mine.keys() | theirs.keys()
-        return math.hypot(*((mine.get(k, neutral) - theirs.get(k, neutral)) / self.sigma for k in places))
+        places = sizes.keys() | theirs.keys()
+        return math.hypot(*((sizes.get(k, neutral) - theirs.get(k, neutral)) / self.sigma for k in places))
 
     def _sizes(self, effects: Sequence[Effect]) -> dict[tuple[tuple[str, float], ...], float]:
         """Size by place (pad, direction)."""
-        found = {}
+        table = {}
         for e in effects:
             if e.name == self.effect:
                 place = tuple(sorted((k, v) for k, v in e.parameters.items() if k != self.parameter))
-                found[place] = e.parameters[self.parameter]
-        return found
+                table[place] = e.parameters[self.parameter]
+        return table
 
 
 #: Deviations are what ordinary workshop means reach, not what the best laboratory would.

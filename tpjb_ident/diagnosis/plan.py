@@ -206,8 +206,8 @@ def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
     seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
     return tuple(
-        DataSet(name, int(mine.sum()), *(_told(seen, mine, chosen, free) for free in (False, True)))
-        for name, mine in masks(seen.observations.elements, planned).items()
+        DataSet(name, int(mask.sum()), *(_told(seen, mask, chosen, free) for free in (False, True)))
+        for name, mask in masks(seen.observations.elements, planned).items()
     )
 
 
@@ -225,15 +225,15 @@ def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArr
     families = np.array([e.family for e in elements])
     first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
     line = np.array([e.place("excitation") for e in elements])
-    one = line == _usual(line[np.isfinite(line)])
+    usual_line = line == _usual(line[np.isfinite(line)])
     direct = np.array([e.observable in DIRECT for e in elements])
-    masks = {"A": direct & one & first}
-    masks |= {name: np.isin(families, sorted(kept)) & first for name, kept in FAMILIES.items()}
+    masks = {"A": direct & usual_line & first}
+    masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in FAMILIES.items()}
     return {**masks, "E": np.ones(len(elements), dtype=bool)}
 
 
 def _usual(lines: FloatArray) -> float:
     """The frequency that is there at the most loads, the middle one among equals."""
-    found, counts = np.unique(lines, return_counts=True)
-    most = found[counts == counts.max()]
+    frequencies, counts = np.unique(lines, return_counts=True)
+    most = frequencies[counts == counts.max()]
     return float(most[len(most) // 2])

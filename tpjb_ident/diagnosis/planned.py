@@ -56,8 +56,8 @@ def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
             where = (*base, ("excitation", omega))
             out += [Element("h", f"{part}{entry}", where) for part in "kc" for entry in ENTRY_NAMES]
         out += [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in test.pads]
-    for one in layout.locus:
-        where3 = (("load", one.load), ("direction", one.direction), ("speed", one.speed))
+    for locus_test in layout.locus:
+        where3 = (("load", locus_test.load), ("direction", locus_test.direction), ("speed", locus_test.speed))
         out += [Element("locus", f"locus_{a}", where3) for a in "xy"]
         out += [Element("load", f"load_{a}", where3) for a in ("ratio", "turn")]
     for dry in layout.dry:

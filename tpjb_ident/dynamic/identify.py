@@ -93,15 +93,18 @@ def identify(
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
         bands = identify_bands(campaign, _band_settings(settings), tell, rig)
     if not sines.of_kind("dynamic"):
-        found = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
+        identification = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
     else:
         with all_runs(sines, settings.phasors, tell, workers, store) as finished:
-            found = assemble(sines, finished, settings, tell, workers)
-    found = found if bands is None else _with_bands(found, bands)
+            identification = assemble(sines, finished, settings, tell, workers)
+    identification = identification if bands is None else _with_bands(identification, bands)
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
     if not zero.any():
-        return found
-    return replace(found, points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in found.points))
+        return identification
+    return replace(
+        identification,
+        points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points),
+    )
 
 
 def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:
@@ -110,12 +113,12 @@ def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification
     joint = np.concatenate([found.calibration_changes, bands.changes], axis=1)
     changes = joint.reshape(len(joint), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    told = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
+    table = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
     return replace(
         found,
         points=tuple(points[i] for i in order),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
-        conditions=tuple(told.values()),
+        conditions=tuple(table.values()),
         bands=bands.results,
     )
 
@@ -172,10 +175,10 @@ def assemble(
         changes.append(change)
         tell("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
-    left, several = finished.left_out, bool(settings.phasors.excitation_lines)
-    told = named_runs(left, len(digests) + len(left)) + lost_points(points, left, several)
-    named = with_probe_doubts(sweeps, named_at_points(points, left, several), settings.clearance)
-    return Identification(campaign.id, settings.method, named, joint, work.draws.conditions() + told)
+    excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
+    conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
+    named = with_probe_doubts(sweeps, named_at_points(points, excluded, several), settings.clearance)
+    return Identification(campaign.id, settings.method, named, joint, work.draws.conditions() + conditions)
 
 
 def _first(settings: IdentifySettings, source: PointSource) -> DynamicStiffness:
@@ -265,7 +268,7 @@ def directions_differ(first: list[DynamicStiffness]) -> bool:
     Few runs per point tell little about it; the cause (set points that are missed a little) is the same
     at all points. Beyond doubt means: the summed chi-square has a probability below 1e-4.
     """
-    known = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
-    dof = sum(est.spare_equations for est in known)
-    total = sum(est.chi_square * est.spare_equations for est in known)
+    estimates = [est for est in first if np.isfinite(est.chi_square) and est.spare_equations > 0]
+    dof = sum(est.spare_equations for est in estimates)
+    total = sum(est.chi_square * est.spare_equations for est in estimates)
     return dof > 0 and float(chdtrc(dof, total)) < 1e-4

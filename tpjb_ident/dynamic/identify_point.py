@@ -34,8 +34,8 @@ MIN_SINE = 0.1
 
 def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
     """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
-    found = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
-    return replace(found, weights=np.empty((0, 2)))
+    estimate = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
+    return replace(estimate, weights=np.empty((0, 2)))
 
 
 def own_method(method: str) -> str:
@@ -139,18 +139,18 @@ def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> d
 def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
     """Say which methods differ from the default beyond both intervals."""
     best = by_method[default]
-    found = []
-    for name, other in by_method.items():
-        if name == default or not (np.isfinite(other.h).all() and np.isfinite(best.h).all()):
+    conditions = []
+    for name, estimate in by_method.items():
+        if name == default or not (np.isfinite(estimate.h).all() and np.isfinite(best.h).all()):
             continue
-        gap = np.abs(other.vector - best.vector)
-        room = np.hypot(other.half_width(systematic=False), best.half_width(systematic=False))
+        gap = np.abs(estimate.vector - best.vector)
+        room = np.hypot(estimate.half_width(systematic=False), best.half_width(systematic=False))
         if (gap > room).any():
             worst = int(np.argmax(gap / room))
-            found.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
-    if not found:
+            conditions.append(f"{name} ({gap[worst] / room[worst]:.1f} times the interval)")
+    if not conditions:
         return ()
-    return (Condition("methods-disagree", f"{', '.join(found)} away from {default}"),)
+    return (Condition("methods-disagree", f"{', '.join(conditions)} away from {default}"),)
 
 
 def nominal_drive(data: PointData) -> ComplexArray | None:
@@ -166,11 +166,11 @@ def nominal_drive(data: PointData) -> ComplexArray | None:
         return None
     result = np.full(data.F.shape, np.nan + 0j)
     for i, angle in enumerate(known):
-        mine = data.run_index == i
-        along = data.F[mine] @ np.array([np.cos(angle), np.sin(angle)])
+        selected = data.run_index == i
+        along = data.F[selected] @ np.array([np.cos(angle), np.sin(angle)])
         along = along[np.isfinite(along)]
         if len(along) < MIN_WINDOWS:
             return None
         drive = np.median(along.real) + 1j * np.median(along.imag)
-        result[mine] = drive * np.array([np.cos(angle), np.sin(angle)])
+        result[selected] = drive * np.array([np.cos(angle), np.sin(angle)])
     return result

@@ -126,6 +126,6 @@ def _stands_still(seen: ChannelStatistics) -> bool:
 def _problem(run: Run, name: str, seen: ChannelStatistics) -> Problem:
     start, share = seen.flat_start / run.sample_rate, seen.longest_flat / max(seen.samples, 1)
     how_long = f"from {start:.2f} s on for {100 * share:.0f} % of the run"
-    what = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
+    text = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
     cure = "Check sensor, range and logger, and repeat the run"
-    return Problem("error", run.file, f"channel {name}", what, cure, run=run.id)
+    return Problem("error", run.file, f"channel {name}", text, cure, run=run.id)

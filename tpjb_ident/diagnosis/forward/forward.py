@@ -78,7 +78,7 @@ class ModelCache:
 
     def copy(self) -> ModelCache:
         """Return a memory of its own that begins with the same knowledge."""
-        return ModelCache({setup: dict(known) for setup, known in self.solved.items()}, dict(self.start))
+        return ModelCache({setup: dict(points) for setup, points in self.solved.items()}, dict(self.start))
 
     def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
         """Look a point up, or solve it."""
@@ -86,26 +86,26 @@ class ModelCache:
             # a set-up is some hundred numbers to be compared: once for all points of a prediction
             plain = setup.change(**_PLAIN)
             self._last = setup, plain, self.solved.setdefault(plain, {})
-        _, plain, known = self._last
+        _, plain, solved_points = self._last
         key = point, lines, sensors
-        found = known.get(key)
-        if found is None:
-            found = known[key] = self._solve(plain, point, lines, sensors)
-        return found.read(setup, lines)
+        solution = solved_points.get(key)
+        if solution is None:
+            solution = solved_points[key] = self._solve(plain, point, lines, sensors)
+        return solution.read(setup, lines)
 
     def _solve(
         self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]
     ) -> SolvedPoint:
         load, direction, speed = point
         force = load * np.array([math.cos(direction), math.sin(direction)])
-        running, found = solve_as_it_runs(setup, force, speed, self.start.get(point))
-        if not found.converged:
-            raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(found.status)})")
-        self.start[point] = found
-        h = bearing_impedance(running, found, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
-        warm = np.array([film.temperature_at(place) for film, place in zip(found.films, sensors, strict=True)])
-        loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in found.films])
-        return SolvedPoint(h, found.position, force, warm, loads)
+        running, equilibrium = solve_as_it_runs(setup, force, speed, self.start.get(point))
+        if not equilibrium.converged:
+            raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(equilibrium.status)})")
+        self.start[point] = equilibrium
+        h = bearing_impedance(running, equilibrium, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
+        warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors, strict=True)])
+        loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in equilibrium.films])
+        return SolvedPoint(h, equilibrium.position, force, warm, loads)
 
 
 __all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]
@@ -149,8 +149,8 @@ class Forward:
             table.dynamic(test, reading)
             for pad, load in enumerate(reading.pad_load, start=1):
                 self._shares[(*point, float(pad))] = float(load) / test.load
-        for one in self.layout.locus:
-            point = (one.load, one.direction, one.speed)
+        for locus_test in self.layout.locus:
+            point = (locus_test.load, locus_test.direction, locus_test.speed)
             table.locus(point, self._solve(setup, point, ()))
         for dry in self.layout.dry:
             table.dry(dry)
@@ -166,15 +166,15 @@ class Forward:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
         names = ("load", "direction", "speed", "pad")
         places = [tuple(e.place(name) for name in names) for e in self.elements]
-        mine = [e.family == "temperature" for e in self.elements]
+        members = [e.family == "temperature" for e in self.elements]
         return np.array(
-            [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, mine, strict=True)]
+            [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, members, strict=True)]
         )
 
     @property
     def _sensors(self) -> tuple[float, ...]:
-        given = self.layout.temperature_position
-        return (*given, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(given))))
+        positions = self.layout.temperature_position
+        return (*positions, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(positions))))
 
     def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
         return self.cache.ask(setup, point, tuple(excitation), self._sensors)

@@ -51,15 +51,19 @@ class Shift:
 
     def __call__(self, setup: Setup) -> Setup:
         """Apply them one after the other."""
-        for one, size in zip(self.nuisances, self.size, strict=True):
-            if one.change is not None and size:
-                setup = one.change(setup, size * one.sigma)
+        for nuisance, size in zip(self.nuisances, self.size, strict=True):
+            if nuisance.change is not None and size:
+                setup = nuisance.change(setup, size * nuisance.sigma)
         return setup
 
     @property
     def readings(self) -> FloatArray | float:
         """Change of the observation vector by those that act on readings."""
-        parts = [one.column * s for one, s in zip(self.nuisances, self.size, strict=True) if one.column is not None]
+        parts = [
+            nuisance.column * s
+            for nuisance, s in zip(self.nuisances, self.size, strict=True)
+            if nuisance.column is not None
+        ]
         return np.sum(parts, axis=0) if parts else 0.0
 
 
@@ -68,7 +72,7 @@ def nuisances(
 ) -> tuple[Nuisance, ...]:
     """List what may be off for an observation vector."""
     pads = range(1, len(setup.bearing.pads) + 1) if by_pad else ()
-    found = [
+    listed = [
         _whole("viscosity", "1", _viscosity, known, "oil_viscosity"),
         _whole("viscosity_exponent", "1", _exponent, known, "viscosity_law"),
         _whole("supply_temperature", "K", _supply, known, "supply_temperature"),
@@ -79,25 +83,25 @@ def nuisances(
     for pad in pads:
         offset = functools.partial(_offset, pad=pad)
         scatter = known["clearance_scatter"], "m", f"pad {pad}", offset
-        found.append(
+        listed.append(
             Nuisance("clearance_scatter", *scatter, aliases=frozenset({f"pad_offset pad {pad}", "uneven_pads"}))
         )
         softer = functools.partial(_softer, pad=pad)
         alias = frozenset({f"soft_pivot pad {pad}"})
-        found.append(
+        listed.append(
             Nuisance(
                 "pivot_stiffness_scatter", known["pivot_stiffness_scatter"], "1", f"pad {pad}", softer, aliases=alias
             )
         )
     for i in range(2):
         gain = functools.partial(_probe, axes=known.probe_axes, index=i)
-        found.append(Nuisance("probe_gain", known["probe_gain"], "1", f"probe {i + 1}", gain,
+        listed.append(Nuisance("probe_gain", known["probe_gain"], "1", f"probe {i + 1}", gain,
                               aliases=frozenset({"probe_gain"})))  # fmt: skip
         cell = functools.partial(_cell, index=i)
-        found.append(Nuisance("cell_gain", known.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
+        listed.append(Nuisance("cell_gain", known.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
                               aliases=frozenset({"loadcell_gain"})))  # fmt: skip
-    found += _readings(elements, known)
-    return tuple(one for one in found if one.sigma > 0.0)
+    listed += _readings(elements, known)
+    return tuple(nuisance for nuisance in listed if nuisance.sigma > 0.0)
 
 
 def _whole(
@@ -131,8 +135,8 @@ def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
-    found = nuisances(forward.elements, setup, known, by_pad=False)
-    return columns_of(forward, effects, found, np.zeros(len(found)), base)
+    bearing_nuisances = nuisances(forward.elements, setup, known, by_pad=False)
+    return columns_of(forward, effects, bearing_nuisances, np.zeros(len(bearing_nuisances)), base)
 
 
 def column_of(

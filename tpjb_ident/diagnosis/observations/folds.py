@@ -59,17 +59,17 @@ def held_out(observations: Observations) -> BoolArray:
 
 def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[str]]:
     """Block of every dynamic element, and the blocks to which a model must extrapolate."""
-    mine = [(i, e) for i, e in enumerate(elements) if e.family in {"h", "temperature"}]
-    speeds = Counter(e.place("speed") for _, e in mine)
+    members = [(i, e) for i, e in enumerate(elements) if e.family in {"h", "temperature"}]
+    speeds = Counter(e.place("speed") for _, e in members)
     usual = speeds.most_common(1)[0][0] if speeds else 0.0
     lines: dict[tuple[float, float], set[float]] = {}
-    for _, e in mine:
+    for _, e in members:
         if e.family == "h" and e.place("speed") == usual:
             lines.setdefault((e.place("load"), e.place("direction")), set()).add(e.place("excitation"))
     names: dict[int, str] = {}
     beyond: set[str] = set()
     top = max((load for load, _ in lines), default=0.0)
-    for i, e in mine:
+    for i, e in members:
         key = (e.place("load"), e.place("direction"))
         if e.place("speed") != usual:
             names[i] = f"speed {e.place('speed'):.1f} rad/s"

@@ -19,16 +19,21 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
     tolerance = tolerance or Tolerance()
     rows: list[tuple[Element, float, float, float]] = []
     tests: dict[tuple[float, float, float], list[float]] = {}
-    for one in read_coefficients(path, reading_error):
-        tests.setdefault((one.load, one.direction, one.speed), []).append(one.omega)
-        where = (("load", one.load), ("direction", one.direction), ("speed", one.speed), ("excitation", one.omega))
+    for entry in read_coefficients(path, reading_error):
+        tests.setdefault((entry.load, entry.direction, entry.speed), []).append(entry.omega)
+        where = (
+            ("load", entry.load),
+            ("direction", entry.direction),
+            ("speed", entry.speed),
+            ("excitation", entry.omega),
+        )
         for part in "kc":
-            factor = one.omega if part == "c" else 1.0
-            mine = {n: v for n, v in one.coefficients.items() if n[0] == part}
-            direct = [abs(v) for name, (v, _) in mine.items() if name in {f"{part}xx", f"{part}yy"}]
-            scale = factor * float(np.mean(direct or [abs(v) for v, _ in mine.values()] or [1.0]))
+            factor = entry.omega if part == "c" else 1.0
+            part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
+            direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
+            scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))
             least = AXIS * scale * (reading_error or 0.0)
-            for name, (value, error) in mine.items():
+            for name, (value, error) in part_coefficients.items():
                 sigma = max(factor * error, least)
                 rows.append((Element("h", name, where), factor * value, sigma, tolerance.stiffness * scale))
     dynamic = tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())

@@ -60,10 +60,10 @@ def gap_by_observable(
     out: dict[str, dict[str, float]] = {}
     names = np.array([e.observable for e in observations.elements])
     for name in dict.fromkeys(names):
-        mine = names == name
-        part = mine & chosen
+        selected = names == name
+        part = selected & chosen
         key = "heldout" if part.any() else "fitted"
-        part = part if part.any() else mine
+        part = part if part.any() else selected
         out[str(name)] = {
             f"{key}_before": gap(observations, before, part),
             f"{key}_after": gap(observations, after, part),
@@ -84,8 +84,8 @@ def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
 def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
     """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,)."""
     values = np.array([e.place(name) for e in elements])
-    known = values[np.isfinite(values)]
-    if len(known) == 0 or np.ptp(known) <= 1e-12 * max(abs(known).max(), 1e-300):
+    finite_values = values[np.isfinite(values)]
+    if len(finite_values) == 0 or np.ptp(finite_values) <= 1e-12 * max(abs(finite_values).max(), 1e-300):
         return np.zeros(len(values))
-    middle, half = 0.5 * (known.max() + known.min()), 0.5 * np.ptp(known)
+    middle, half = 0.5 * (finite_values.max() + finite_values.min()), 0.5 * np.ptp(finite_values)
     return np.where(np.isfinite(values), (values - middle) / half, 0.0)

@@ -260,8 +260,8 @@ def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryT
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(DRY_SHAPE**2 * np.diag(covariance))
     builder.add(elements, value, covariance, tolerance.dry)
-    kept = load[builder.kept]
-    return DryTest(curve.pad, tuple(float(w) for w in kept))
+    used_loads = load[builder.kept]
+    return DryTest(curve.pad, tuple(float(w) for w in used_loads))
 
 
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
@@ -294,10 +294,10 @@ def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArr
 
 def _stiffness(identification: Identification, load: float) -> float:
     """Mean direct stiffness at the nearest load and the lowest excitation [N/m]."""
-    known = [p for p in identification.points if np.isfinite(p.stiffness.h).all()]
-    if not known:
+    points = [p for p in identification.points if np.isfinite(p.stiffness.h).all()]
+    if not points:
         return math.inf
-    nearest = min(known, key=lambda p: (abs(p.point.static_load - load), p.point.excitation))
+    nearest = min(points, key=lambda p: (abs(p.point.static_load - load), p.point.excitation))
     return nearest.stiffness.direct[0]
 
 

@@ -46,12 +46,12 @@ class AmplitudePath:
     def neutral_slope(self) -> FloatArray:
         """Derivative where nothing happens yet, of a parabola through the neighbours, (n,)."""
         here = int(np.searchsorted(self.at, 0.0))
-        known = [i for i in (here - 1, here, here + 1) if 0 <= i < len(self.at)]
-        if len(known) < 3:
-            known = list(range(3)) if here == 0 else list(range(len(self.at) - 3, len(self.at)))
-        scale = float(np.abs(self.at[known]).max())
-        powers = np.vander(self.at[known] / scale, 3, increasing=True)
-        return np.asarray(np.linalg.solve(powers, self.columns[:, known].T)[1] / scale)
+        nodes = [i for i in (here - 1, here, here + 1) if 0 <= i < len(self.at)]
+        if len(nodes) < 3:
+            nodes = list(range(3)) if here == 0 else list(range(len(self.at) - 3, len(self.at)))
+        scale = float(np.abs(self.at[nodes]).max())
+        powers = np.vander(self.at[nodes] / scale, 3, increasing=True)
+        return np.asarray(np.linalg.solve(powers, self.columns[:, nodes].T)[1] / scale)
 
     def _inside(self, amplitudes: FloatArray) -> FloatArray:
         return np.clip(amplitudes, self.at[0], self.at[-1])

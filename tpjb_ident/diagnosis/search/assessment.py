@@ -46,7 +46,7 @@ class Basis:
     @property
     def stated(self) -> FloatArray:
         """Scales of a model that is as wrong as stated and no more, (c,)."""
-        return np.array([1e-5 if one.name in {"scatter", "beyond"} else 1.0 for one in self.components])
+        return np.array([1e-5 if component.name in {"scatter", "beyond"} else 1.0 for component in self.components])
 
     @functools.cached_property
     def coarse(self) -> Basis:
@@ -56,12 +56,12 @@ class Basis:
     def covariance(self, scales: FloatArray) -> FloatArray:
         """Noise and model error at scales t_k, (n, n); `scales` (c,)."""
         own = np.array(scales, float)
-        for one, scale in zip(self.components, scales, strict=True):
-            own[list(one.made_of)] += scale
+        for component, scale in zip(self.components, scales, strict=True):
+            own[list(component.made_of)] += scale
         out = self.noise.copy()
-        for one, scale, at in zip(self.components, own, self._at, strict=True):
-            if not one.made_of:
-                out[at] += scale * one.matrix
+        for component, scale, at in zip(self.components, own, self._at, strict=True):
+            if not component.made_of:
+                out[at] += scale * component.matrix
         return out
 
     @functools.cached_property
@@ -95,8 +95,8 @@ class Linear:
 
     def without(self, gone: Sequence[int]) -> Linear:
         """Return the same without some columns."""
-        kept = np.setdiff1d(np.arange(self.columns.shape[1]), np.asarray(gone, int))
-        return Linear(self.residual, self.columns[:, kept], self.width[kept])
+        remaining = np.setdiff1d(np.arange(self.columns.shape[1]), np.asarray(gone, int))
+        return Linear(self.residual, self.columns[:, remaining], self.width[remaining])
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed:
     value, factor = _evidence(basis, linear, spread, logs)
     inverse = _inverse(factor)
     damping, stride = 1e-3, 1.0
-    lowest, highest = np.array([(one.lowest, one.highest) for one in basis.components]).T
+    lowest, highest = np.array([(component.lowest, component.highest) for component in basis.components]).T
     for _ in range(0 if fixed else STEPS):
         gradient, fisher = _slopes(basis, linear, inverse, logs)
         moved = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)) + 1e-9 * np.eye(len(logs)), gradient)
@@ -204,21 +204,23 @@ def _slopes(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     scales = np.exp(logs)
     weighted = inverse @ linear.residual
-    known = basis.components
-    own = [i for i, one in enumerate(known) if not one.made_of]
+    components = basis.components
+    own = [i for i, component in enumerate(components) if not component.made_of]
     # Q D_k over the rows that each acts on
-    products = {i: inverse[:, known[i].rows] @ known[i].matrix if i else (basis.sparse @ inverse).T for i in own}
-    made = np.zeros((len(known), len(own)))  # what is made of others has their sums
-    for i, one in enumerate(known):
-        made[i, [own.index(k) for k in one.made_of or (i,)]] = 1.0
-    trace = made @ [np.trace(products[i][known[i].rows]) for i in own]
-    square = made @ [weighted[known[i].rows] @ known[i].matrix @ weighted[known[i].rows] for i in own]
+    products = {
+        i: inverse[:, components[i].rows] @ components[i].matrix if i else (basis.sparse @ inverse).T for i in own
+    }
+    made = np.zeros((len(components), len(own)))  # what is made of others has their sums
+    for i, component in enumerate(components):
+        made[i, [own.index(k) for k in component.made_of or (i,)]] = 1.0
+    trace = made @ [np.trace(products[i][components[i].rows]) for i in own]
+    square = made @ [weighted[components[i].rows] @ components[i].matrix @ weighted[components[i].rows] for i in own]
     share = scales / (1.0 + scales)
     gradient = 0.5 * scales * (square - trace) + 0.5 - share
     both = np.zeros((len(own), len(own)))
     for a, i in enumerate(own):
         for b, j in enumerate(own[a:], a):
             # tr(Q D_i Q D_j) over the rows that each acts on
-            both[a, b] = both[b, a] = float(np.vdot(products[i][known[j].rows], products[j][known[i].rows].T))
+            both[a, b] = both[b, a] = float(np.vdot(products[i][components[j].rows], products[j][components[i].rows].T))
     fisher = 0.5 * np.outer(scales, scales) * (made @ both @ made.T)
     return gradient, fisher + np.diag(share * (1.0 - share))

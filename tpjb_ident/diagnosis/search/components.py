@@ -52,8 +52,8 @@ def components(observations: Observations) -> tuple[Component, ...]:
     kinds = np.array([KINDS[e.family] for e in observations.elements])
     for kind in dict.fromkeys(kinds):
         rows = np.flatnonzero(kinds == kind)
-        mine = [observations.elements[i] for i in rows]
-        matrix = _correlation(mine) * np.outer(share[rows], share[rows])
+        members = [observations.elements[i] for i in rows]
+        matrix = _correlation(members) * np.outer(share[rows], share[rows])
         beyond[np.ix_(rows, rows)] = matrix
         out.append(Component(str(kind), rows, matrix))
     return (*out, Component("beyond", everything, beyond, NOTHING, HIGHEST, tuple(range(1, len(out)))))
@@ -88,7 +88,7 @@ def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
     scale = observations.total_sigma
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)
-    for one in components(observations)[1:-1]:
-        total[np.ix_(one.rows, one.rows)] += USUAL**2 * one.matrix
+    for component in components(observations)[1:-1]:
+        total[np.ix_(component.rows, component.rows)] += USUAL**2 * component.matrix
     total += 1e-6 * np.diag(share**2)
     return np.asarray(scale[:, None] * np.linalg.cholesky(total))

@@ -24,20 +24,20 @@ def converge(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fi
     """Give a fit derivatives of its own, those of the nuisances too, and move all of them together."""
     if found.converged:
         return found
-    here = SearchState(found.start, found.prediction)
+    state = SearchState(found.start, found.prediction)
     scales = found.assessment.scales
     for number in range(rounds):
         if number:
-            here = replace(here, start=_renewed(run, problem, here.start, here.prediction))
-            found = fitted(problem, here.start, here.prediction, scales)
+            state = replace(state, start=_renewed(run, problem, state.start, state.prediction))
+            found = fitted(problem, state.start, state.prediction, scales)
             scales = found.assessment.scales
         moved = False
         for _ in range(STEPS_BETWEEN):
-            there, stepped = _stepped(run, problem, here, found)
+            next_state, stepped = _stepped(run, problem, state, found)
             if not stepped:
                 break
-            here, moved = _learnt(problem, here, there), True
-            found = fitted(problem, here.start, here.prediction, scales)
+            state, moved = _learnt(problem, state, next_state), True
+            found = fitted(problem, state.start, state.prediction, scales)
             scales = found.assessment.scales
         if number and not moved:
             return replace(found, converged=True)
@@ -51,7 +51,7 @@ def _learnt(problem: Problem, here: SearchState, there: SearchState) -> SearchSt
     columns = np.column_stack([here.start.jacobian, here.start.columns]) * width
     change = there.prediction - here.prediction - columns @ step
     # what acts on readings is linear
-    step[count:][[one.column is not None for one in problem.nuisances]] = 0.0
+    step[count:][[nuisance.column is not None for nuisance in problem.nuisances]] = 0.0
     length = float(step @ step)
     if length < 1e-20:
         return there
@@ -72,9 +72,9 @@ def _stepped(run: Map, problem: Problem, here: SearchState, found: Fit) -> tuple
         start = _moved(here.start, now + share * (free - now))
         (y,) = tuple(run(attempt, [(start,)]))
         if y is not None:
-            there = SearchState(start, y)
-            if there.cost(problem, weight) < cost:
-                return there, True
+            next_state = SearchState(start, y)
+            if next_state.cost(problem, weight) < cost:
+                return next_state, True
     return here, False
 
 
@@ -87,7 +87,7 @@ def _moved(start: InitialFit, free: FloatArray) -> InitialFit:
 def _renewed(run: Map, problem: Problem, start: InitialFit, y: FloatArray) -> InitialFit:
     """Take all derivatives anew; what acts on readings has its own."""
     count = start.jacobian.shape[1]
-    asked = [*range(count), *(count + i for i, one in enumerate(problem.nuisances) if one.column is None)]
+    asked = [*range(count), *(count + i for i, nuisance in enumerate(problem.nuisances) if nuisance.column is None)]
     every = np.column_stack([start.jacobian, start.columns])
     for index, column in zip(asked, run(_column, [(start, y, i) for i in asked]), strict=True):
         every[:, index] = column

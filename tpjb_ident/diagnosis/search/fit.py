@@ -129,5 +129,7 @@ def linear(problem: Problem, start: InitialFit, prediction: FloatArray, slack: f
 
 def fitted(problem: Problem, start: InitialFit, prediction: FloatArray, scales: FloatArray | None = None) -> Fit:
     """A fit where a model stands, assessed; `prediction` (n,), `scales` (c,)."""
-    found = assess(problem.basis, linear(problem, start, prediction), scales)
-    return Fit(start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, found)
+    assessment = assess(problem.basis, linear(problem, start, prediction), scales)
+    return Fit(
+        start.candidates, start.amplitudes, start.jacobian, start.nuisance, start.columns, prediction, assessment
+    )

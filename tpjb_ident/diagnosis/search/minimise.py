@@ -51,15 +51,15 @@ def fit(forward: ForwardModel, problem: Problem, start: InitialFit) -> Fit | Non
     if y is None:
         return None
     coarse, basis = problem.basis.coarse, problem.basis
-    here = _minimised(forward, problem, SearchState(start, y), Objective(coarse, basis.stated, TIGHT))
-    here = _minimised(forward, problem, here, Objective(basis, basis.stated, TIGHT))
-    here = _minimised(forward, problem, here, Objective(basis, basis.stated))
-    found = fitted(problem, here.start, here.prediction)
-    there = _minimised(forward, problem, here, Objective(basis, found.assessment.scales))
-    if there is here:
-        return found
-    other = fitted(problem, there.start, there.prediction, found.assessment.scales)
-    return other if other.evidence > found.evidence else found
+    state = _minimised(forward, problem, SearchState(start, y), Objective(coarse, basis.stated, TIGHT))
+    state = _minimised(forward, problem, state, Objective(basis, basis.stated, TIGHT))
+    state = _minimised(forward, problem, state, Objective(basis, basis.stated))
+    fitted_first = fitted(problem, state.start, state.prediction)
+    next_state = _minimised(forward, problem, state, Objective(basis, fitted_first.assessment.scales))
+    if next_state is state:
+        return fitted_first
+    refitted = fitted(problem, next_state.start, next_state.prediction, fitted_first.assessment.scales)
+    return refitted if refitted.evidence > fitted_first.evidence else fitted_first
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,13 @@ class Objective:
 def _minimised(forward: ForwardModel, problem: Problem, here: SearchState, objective: Objective) -> SearchState:
     """Steps at fixed scales of the model's error until no amplitude moves."""
     for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
-        found = objective.assess(problem, here.start, here.prediction)
+        assessment = objective.assess(problem, here.start, here.prediction)
         now = np.concatenate(here.start.amplitudes)
-        step = np.concatenate(here.start.split(_targets(here.start, found))) - now
-        errors = np.sqrt(np.maximum(np.diag(found.covariance)[: len(now)], 0.0))
+        step = np.concatenate(here.start.split(_targets(here.start, assessment))) - now
+        errors = np.sqrt(np.maximum(np.diag(assessment.covariance)[: len(now)], 0.0))
         if np.all(np.abs(step) < CONVERGED * errors):
             break
-        moved = _improved(forward, problem, here, step, (objective, found))
+        moved = _improved(forward, problem, here, step, (objective, assessment))
         if moved is None:
             break
         here = moved
@@ -96,19 +96,19 @@ def _improved(
     forward: ForwardModel, problem: Problem, here: SearchState, step: FloatArray, evidence: tuple[Objective, Assessment]
 ) -> SearchState | None:
     """The place after a step, or after a part of it, that is better; None if none is."""
-    objective, found = evidence
+    objective, assessment = evidence
     now = np.concatenate(here.start.amplitudes)
     for share in (1.0, 0.4, 0.1):
         trial = replace(here.start, amplitudes=here.start.split(now + share * step))
         y = attempt(forward, problem, trial)
         if y is None:
             continue
-        taken = np.concatenate(trial.amplitudes) - now
-        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, taken))
-        told = objective.assess(problem, trial, y)
-        if told.evidence > found.evidence:
+        moved = np.concatenate(trial.amplitudes) - now
+        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, moved))
+        trial_assessment = objective.assess(problem, trial, y)
+        if trial_assessment.evidence > assessment.evidence:
             return SearchState(trial, y)
-        if found.evidence - told.evidence < HARDLY:
+        if assessment.evidence - trial_assessment.evidence < HARDLY:
             break
     return None
 
@@ -149,10 +149,10 @@ def slope(
         moved = flat.copy()
         moved[index] += signed
         trial = replace(start, amplitudes=start.split(moved))
-        taken = np.concatenate(trial.amplitudes)[index] - flat[index]
-        if taken == 0.0:
+        change = np.concatenate(trial.amplitudes)[index] - flat[index]
+        if change == 0.0:
             continue
-        other = attempt(forward, problem, trial)
-        if other is not None:
-            return np.asarray((other - y) / taken)
+        shifted = attempt(forward, problem, trial)
+        if shifted is not None:
+            return np.asarray((shifted - y) / change)
     return np.zeros_like(y)

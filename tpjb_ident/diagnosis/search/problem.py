@@ -59,7 +59,7 @@ class Problem:
     def aliases(self, candidate: Candidate) -> list[int]:
         """Nuisances that do what a candidate does."""
         names = {candidate.name, candidate.label}
-        return [i for i, one in enumerate(self.nuisances) if names & one.aliases]
+        return [i for i, nuisance in enumerate(self.nuisances) if names & nuisance.aliases]
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:

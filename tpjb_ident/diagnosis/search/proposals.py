@@ -54,9 +54,9 @@ class Proposals:
         """Fits of a model with one candidate more, best first; `table` (n, k) each."""
         free = self._free(model, table)
         ranked = self._promising(scores(self.problem, model, free, paths=self.paths))
-        known = {s.candidates for s in ranked}
+        scored = {s.candidates for s in ranked}
         starts = [with_model(model, s, free, self.paths) for s in ranked]
-        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in known]
+        starts += [s for s in instead(self.problem, model, free, STAND_IN) if s.candidates[-1:] not in scored]
         return self.fits(starts)
 
     def afresh(self, drawn: Fit, table: Columns) -> list[Fit]:
@@ -101,8 +101,8 @@ class Proposals:
 
     def fits(self, starts: Sequence[InitialFit]) -> list[Fit]:
         """Fits from their starts, best first."""
-        found = self.run(fit, [(start,) for start in starts])
-        return sorted((f for f in found if f is not None), key=lambda f: -f.evidence)
+        results = self.run(fit, [(start,) for start in starts])
+        return sorted((f for f in results if f is not None), key=lambda f: -f.evidence)
 
     def refined(self, model: Fit) -> Fit:
         """The same model with directions off their grid and derivatives of its own."""
@@ -135,15 +135,15 @@ class Proposals:
     def far(self, near: Sequence[Fit], afresh: Sequence[Fit]) -> list[Fit]:
         """Fits afresh that close most of the gap, settled, where they come to be likelier than what leads."""
         least = max((f.evidence for f in near), default=-np.inf)
-        left = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
-        order = np.argsort([float(z @ z) for z in left])[:FAR]
-        found = self.run.together([functools.partial(self.refined, afresh[i]) for i in order])
-        return [converge(self.run, self.problem, f) for f in found if f.evidence > least]
+        remaining = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
+        order = np.argsort([float(z @ z) for z in remaining])[:FAR]
+        fits = self.run.together([functools.partial(self.refined, afresh[i]) for i in order])
+        return [converge(self.run, self.problem, f) for f in fits if f.evidence > least]
 
 
 def best_of(fits: Sequence[Fit]) -> list[Fit]:
     """The better fit of every set of candidates, best first."""
-    kept: dict[str, Fit] = {}
+    by_label: dict[str, Fit] = {}
     for f in sorted(fits, key=lambda f: -f.evidence):
-        kept.setdefault(f.label, f)
-    return list(kept.values())
+        by_label.setdefault(f.label, f)
+    return list(by_label.values())

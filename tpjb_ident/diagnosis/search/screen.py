@@ -57,9 +57,9 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     """
     # the longest ones begin: nobody waits for them at the end
     order = sorted(pool, key=lambda c: c.name not in SLOW)
-    found = dict(zip(order, run(_surveyed, [(model.start, model.prediction, c) for c in order]), strict=True))
-    secants, slopes = ({c: found[c][i] for c in pool} for i in range(2))
-    return Survey(secants, slopes, {c: path for c in pool if (path := found[c][2]) is not None})
+    surveyed = dict(zip(order, run(_surveyed, [(model.start, model.prediction, c) for c in order]), strict=True))
+    secants, slopes = ({c: surveyed[c][i] for c in pool} for i in range(2))
+    return Survey(secants, slopes, {c: path for c in pool if (path := surveyed[c][2]) is not None})
 
 
 def _surveyed(
@@ -73,8 +73,8 @@ def _surveyed(
             secant = path.columns[:, nearest] / path.at[nearest]
             return secant[:, None], path.neutral_slope[:, None], path
     parts = [_column(forward, problem, model, y, candidate, i) for i in range(len(candidate.steps))]
-    found = np.column_stack(parts)
-    return found, found, None
+    derivatives = np.column_stack(parts)
+    return derivatives, derivatives, None
 
 
 def _path(
@@ -88,12 +88,12 @@ def _path(
     for share in (s for s in NODES if low <= around + s * step <= high):
         start = replace(model, candidates=(*model.candidates, candidate),
                         amplitudes=(*model.amplitudes, np.array([around + share * step])))  # fmt: skip
-        other = attempt(forward, problem, start)
-        if other is None and len(changes) < 2:
+        prediction = attempt(forward, problem, start)
+        if prediction is None and len(changes) < 2:
             return None
-        if other is not None:
+        if prediction is not None:
             asked.append(share * step)
-            changes.append(other - y)
+            changes.append(prediction - y)
     return path_through(asked, changes) if len(changes) > 1 else None
 
 
@@ -122,7 +122,7 @@ def scores(
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
     if pairs:
         chosen = [(a, b) for i, a in enumerate(pool) for b in pool[i + 1 :]]
-    found = [max((level.score(one) for level in levels), key=lambda s: s.gain) for one in chosen]
+    found = [max((level.score(candidates) for level in levels), key=lambda s: s.gain) for candidates in chosen]
     return sorted(found, key=lambda s: -s.gain)
 
 
@@ -149,9 +149,9 @@ def _closing(problem: Problem, gap: FloatArray, c: Candidate, column: FloatArray
     else:
         tried = _grid(low[0], high[0])[:, None]
         change = path.weights(tried[:, 0] * c.width[0]) @ problem.scaled(path.columns).T
-    left = np.sum((gap - change) ** 2, axis=1) + np.sum(tried**2, axis=1)
-    best = int(np.argmin(left))
-    return Score((c,), 0.5 * float(gap @ gap - left[best]), (c.origin + tried[best] * c.width,))
+    remaining = np.sum((gap - change) ** 2, axis=1) + np.sum(tried**2, axis=1)
+    best = int(np.argmin(remaining))
+    return Score((c,), 0.5 * float(gap @ gap - remaining[best]), (c.origin + tried[best] * c.width,))
 
 
 def _grid(low: float, high: float) -> FloatArray:
@@ -164,8 +164,8 @@ class _Level:
 
     def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, paths: AmplitudePaths) -> None:
         known = model.assessment.linear
-        found = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
-        self.offset = found.evidence - model.evidence
+        assessment = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
+        self.offset = assessment.evidence - model.evidence
         residual = model.assessment.linear.residual
         self.at: dict[Candidate, slice] = {}
         parts, width, count = [], [], 0
@@ -175,13 +175,13 @@ class _Level:
             self.at[c] = slice(count, count + column.shape[1])
             count += column.shape[1]
         unit = np.column_stack(parts)
-        weighted = found.inverse @ unit
+        weighted = assessment.inverse @ unit
         self.gram, self.toward = unit.T @ weighted, weighted.T @ residual
         self.width = np.concatenate(width)
         self.paths: dict[Candidate, tuple[AmplitudePath, FloatArray, FloatArray]] = {}
         for c in table.keys() & paths.keys():
             whole = problem.scaled(paths[c].columns)
-            weighed = found.inverse @ whole
+            weighed = assessment.inverse @ whole
             self.paths[c] = paths[c], weighed.T @ residual, whole.T @ weighed
 
     def _along(self, c: Candidate) -> Score:

@@ -55,8 +55,8 @@ class Selection:
 
     def _likeliest(self, model: Fit) -> Fit:
         """The likeliest fit of a model's candidates met so far; the model itself if none is much better."""
-        known = self._places.get(model.label, model) if model.candidates else self.baseline
-        return known if known.evidence > model.evidence + CLEARLY else model
+        best_fit = self._places.get(model.label, model) if model.candidates else self.baseline
+        return best_fit if best_fit.evidence > model.evidence + CLEARLY else model
 
     def forward(self, say: Progress, afar: bool = False) -> tuple[Fit, tuple[Fit, ...]]:
         """Add what unseen points want, one at a time or two at once; drop what they do not want any more."""
@@ -77,7 +77,7 @@ class Selection:
             near = self.run.together([functools.partial(self.proposed.refined, f) for f in lead])
             if afar:
                 near += self.proposed.far(near, afresh or self.proposed.afresh(self.proposed.as_drawn(model), table))
-            tried = [*near, *(f for f in tried if not any(f is one for one in lead))]
+            tried = [*near, *(f for f in tried if not any(f is best_fit for best_fit in lead))]
             singles = singles or tuple(best_of(tried))
             chosen = self._chosen(model, tried)
             if chosen is None:
@@ -106,7 +106,7 @@ class Selection:
         if lead and lead[0].names & set(TERMS):
             # free numbers of a term find any direction, an effect on its grid none between
             turned = [f for f in tried if not f.names & set(TERMS) and any(c.refined() != c for c in f.candidates)]
-            lead += [f for f in turned[:TURNED] if not any(f is one for one in lead)]
+            lead += [f for f in turned[:TURNED] if not any(f is best_fit for best_fit in lead)]
         return lead
 
     def _chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
@@ -235,15 +235,15 @@ class Selection:
             return (tuple(f for f in singles if f.label != model.label),)
         out: list[tuple[Fit, ...]] = []
         for index, gone in enumerate(model.candidates):
-            rest = self.without(model, index)
-            if rest is None:
+            reduced = self.without(model, index)
+            if reduced is None:
                 out.append(())
                 continue
-            used = {gone.label, *(o.label for o in rest.candidates)}
+            used = {gone.label, *(o.label for o in reduced.candidates)}
             table = {c: v for c, v in self.proposed.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, rest, table, paths=self.proposed.paths) if s.gain > 0.0][:RIVALS]
-            found = self.proposed.fits([with_model(rest, s, table, self.proposed.paths) for s in best])
+            best = [s for s in scores(self.problem, reduced, table, paths=self.proposed.paths) if s.gain > 0.0][:RIVALS]
+            fits = self.proposed.fits([with_model(reduced, s, table, self.proposed.paths) for s in best])
             if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
-                found = self.run.together([functools.partial(self.proposed.refined, f) for f in found])
-            out.append(tuple(found))
+                fits = self.run.together([functools.partial(self.proposed.refined, f) for f in fits])
+            out.append(tuple(fits))
         return tuple(out)

@@ -69,11 +69,11 @@ def _pads(problem: Problem, fitted: Fit) -> list[Behaviour]:
     free = fitted.assessment.free[count:]
     variance = np.diag(fitted.assessment.covariance)[count:]
     out = []
-    for one, m, v in zip(problem.nuisances, free, variance, strict=True):
-        if one.name not in PADS or abs(m) < STAND_IN * math.sqrt(max(1.0 - v, 1e-12)):
+    for nuisance, m, v in zip(problem.nuisances, free, variance, strict=True):
+        if nuisance.name not in PADS or abs(m) < STAND_IN * math.sqrt(max(1.0 - v, 1e-12)):
             continue
-        pad, change, spread = int(one.place.split()[-1]), float(m * one.sigma), float(math.sqrt(v) / abs(m))
-        kind, effect, parameter, unit = PADS[one.name]
+        pad, change, spread = int(nuisance.place.split()[-1]), float(m * nuisance.sigma), float(math.sqrt(v) / abs(m))
+        kind, effect, parameter, unit = PADS[nuisance.name]
         if effect == "pad_offset":
             size, words = change, f"pad #{pad} stands {1e6 * change:+.1f} um from where the drawing has it"
         else:
@@ -144,10 +144,10 @@ def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drif
     name, coordinate, levels = row
     where = np.array([e.place(coordinate) if e.family in {"h", "temperature"} else math.nan
                       for e in problem.observations.elements])  # fmt: skip
-    known = sorted(set(where[np.isfinite(where)]))
-    if len(known) < levels:
+    finite_values = sorted(set(where[np.isfinite(where)]))
+    if len(finite_values) < levels:
         return None
-    middle = float(np.mean(known))
+    middle = float(np.mean(finite_values))
     slope = np.nan_to_num(where / middle - 1.0)
     linear = fitted.assessment.linear
     # per unit of relative growth; a prior of one: up to twice, down to nothing
@@ -156,16 +156,16 @@ def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drif
     )
     column = linear.columns[:, index] * slope * moved
     wider = Linear(linear.residual, np.column_stack([linear.columns, column]), np.append(linear.width, 1.0))
-    found = assess(problem.basis, wider, fitted.assessment.scales)
-    growth = float(found.free[-1])
+    assessment = assess(problem.basis, wider, fitted.assessment.scales)
+    growth = float(assessment.free[-1])
     origin = float(candidate.origin[0])
-    ends = [_value(candidate, origin, moved, growth, v / middle - 1.0) for v in (known[0], known[-1])]
+    ends = [_value(candidate, origin, moved, growth, v / middle - 1.0) for v in (finite_values[0], finite_values[-1])]
     size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
     if size < SAME:
         return None
     parameter = candidate.free[0]
-    words = _words(ends, known, name)
-    return found.evidence - fitted.evidence, Drift(candidate.label, parameter.name, name, ends[0], ends[1], words)
+    words = _words(ends, finite_values, name)
+    return assessment.evidence - fitted.evidence, Drift(candidate.label, parameter.name, name, ends[0], ends[1], words)
 
 
 def _value(candidate, origin: float, moved: float, growth: float, share: float) -> float:  # type: ignore[no-untyped-def]

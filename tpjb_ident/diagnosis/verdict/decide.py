@@ -52,31 +52,30 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Eviden
     closed = closure(problem, baseline_fit(problem), effects)
     if not found.model.candidates:
         if before.p >= settings.alarm:
-            told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
-            return Evidence("consistent", baseline, closed, before, (), (told,))
-        told = (
+            text = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
+            return Evidence("consistent", baseline, closed, before, (), (text,))
+        text = (
             f"something is the matter (p = {before.p:.1g}, most in {before.where}), and unseen points want no effect "
             "of the library"
         )
-        return Evidence("unexplained", baseline, closed, before, (), (told,))
-    left = excess(problem, effects)
-    reasons = _refusals(found, closed, left, settings)
+        return Evidence("unexplained", baseline, closed, before, (), (text,))
+    remaining = excess(problem, effects)
+    reasons = _refusals(found, closed, remaining, settings)
     if reasons and before.p >= settings.alarm:
-        told = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
-        return Evidence("consistent", baseline, closed, before, (), (told,))
+        text = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
+        return Evidence("consistent", baseline, closed, before, (), (text,))
     if reasons:
         return Evidence("unexplained", baseline, closed, before, (), reasons)
     alike = _alike(found, settings)
     share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
     if math.isnan(closed.closed):
         share = "unseen points want it though what may be off closes the gap as well, beyond its tolerances"
-    if left.p < settings.alarm or found.model.candidates != effects.candidates:
-        told = (
-            f"{share}; what is left is more than noise and stated tolerances (p = {left.p:.1g}), most in {left.where}"
-        )
-        return Evidence("partly-explained", effects, closed, left, alike, (told,))
-    told = f"{share}; what is left is within noise and stated tolerances (p = {left.p:.2g})"
-    return Evidence("ambiguous" if alike else "named", effects, closed, left, alike, (told,))
+    if remaining.p < settings.alarm or found.model.candidates != effects.candidates:
+        beyond = f"more than noise and stated tolerances (p = {remaining.p:.1g}), most in {remaining.where}"
+        text = f"{share}; what is left is {beyond}"
+        return Evidence("partly-explained", effects, closed, remaining, alike, (text,))
+    text = f"{share}; what is left is within noise and stated tolerances (p = {remaining.p:.2g})"
+    return Evidence("ambiguous" if alike else "named", effects, closed, remaining, alike, (text,))
 
 
 def _refusals(found: Search, closed: Closure, left: Excess, settings: DiagnoseSettings) -> tuple[str, ...]:
@@ -152,10 +151,12 @@ def decide(
 
 def _remainder(problem: Problem, evidence: Evidence, where: str, alarm: float) -> Remainder:
     """What is left on unseen points once everything that may be off is at its likeliest."""
-    left = evidence.closed.after if evidence.named.candidates else evidence.closed.before
+    remaining = evidence.closed.after if evidence.named.candidates else evidence.closed.before
     floor, before = noise_floor(problem.observations) ** 2, gap(problem.observations, problem.base) ** 2
-    share = max(left**2 - floor, 0.0) / (before - floor) if before > floor else 0.0
-    return Remainder(left, min(share, 1.0), evidence.left.where if evidence.left.p < alarm else where, evidence.left.p)
+    share = max(remaining**2 - floor, 0.0) / (before - floor) if before > floor else 0.0
+    return Remainder(
+        remaining, min(share, 1.0), evidence.left.where if evidence.left.p < alarm else where, evidence.left.p
+    )
 
 
 def _drifts(problem: Problem, found: Search, evidence: Evidence) -> tuple[Drift, ...]:
@@ -240,9 +241,9 @@ def _assumptions(problem: Problem, found: Search, settings: DiagnoseSettings) ->
     free = found.model.assessment.free[count:]
     fitted: dict[str, list[float]] = {}
     units: dict[str, tuple[float, str]] = {}
-    for one, size in zip(problem.nuisances, free, strict=True):
-        fitted.setdefault(one.name, []).append(float(size * one.sigma))
-        units[one.name] = one.sigma, one.unit
+    for nuisance, size in zip(problem.nuisances, free, strict=True):
+        fitted.setdefault(nuisance.name, []).append(float(size * nuisance.sigma))
+        units[nuisance.name] = nuisance.sigma, nuisance.unit
     stated = settings.tolerances.stated
     out = []
     for name, values in fitted.items():

@@ -71,16 +71,16 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     """
     # every kind of observable as wrong as stated, nothing beyond, no more scatter than stated
     stated = problem.basis.stated
-    told = assess(problem.basis, fitted.assessment.linear, stated, fixed=True)
+    assessment = assess(problem.basis, fitted.assessment.linear, stated, fixed=True)
     total = problem.basis.covariance(stated) + fitted.assessment.linear.spread
-    residual = told.linear.residual
+    residual = assessment.linear.residual
     rows = _groups(problem)
     tests = [(float(chdtrc(len(at), _square(total, residual, at))), name) for name, at in rows]
     first = len(fitted.errors)
-    left = 1.0 - np.diag(told.covariance)[first:]
-    for one, m, spread in zip(problem.nuisances, told.free[first:], left, strict=True):
+    remaining = 1.0 - np.diag(assessment.covariance)[first:]
+    for nuisance, m, spread in zip(problem.nuisances, assessment.free[first:], remaining, strict=True):
         if spread > TOLD:
-            tests.append((2.0 * float(ndtr(-abs(m) / np.sqrt(spread))), f"{one.name} {one.place}".strip()))
+            tests.append((2.0 * float(ndtr(-abs(m) / np.sqrt(spread))), f"{nuisance.name} {nuisance.place}".strip()))
     p, where = min(tests)
     return Excess(min(1.0, p * len(tests)), where)
 
@@ -95,9 +95,9 @@ def _groups(problem: Problem) -> list[tuple[str, IntArray]]:
     pads = np.array([e.place("pad") for e in elements])
     out = []
     for name in dict.fromkeys(names):
-        mine = names == name
-        numbers = sorted(set(pads[mine & np.isfinite(pads)]))
-        out += [(f"{name} of pad {k:.0f}", np.flatnonzero(mine & (pads == k))) for k in numbers]
+        selected = names == name
+        numbers = sorted(set(pads[selected & np.isfinite(pads)]))
+        out += [(f"{name} of pad {k:.0f}", np.flatnonzero(selected & (pads == k))) for k in numbers]
         if not numbers:
-            out.append((str(name), np.flatnonzero(mine)))
+            out.append((str(name), np.flatnonzero(selected)))
     return out + [(f.name, f.members) for f in problem.folds] + [("everything", np.arange(len(elements)))]

@@ -138,9 +138,9 @@ class Verdict:
         """
         counted = ['counted_from = "measured pivots"'] if from_measured else []
         lines = ['schema = "tpjb-effects/1"', *counted, ""]
-        for known in before:
-            values = [f"{k} = {v!r}" for k, v in known.parameters.items()]
-            lines += ["[[effects]]", f'name = "{known.name}"', *values, ""]
+        for effect in before:
+            values = [f"{k} = {v!r}" for k, v in effect.parameters.items()]
+            lines += ["[[effects]]", f'name = "{effect.name}"', *values, ""]
         for e in self.effects:
             kind = kind_of(e.name)
             lines += ["[[effects]]", f'name = "{e.name}"']

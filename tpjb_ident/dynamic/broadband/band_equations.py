@@ -63,12 +63,14 @@ def line_sums(rows: LineRows, middle: float, basis: Basis, instrument: str) -> l
     source = _explained(rows, flat) if instrument == "command" else rows.command
     assert source is not None
     zeta = _phi(rows, source, middle, basis)
-    found = []
+    sums = []
     for r, q in enumerate(flat):
-        mine = rows.run == r
+        selected = rows.run == r
         spare = len(q) - (np.linalg.matrix_rank(ends_columns(rows.one_run(r))) if rows.ends else 0)
-        found.append(_of_rows(q @ rows.F[mine], q @ phi[mine], q @ rows.D[mine], q @ zeta[mine], float(spare)))
-    return found
+        sums.append(
+            _of_rows(q @ rows.F[selected], q @ phi[selected], q @ rows.D[selected], q @ zeta[selected], float(spare))
+        )
+    return sums
 
 
 def _phi(rows: LineRows, source: ComplexArray, middle: float, basis: Basis) -> ComplexArray:
@@ -99,8 +101,8 @@ def _explained(rows: LineRows, flat: list[ComplexArray]) -> ComplexArray:
 
 def _of_rows(F: ComplexArray, phi: ComplexArray, D: ComplexArray, zeta: ComplexArray, spare: float) -> RunSums:
     def residual(theta: FloatArray) -> ComplexArray:
-        left = F - phi @ theta.T
-        return np.einsum("ni,nk->ik", left, left.conj()) / max(spare, 1.0)
+        remaining = F - phi @ theta.T
+        return np.einsum("ni,nk->ik", remaining, remaining.conj()) / max(spare, 1.0)
 
     return RunSums(
         np.einsum("na,nb->ab", zeta.conj(), phi),

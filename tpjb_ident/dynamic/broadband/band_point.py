@@ -98,19 +98,19 @@ def read_point(
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
     """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
-    left = []
+    remaining = []
     chosen = _with_clocks(group, _spectra_settings(group, settings))
     for run in group.runs:
         try:
             spectra.append(run_spectra(run, housing_mass, chosen))
         except RigDataError as error:
-            left.append(ExcludedRun(run.id, run.point, error))
+            remaining.append(ExcludedRun(run.id, run.point, error))
     if not spectra:
-        return None, left
-    late, told = _band_balance(_alike(spectra))
+        return None, remaining
+    late, conditions = _band_balance(_alike(spectra))
     # how late the cells are is not put right, as with sines, but stands in the interval
     spectra = [replace(s, start=float(np.hypot(s.start, late))) for s in spectra]
-    return BandPoint(group, spectra, line_plan(spectra), baseline, told), left
+    return BandPoint(group, spectra, line_plan(spectra), baseline, conditions), remaining
 
 
 def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
@@ -133,12 +133,14 @@ def _spectra_settings(group: BandGroup, settings: BandSettings) -> SpectraSettin
 def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
     """Runs with the same bins."""
     first = spectra[0]
-    for other in spectra[1:]:
-        same = len(other.frequencies) == len(first.frequencies)
-        if not same or np.abs(other.frequencies / first.frequencies - 1).max() > 1e-3:
-            told = [f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, other)]
+    for spectrum in spectra[1:]:
+        same = len(spectrum.frequencies) == len(first.frequencies)
+        if not same or np.abs(spectrum.frequencies / first.frequencies - 1).max() > 1e-3:
+            sentences = [
+                f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, spectrum)
+            ]
             raise BadInputError(
-                f"runs at {first.phasors.point} repeat with different periods ({', '.join(told)}); "
+                f"runs at {first.phasors.point} repeat with different periods ({', '.join(sentences)}); "
                 "excite the runs of one point with one period, or list them as different kinds of excitation"
             )
     return spectra
@@ -164,8 +166,8 @@ def _group(runs: list[Run]) -> BandGroup:
     low, high = max(b[0] for b in bands), min(b[1] for b in bands)
     first = runs[0]
     if not low < high:
-        what = f"runs at {first.point} have no common excitation_band"
-        raise RigDataError(Problem("error", first.file, "excitation_band", what, "Check the bands", first.id))
+        text = f"runs at {first.point} have no common excitation_band"
+        raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
     p = first.point
     point = OperatingPoint(p.static_load, p.static_load_direction, p.shaft_speed, 0.0)
     return BandGroup(point, first.excitation_kind, (low, high), tuple(runs))
@@ -182,12 +184,12 @@ def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition
         return 0.0, ()
     free = np.flatnonzero(~np.any([s.taken for s in spectra], axis=0))
     parts = np.array_split(free, min(PARTS, max(len(free) // LEAST, 1)))
-    found = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
-    told = merged(*(found[f].conditions for f in sorted(found, reverse=True)))
-    if "accelerometers-contradict-cells" in told:  # where the housing's inertia is larger
-        told = tuple(c for c in told if c != "accelerometers-doubtful")
-    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in found.items()]
-    return max(lags, default=0.0), told
+    table = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
+    conditions = merged(*(table[f].conditions for f in sorted(table, reverse=True)))
+    if "accelerometers-contradict-cells" in conditions:  # where the housing's inertia is larger
+        conditions = tuple(c for c in conditions if c != "accelerometers-doubtful")
+    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in table.items()]
+    return max(lags, default=0.0), conditions
 
 
 def _lines(spectra: RunSpectra, part: Sequence[int]) -> list[BalanceRun]:

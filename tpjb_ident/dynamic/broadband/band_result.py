@@ -211,16 +211,16 @@ def _point(
 
 def _estimate(part: BandPart, point: BandPoint, result: BandResult) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
     """The part's h with all its uncertainties, and these by source."""
-    found = {"random": part.covariance, "shared by all lines": np.cov(part.moved.T, bias=True)}
+    table = {"random": part.covariance, "shared by all lines": np.cov(part.moved.T, bias=True)}
     rig = point.baseline.at(part.omega)
     if rig is not None:
-        found["baseline"] = rig[1]
+        table["baseline"] = rig[1]
     if part.bracket.any():
         # a rectangle's standard deviation is half its width by the root of three
-        found["no instrument"] = np.diag(part.bracket**2) / 3
-    systematic = np.sum([v for name, v in found.items() if name != "random"], axis=0)
+        table["no instrument"] = np.diag(part.bracket**2) / 3
+    systematic = np.sum([v for name, v in table.items() if name != "random"], axis=0)
     condition = float(np.median([line.stiffness.condition for line in result.lines])) if result.lines else np.nan
     est = DynamicStiffness(
         part.h, part.omega, part.covariance, part.dof, f"band-{result.method}", np.ones((1, 2)), condition=condition
     )
-    return replace(est, systematic=systematic), found
+    return replace(est, systematic=systematic), table

@@ -36,17 +36,17 @@ class ClockRate:
 
 def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str, ClockRate]:
     """Differences that runs share, by quantity; those that are clear, and matter."""
-    found = {}
+    table = {}
     for quantity in sorted({q for one in seen for q in one}):
-        known = [one[quantity] for one in seen if quantity in one and np.isfinite(one[quantity].error)]
-        if not known:
+        clocks = [one[quantity] for one in seen if quantity in one and np.isfinite(one[quantity].error)]
+        if not clocks:
             continue
-        weight = np.array([max(each.error, 1e-12) ** -2.0 for each in known])
-        rate = float(np.sum(weight * [each.rate for each in known]) / weight.sum())
+        weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])
+        rate = float(np.sum(weight * [clock.rate for clock in clocks]) / weight.sum())
         pooled = ClockRate(rate, float(weight.sum() ** -0.5))
         if abs(rate) > CLEAR * pooled.error and abs(rate) * reach > NOTABLE:
-            found[quantity] = pooled
-    return found
+            table[quantity] = pooled
+    return table
 
 
 def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
@@ -86,11 +86,11 @@ def _clock_rate(
     rate = 0.0
     for step in (1, 3, PIECES - 1):  # from near pieces to far ones: turns wrap, and are counted from what is known
         near = (second - first) <= step
-        left = np.angle(turn * np.exp(-1j * rate * lever))[near]
-        rate += float(np.sum((weight * lever)[near] * left) / np.sum((weight * lever**2)[near]))
-    left = np.angle(turn * np.exp(-1j * rate * lever))
+        remaining = np.angle(turn * np.exp(-1j * rate * lever))[near]
+        rate += float(np.sum((weight * lever)[near] * remaining) / np.sum((weight * lever**2)[near]))
+    remaining = np.angle(turn * np.exp(-1j * rate * lever))
     # bins err apart from each other, pairs of pieces do not
-    scores = np.sum(weight * lever * left, axis=0)
+    scores = np.sum(weight * lever * remaining, axis=0)
     return ClockRate(rate, float(np.sqrt(np.sum(scores**2)) / np.sum(weight * lever**2)))
 
 

@@ -61,14 +61,16 @@ def identify_bands(
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
     seen = list(_observed(runs, progress))
     checked = campaign_verdicts(campaign, seen)
-    left = [ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable]
+    remaining = [
+        ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
+    ]
     points: list[BandPoint] = []
     for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
         point, bad = read_point(group, campaign.housing_mass, settings, baseline or Baseline())
-        left += bad
+        remaining += bad
         points += [] if point is None else [point]
     if not points:
-        raise left[0].error
+        raise remaining[0].error
     zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
     first = [[estimate_line(point.rows(k), classic=False) for k in range(len(point.plan.bins))] for point in points]
@@ -77,15 +79,15 @@ def identify_bands(
     results, changes = [], []
     for i, point in enumerate(points):
         slopes = _slopes(points, first, i) if settings.correct else None
-        told = load_conditions(misses[i], common) + zero.conditions()
-        told += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, left)
-        result = _finish(point, misses[i], slopes, sources, told)
+        conditions = load_conditions(misses[i], common) + zero.conditions()
+        conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
+        result = _finish(point, misses[i], slopes, sources, conditions)
         own, moved = band_points(point, result, misses[i], settings.clearance)
         results.append(replace(result, points=own))
         changes.append(moved if len(own) else np.empty((len(sources.load), 0)))
     joint = np.concatenate(changes, axis=1)
     return IdentifiedBands(
-        tuple(results), joint, named_runs(left, len(runs)) + _lost(points, left) + sources.conditions()
+        tuple(results), joint, named_runs(remaining, len(runs)) + _lost(points, remaining) + sources.conditions()
     )
 
 
@@ -97,18 +99,18 @@ def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation
 
 def _without(point: BandPoint, left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the runs of a point that take no part."""
-    mine = [one.run for one in left if replace(one.point, excitation=0.0) == point.point]
-    return (Condition("run-left-out", f"without {', '.join(mine)}, which cannot be used"),) if mine else ()
+    members = [excluded.run for excluded in left if replace(excluded.point, excitation=0.0) == point.point]
+    return (Condition("run-left-out", f"without {', '.join(members)}, which cannot be used"),) if members else ()
 
 
 def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
     kept = [point.point for point in points]
-    lost = [one for one in left if replace(one.point, excitation=0.0) not in kept]
+    lost = [excluded for excluded in left if replace(excluded.point, excitation=0.0) not in kept]
     if not lost:
         return ()
-    places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN" for one in lost)
-    runs = ", ".join(one.run for one in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    places = dict.fromkeys(f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost)
+    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
     return (Condition("point-lost", f"no usable run over a band at {'; '.join(places)}: {runs}"),)
 
 
@@ -117,11 +119,11 @@ def _slopes(points: list[BandPoint], first: list[list[LineEstimates]], i: int) -
     mine = points[i]
     same = [
         j
-        for j, other in enumerate(points)
-        if other.group.kind == mine.group.kind
-        and other.point.static_load_direction_deg == mine.point.static_load_direction_deg
-        and other.point.shaft_speed_hz == mine.point.shaft_speed_hz
-        and other.point.static_load > 0
+        for j, point in enumerate(points)
+        if point.group.kind == mine.group.kind
+        and point.point.static_load_direction_deg == mine.point.static_load_direction_deg
+        and point.point.shaft_speed_hz == mine.point.shaft_speed_hz
+        and point.point.static_load > 0
     ]
     curves = [_over(mine.plan.frequencies, points[j].plan.frequencies, first[j]) for j in same]
     known = [(j, curve) for j, curve in zip(same, curves) if curve is not None]
@@ -184,15 +186,15 @@ def _finish(
 
 def _models(rows: list[LineRows], method: str, shared: SharedErrors) -> dict[str, BandModel]:
     """Models over the band by name; without an instrument, the middle between H1 and H2, and an interval over both."""
-    found: dict[str, BandModel] = {}
+    table: dict[str, BandModel] = {}
     instrument = {"periods": "periods", "iv": "command"}.get(method)
     for name in MODELS:
         ways = [instrument] if instrument else ["displacement", "force"]
         fits = [fit_band(rows, name, way, shared) for way in ways]
-        known = [fit for fit in fits if fit is not None]
-        if len(known) == len(ways):
-            found[name] = known[0] if instrument else between(known[0], known[1])
-    return found
+        band_models = [fit for fit in fits if fit is not None]
+        if len(band_models) == len(ways):
+            table[name] = band_models[0] if instrument else between(band_models[0], band_models[1])
+    return table
 
 
 def _line(
@@ -212,10 +214,10 @@ def _line(
         # a rectangle from H1 to H2 has the standard deviation of its half width by the root of three
         seen = seen + sources.load.reshape(len(change), 8) * line.bracket / np.sqrt(3)
     systematic = np.cov(seen.T, bias=True) + (0.0 if rig is None else rig[1])
-    found = {name: _stiffness(line.omega, fit, name) for name, fit in line.fits.items() if fit.found}
-    found = {name: replace(est, systematic=systematic) for name, est in found.items()}
+    table = {name: _stiffness(line.omega, fit, name) for name, fit in line.fits.items() if fit.found}
+    table = {name: replace(est, systematic=systematic) for name, est in table.items()}
     frequency = line.omega / (2 * np.pi)
-    return BandLine(frequency, found, line.method, line.coherence, line.n_rows), change
+    return BandLine(frequency, table, line.method, line.coherence, line.n_rows), change
 
 
 def _stiffness(omega: float, fit: LineFit, method: str) -> DynamicStiffness:
@@ -231,14 +233,14 @@ def _band_conditions(
     found = []
     conditions = np.array([line.fit.condition for line in estimates])
     if len(estimates) and np.median(conditions) > 1e6:
-        told = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
-        found.append(Condition("fewer-than-two-directions", told))
+        text = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
+        found.append(Condition("fewer-than-two-directions", text))
     elif len(lines) < LEAST_LINES * len(estimates):
-        told = f"{len(lines)} of {len(estimates)} lines stand {STRONG:g} times (F ratio) above the noise"
-        found.append(Condition("excitation-too-weak", told))
+        text = f"{len(lines)} of {len(estimates)} lines stand {STRONG:g} times (F ratio) above the noise"
+        found.append(Condition("excitation-too-weak", text))
     elif np.median(conditions) > ILL_CONDITIONED:
-        told = f"condition number {np.median(conditions):.0f} (median over the band)"
-        found.append(Condition("ill-conditioned", told))
+        text = f"condition number {np.median(conditions):.0f} (median over the band)"
+        found.append(Condition("ill-conditioned", text))
     if spectra[0].disturbances:
         held = [d for d in spectra[0].disturbances if _inside(spectra[0], d.frequency)]
         if held:
@@ -247,8 +249,8 @@ def _band_conditions(
             found.append(Condition("lines-left-out", f"{named}{more}"))
     if lines and lines[0].method == "hv":
         low = float(np.median([line.coherence.min() for line in lines]))
-        told = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
-        found.append(Condition("no-instrument", told))
+        text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
+        found.append(Condition("no-instrument", text))
         if low < LOW_COHERENCE:
             found.append(Condition("low-coherence", f"{low:.2f}, median over the band"))
     if spectra[0].phasors.acceleration is None and spectra[0].phasors.housing_mass > 0:

@@ -84,9 +84,9 @@ def _period_means(rows: LineRows) -> tuple[ComplexArray, ComplexArray, FloatArra
     for r in range(rows.n_runs):
         mine = z[rows.run == r]
         mean = mine.mean(axis=0)
-        left = mine - mean
+        remaining = mine - mean
         means.append(mean)
-        spreads.append(np.einsum("ni,nk->ik", left, left.conj()) / max(len(mine) - 1, 1))
+        spreads.append(np.einsum("ni,nk->ik", remaining, remaining.conj()) / max(len(mine) - 1, 1))
         counts.append(len(mine))
     return np.array(means), np.array(spreads), np.array(counts, dtype=float)
 
@@ -172,10 +172,10 @@ def coherence(rows: LineRows, fit: LineFit) -> FloatArray:
     """Multiple coherence of the force along X and Y with the displacements, (2,), free of the few rows' bias."""
     flat = without_slopes(rows, fit)
     basis = np.linalg.qr(flat.D)[0]
-    left = flat.F - basis @ (basis.conj().T @ flat.F)
+    remaining = flat.F - basis @ (basis.conj().T @ flat.F)
     n, spent = len(rows.D), _spent(rows)
     power = np.mean(np.abs(flat.F) ** 2, axis=0) * n / max(n - spent, 1)
-    noise = np.sum(np.abs(left) ** 2, axis=0) / max(n - spent - 2, 1)
+    noise = np.sum(np.abs(remaining) ** 2, axis=0) / max(n - spent - 2, 1)
     with np.errstate(invalid="ignore", divide="ignore"):  # no force at all has no coherence
         return np.asarray(np.clip(1 - noise / power, 0.0, 1.0))
 

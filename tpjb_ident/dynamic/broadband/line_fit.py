@@ -84,9 +84,9 @@ def by_runs(D: ComplexArray, g: ComplexArray, run: IntArray, n_runs: int) -> tup
     leverage = np.empty((n_runs, 2, 2), dtype=complex)
     share = np.empty((n_runs, 2, 2), dtype=complex)
     for r in range(n_runs):
-        mine = run == r
-        leverage[r] = np.einsum("nj,nl->jl", g[mine], g[mine].conj())
-        share[r] = np.einsum("ni,nj->ij", D[mine], g[mine])
+        selected = run == r
+        leverage[r] = np.einsum("nj,nl->jl", g[selected], g[selected].conj())
+        share[r] = np.einsum("ni,nj->ij", D[selected], g[selected])
     return leverage, share
 
 

@@ -66,17 +66,17 @@ class LineRows:
 
     def one_run(self, r: int) -> LineRows:
         """Rows of one run alone."""
-        mine = self.run == r
-        command = None if self.command is None else self.command[mine]
-        zero = np.zeros(int(mine.sum()), dtype=int)
+        selected = self.run == r
+        command = None if self.command is None else self.command[selected]
+        zero = np.zeros(int(selected.sum()), dtype=int)
         return replace(
             self,
-            D=self.D[mine],
-            F=self.F[mine],
-            A=self.A[mine],
+            D=self.D[selected],
+            F=self.F[selected],
+            A=self.A[selected],
             command=command,
             run=zero,
-            place=self.place[mine],
+            place=self.place[selected],
         )
 
 

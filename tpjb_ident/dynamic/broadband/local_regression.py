@@ -88,13 +88,13 @@ def remainder(columns: ComplexArray) -> ComplexArray:
 
 def _noise(residual: ComplexArray, maker: ComplexArray, rows: LineRows) -> tuple[ComplexArray, FloatArray]:
     """Covariance of the equation noise in each run, and its complex degrees of freedom."""
-    left = np.sum(np.abs(maker) ** 2, axis=1)
+    remaining = np.sum(np.abs(maker) ** 2, axis=1)
     noise = np.empty((rows.n_runs, 2, 2), dtype=complex)
     dof = np.empty(rows.n_runs)
     for r in range(rows.n_runs):
-        mine = rows.run == r
-        dof[r] = left[mine].sum()
-        noise[r] = np.einsum("ni,nk->ik", residual[mine], residual[mine].conj()) / max(float(dof[r]), 1e-300)
+        selected = rows.run == r
+        dof[r] = remaining[selected].sum()
+        noise[r] = np.einsum("ni,nk->ik", residual[selected], residual[selected].conj()) / max(float(dof[r]), 1e-300)
     return noise, dof
 
 
@@ -107,10 +107,10 @@ def _excited(rows: LineRows, W: ComplexArray, ends: ComplexArray) -> tuple[float
         return np.inf, 0.0
     explained = q.conj().T @ D
     singular = np.linalg.svd(explained, compute_uv=False)
-    left = D - q @ explained
+    remaining = D - q @ explained
     spare = max(len(D) - ends.shape[1] - 2, 1)
     # noise along the weaker direction of motion
     weak = np.linalg.svd(explained)[2][1].conj()
-    power = float(np.sum(np.abs(left @ weak) ** 2)) / spare
+    power = float(np.sum(np.abs(remaining @ weak) ** 2)) / spare
     strength = float(singular[1] ** 2 / (2 * power)) if power > 0 else np.inf
     return float(singular[0] / singular[1]) if singular[1] > 0 else np.inf, strength

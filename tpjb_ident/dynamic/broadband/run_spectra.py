@@ -88,12 +88,12 @@ def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
     """Read one run and transform it."""
     with run.opened():
-        slower, told = inspect_readings(run)
+        slower, conditions = inspect_readings(run)
         samples = read_samples(run, settings.seconds)
         temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:
-        what = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
-        raise _error(run, "excitation_band", what, "Sample faster, or excite lower frequencies")
+        text = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
+        raise _error(run, "excitation_band", text, "Sample faster, or excite lower frequencies")
     means = samples.values["force"].mean(axis=1), samples.values["displacement"].mean(axis=1)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
     samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
@@ -106,7 +106,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         clean = without_disturbances(cut, lines, length)
     result = _transformed(run, clean, length, housing_mass, settings)
     phasors = compensated(result, run, slower)
-    phasors = replace(phasors, conditions=merged(samples.conditions, told, _clock_conditions(clocks)))
+    phasors = replace(phasors, conditions=merged(samples.conditions, conditions, _clock_conditions(clocks)))
     frequencies = phasors.lines.frequencies
     phasors = phasors.advanced(settings.delays)
     a = None if phasors.acceleration is None else phasors.acceleration.phasors
@@ -147,8 +147,8 @@ def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[
     frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
     found = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
     if found is None and run.excitation_kind == "multisine":
-        what = "a multi-sine, but no period is found that the record holds three times"
-        raise _error(run, "excitation", what, 'Record longer; or state excitation = "random" if it does not repeat')
+        text = "a multi-sine, but no period is found that the record holds three times"
+        raise _error(run, "excitation", text, 'Record longer; or state excitation = "random" if it does not repeat')
     return found
 
 

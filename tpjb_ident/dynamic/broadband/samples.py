@@ -54,8 +54,8 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     for quantity, rows in found.rows.items():
         values[quantity], share = _bridged(run, quantity, rows)
         lost = max(lost, share)
-    told = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > TOLD_LOST else ()
-    return Samples(rate, values, _command(run, n), _angle(run, n, rate), told)
+    text = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > TOLD_LOST else ()
+    return Samples(rate, values, _command(run, n), _angle(run, n, rate), text)
 
 
 def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -63,15 +63,15 @@ def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
 
 
 def _even(run: Run, time: FloatArray, rate: float) -> None:
-    known = np.isfinite(time)
-    if not known.any():
+    finite = np.isfinite(time)
+    if not finite.any():
         return
-    place = np.flatnonzero(known)
-    off = (time[known] - time[known][0]) * rate - (place - place[0])
+    place = np.flatnonzero(finite)
+    off = (time[finite] - time[finite][0]) * rate - (place - place[0])
     drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
     if np.abs(off - drift).max() > MAX_JITTER:
-        what = "the samples are not evenly spaced; a transform over a band needs an even grid"
-        raise _error(run, "time", what, "Resample the record, or export it without gaps")
+        text = "the samples are not evenly spaced; a transform over a band needs an even grid"
+        raise _error(run, "time", text, "Resample the record, or export it without gaps")
 
 
 def _bridged(run: Run, place: str, rows: FloatArray) -> tuple[FloatArray, float]:

@@ -139,8 +139,8 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     if n_runs < 2 or not fits:
         return RunScatter(0.0, draws)
     if n_runs == 2:
-        told = "with two runs the interval holds how their repeats differ, not how runs do"
-        return RunScatter(0.0, draws, (Condition("no-spare-direction", told),))
+        text = "with two runs the interval holds how their repeats differ, not how runs do"
+        return RunScatter(0.0, draws, (Condition("no-spare-direction", text),))
     power = np.sum([fit.apart.power for fit in fits], axis=0)
     gain = np.sum([fit.apart.left for fit in fits], axis=0) / power
     noise = np.sum([fit.apart.variance for fit in fits], axis=0) / power**2
@@ -166,5 +166,5 @@ def _left_of_gains(fits: Sequence[LineFit]) -> FloatArray:
     for fit in fits:
         turned = fit.h @ fit.share @ np.linalg.inv(fit.h)
         taken += np.einsum("sij,rji->rs", turned, fit.apart.force)
-    left = np.eye(n_runs) - taken / power[:, None]
-    return np.concatenate([left.real, left.imag])
+    remaining = np.eye(n_runs) - taken / power[:, None]
+    return np.concatenate([remaining.real, remaining.imag])

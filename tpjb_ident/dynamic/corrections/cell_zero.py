@@ -55,13 +55,13 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     answer, weight = y / size, np.ones(len(y))
     for _ in range(10):
         root = np.sqrt(weight)[:, None]
-        found = np.linalg.lstsq(design * root, answer * root[:, 0], rcond=None)[0]
-        rest = np.abs(answer - design @ found)
-        scale = 1.4826 * float(np.median(rest)) + 1e-9
-        weight = np.minimum(1.0, 1.5 * scale / np.maximum(rest, 1e-300))
-    spread = float(np.sum(weight * rest**2) / max(float(weight.sum()) - 2.0, 1.0))
+        coefficients = np.linalg.lstsq(design * root, answer * root[:, 0], rcond=None)[0]
+        residual = np.abs(answer - design @ coefficients)
+        scale = 1.4826 * float(np.median(residual)) + 1e-9
+        weight = np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-300))
+    spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
     covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
-    zero, error = complex(found[1]), float(np.sqrt(covariance[1, 1]))
+    zero, error = complex(coefficients[1]), float(np.sqrt(covariance[1, 1]))
     there = abs(zero) > CLEAR * error and abs(zero) > NOTABLE * size.min()
     allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
     return CellZero(zero, error) if there and allowed else CellZero()

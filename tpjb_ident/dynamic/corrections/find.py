@@ -79,8 +79,8 @@ class Correction:
 
     def measured_only(self) -> Correction:
         """The same findings, nothing corrected."""
-        kept = tuple(c for c in self.conditions if c != MAINS_CORRECTED)
-        return replace(self, slope=None, turn=None, mains=None, conditions=kept)
+        conditions = tuple(c for c in self.conditions if c != MAINS_CORRECTED)
+        return replace(self, slope=None, turn=None, mains=None, conditions=conditions)
 
 
 def find_corrections(

@@ -145,19 +145,19 @@ def _projected(ratio: RunRatios, basis: ComplexArray) -> tuple[FloatArray, Float
 def _ridge(design: FloatArray, answer: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Robust ridge regression: parameters (8,) and their covariance (8, 8)."""
     prior = np.diag(1.0 / np.repeat(PLAUSIBLE, 4) ** 2)
-    found, covariance = np.zeros(design.shape[1]), np.linalg.inv(prior)
+    coefficients, covariance = np.zeros(design.shape[1]), np.linalg.inv(prior)
     scale, spent = 1.4826 * float(np.median(np.abs(answer))) + ROUNDING, 0.0
     for _ in range(ROUNDS):
-        residual = np.abs(answer - design @ found)
+        residual = np.abs(answer - design @ coefficients)
         clipped = float(np.sum(np.minimum(residual, HUBER * scale) ** 2))
         # Huber's proposal 2; what the parameters have taken out of the residuals is put back
         scale = math.sqrt(clipped / CLIPPED_SQUARE / max(len(answer) - spent, 1.0)) + ROUNDING
         weight = np.minimum(1.0, HUBER * scale / np.maximum(residual, 1e-300)) / scale**2
         information = design.T @ (weight[:, None] * design)
         covariance = np.linalg.inv(information + prior)
-        found = covariance @ (design.T @ (weight * answer))
+        coefficients = covariance @ (design.T @ (weight * answer))
         spent = float(np.trace(information @ covariance))
-    return found, np.asarray(covariance, dtype=float)
+    return coefficients, np.asarray(covariance, dtype=float)
 
 
 def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, FloatArray]]) -> DirectionSensitivity:
@@ -170,7 +170,7 @@ def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, Fl
         for total, part in ((left, moved), (doubt, basis)):
             both = np.concatenate([part.real, part.imag])
             total[np.ix_(at, at)] = both @ covariance @ both.T
-    return DirectionSensitivity(np.array([basis @ found for found, _ in fits]), left, doubt)
+    return DirectionSensitivity(np.array([basis @ coefficients for coefficients, _ in fits]), left, doubt)
 
 
 def common_turn(h: ComplexArray, turn: DirectionSensitivity | None, angle: float) -> FloatArray:

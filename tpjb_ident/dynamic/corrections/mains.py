@@ -112,12 +112,12 @@ def _direction_means(data: PointData) -> tuple[ComplexArray, ComplexArray] | Non
         return None
     good = np.zeros(len(table))
     for i in range(table.n_directions):
-        mine = table.direction == i
-        size = np.abs(table.D[mine] - complex_median(table.D[mine])) + np.abs(
-            table.F[mine] - complex_median(table.F[mine])
+        selected = table.direction == i
+        size = np.abs(table.D[selected] - complex_median(table.D[selected])) + np.abs(
+            table.F[selected] - complex_median(table.F[selected])
         )
         size = size.max(axis=1)
-        good[mine] = size <= 4 * np.median(size)
+        good[selected] = size <= 4 * np.median(size)
     averaged = repeats(table, good, rounds=1)
     if averaged is None or len(averaged.means) < len(data.runs):
         return None

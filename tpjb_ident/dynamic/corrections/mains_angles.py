@@ -87,8 +87,8 @@ class MainsEquations:
 
     def _angles(self, h: ComplexArray) -> FloatArray:
         """Angles for given H, batched: (..., 2, 2) -> (..., g, m)."""
-        left = self.D - self.F @ np.swapaxes(np.linalg.inv(h), -1, -2)
-        return np.asarray(np.angle(left @ np.linalg.pinv(self.patterns)))
+        remaining = self.D - self.F @ np.swapaxes(np.linalg.inv(h), -1, -2)
+        return np.asarray(np.angle(remaining @ np.linalg.pinv(self.patterns)))
 
     def solve(self) -> list[Minimum]:
         """Distinct minima, best first.
@@ -98,18 +98,18 @@ class MainsEquations:
         """
         from scipy.optimize import least_squares
 
-        found: list[Minimum] = []
+        minima: list[Minimum] = []
         for h in self._candidates():
             fit = least_squares(self.residual, self.start(h), self.jacobian, method="lm", max_nfev=400)
-            if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in found):
+            if fit.status <= 0 or any(np.abs(fit.x[:8] - m.x[:8]).max() < 1e-5 for m in minima):
                 continue
             normal = fit.jac.T @ fit.jac
             log_volume = -0.5 * float(np.linalg.slogdet(normal)[1])
             if not np.isfinite(log_volume):
                 continue  # a valley without a floor: these runs leave H open there
             covariance = np.linalg.pinv(normal)[:8, :8] * self.scale**2
-            found.append(Minimum(2.0 * float(fit.cost), fit.x, np.asarray(covariance), log_volume))
-        return sorted(found, key=lambda minimum: minimum.cost)
+            minima.append(Minimum(2.0 * float(fit.cost), fit.x, np.asarray(covariance), log_volume))
+        return sorted(minima, key=lambda minimum: minimum.cost)
 
     def _candidates(self) -> ComplexArray:
         """H of the best starts, (n, 2, 2)."""
@@ -124,8 +124,8 @@ class MainsEquations:
             clean = (self.D - np.exp(1j * self._angles(h)) @ self.patterns) * weight
             adjoint = np.swapaxes(clean, -1, -2).conj()
             h = np.swapaxes(np.linalg.solve(adjoint @ clean, adjoint @ (self.F * weight)), -1, -2)
-        left = (self.F - (self.D - np.exp(1j * self._angles(h)) @ self.patterns) @ np.swapaxes(h, -1, -2)) * weight
-        cost = (np.abs(left) ** 2).sum(axis=(-1, -2))
+        remaining = (self.F - (self.D - np.exp(1j * self._angles(h)) @ self.patterns) @ np.swapaxes(h, -1, -2)) * weight
+        cost = (np.abs(remaining) ** 2).sum(axis=(-1, -2))
         return h[_distinct(h, cost)]
 
 

@@ -189,29 +189,29 @@ def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
     """Point out loads that are off by more than scatter."""
-    found = []
+    conditions = []
     worst = float(np.abs(miss.size).max(initial=0.0))
     if worst > MAX_MISS:
-        found.append(
+        conditions.append(
             Condition("static-load-off", f"a run's measured static load is {100 * worst:.1f} % off its set point")
         )
     sideways = float(np.abs(miss.sideways).max(initial=0.0))
     if sideways > MAX_SIDEWAYS:
-        found.append(
+        conditions.append(
             Condition(
                 "static-load-turned",
                 f"a run's measured static load points {np.degrees(sideways):.1f} deg away from its set direction",
             )
         )
-    return (*found, *_common_conditions(common))
+    return (*conditions, *_common_conditions(common))
 
 
 def _common_conditions(common: complex) -> tuple[Condition, ...]:
     """What all runs share: a gain of the cells, or what no gain explains."""
     size, turn = abs(common), float(np.angle(common))
     if size == 0.0:
-        told = "the cells show no static force: whether the loads meet their set points is not known"
-        return (Condition("no-static-force", told),)
+        text = "the cells show no static force: whether the loads meet their set points is not known"
+        return (Condition("no-static-force", text),)
     if not CONTRADICTS[0] <= size <= CONTRADICTS[1]:
         return (
             Condition(
@@ -223,15 +223,15 @@ def _common_conditions(common: complex) -> tuple[Condition, ...]:
     aside = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
     if abs(turn) > CONTRADICTS_TURN:
         return (Condition("cells-contradict-set-points", f"{aside}: a cell is inverted, or the cells are exchanged"),)
-    found = []
+    conditions = []
     if abs(turn) > MAX_SIDEWAYS:
-        found.append(Condition("static-load-turned", aside))
+        conditions.append(Condition("static-load-turned", aside))
     if abs(size - 1) > 0.01:
-        found.append(
+        conditions.append(
             Condition(
                 "cells-against-set-points",
                 f"the cells read {100 * (size - 1):+.2f} % against the set points in all runs alike "
                 "(gain of the cells or of the actuators' transducers)",
             )
         )
-    return tuple(found)
+    return tuple(conditions)

@@ -40,8 +40,8 @@ class GainDraws:
         """What to say of channels without a stated uncertainty."""
         if not self.unstated:
             return ()
-        told = f"no uncertainty in the manifest for {', '.join(self.unstated)}: their systematic part is left out"
-        return (Condition("calibration-uncertainty-unstated", told),)
+        text = f"no uncertainty in the manifest for {', '.join(self.unstated)}: their systematic part is left out"
+        return (Condition("calibration-uncertainty-unstated", text),)
 
 
 def gain_draws(channels: Mapping[str, Any], n: int, seed: int) -> GainDraws:
@@ -106,16 +106,16 @@ class SystematicSources:
 
     def changes(self, data: PointData, stiffness: DynamicStiffness) -> dict[str, FloatArray]:
         """Change of the eight entries of H in every draw [N/m], (n, 8), by source."""
-        found = {}
+        table = {}
         if self.turns:
-            found["axis"] = apparent_change(data, stiffness, self._draws(self._turned))
+            table["axis"] = apparent_change(data, stiffness, self._draws(self._turned))
         if self.delays:
-            found["delay"] = apparent_change(data, stiffness, self._draws(lambda q: self._delayed(q, stiffness.omega)))
+            table["delay"] = apparent_change(data, stiffness, self._draws(lambda q: self._delayed(q, stiffness.omega)))
         if len(self.mass):
             heavier = np.eye(2) * (1 + self.mass)[:, None, None]
             same = np.broadcast_to(np.eye(2), heavier.shape)
-            found["mass"] = apparent_change(data, stiffness, GainDraws(same, same, heavier, ()))
-        return found
+            table["mass"] = apparent_change(data, stiffness, GainDraws(same, same, heavier, ()))
+        return table
 
     def _draws(self, matrices: Any) -> GainDraws:
         displacement, force, acceleration = (matrices(quantity) for quantity in _QUANTITIES)

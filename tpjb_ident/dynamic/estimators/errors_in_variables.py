@@ -90,8 +90,8 @@ def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats
         return None
     mean, noise, spare = state
     count = np.bincount(table.direction, weights=good, minlength=len(mean)).astype(float)
-    kept = count >= 0.5
-    return Repeats(DirectionMeans(mean[kept, :2], mean[kept, 2:], count[kept]), noise, spare, good, wandering)
+    used = count >= 0.5
+    return Repeats(DirectionMeans(mean[used, :2], mean[used, 2:], count[used]), noise, spare, good, wandering)
 
 
 def _pooled(
@@ -184,9 +184,9 @@ def _score_iteration(
     for _ in range(50):
         D_true = _true_displacement(h, means, noise, T)
         inverse = np.asarray(np.linalg.inv(direction_covariances(means, _residual_noise(h, noise), T)), dtype=complex)
-        left = information(means.D, D_true, inverse)
+        remaining = information(means.D, D_true, inverse)
         right = np.einsum("gac,gb,gc->ab", inverse, D_true.conj(), means.F).reshape(4)
-        h_new = np.asarray(np.linalg.solve(left, right), dtype=complex).reshape(2, 2)
+        h_new = np.asarray(np.linalg.solve(remaining, right), dtype=complex).reshape(2, 2)
         change = np.abs(h_new - h).max() / np.abs(h).max()
         h = h_new
         if change < 1e-12:
@@ -204,12 +204,12 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
     """
     result, wandering = z, 0
     for d in range(int(direction.max()) + 1):
-        mine = np.flatnonzero(direction == d)
-        good = mine[weights[mine] > 0]
+        places = np.flatnonzero(direction == d)
+        good = places[weights[places] > 0]
         if len(good) < 3:
             continue
         pattern = np.linalg.svd(z[good], full_matrices=False)[2][0].conj()
-        along = z[mine] @ pattern
+        along = z[places] @ pattern
         counted = z[good] @ pattern
         if abs(counted.sum()) >= LOCKED * np.abs(counted).sum():
             continue
@@ -217,7 +217,7 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
             result = z.copy()
         wandering += 1
         turn = np.exp(-1j * np.angle(along))
-        result[mine] = z[mine] * turn[:, None]
+        result[places] = z[places] * turn[:, None]
     return result, wandering
 
 
@@ -249,11 +249,11 @@ def windows_used_again(table: PhasorTable, weights: FloatArray) -> FloatArray:
 
 def _agreeing(table: PhasorTable, direction: int, others: Repeats) -> BoolArray:
     """Windows of a direction that lie together within the noise of the other directions."""
-    mine = table.direction == direction
+    selected = table.direction == direction
     z = np.concatenate([table.D, table.F], axis=1)
-    deviation = z - complex_median(z[mine])
+    deviation = z - complex_median(z[selected])
     u2 = 2.0 * np.einsum("na,an->n", deviation.conj(), np.linalg.solve(others.noise, deviation.T)).real
-    return np.asarray(mine & (u2 <= 2.0 * trimming_limits(8)[1]))
+    return np.asarray(selected & (u2 <= 2.0 * trimming_limits(8)[1]))
 
 
 def _explained(table: PhasorTable, core: BoolArray, others: Repeats) -> bool:

@@ -117,11 +117,11 @@ def spread_of(
     Gives covariance (8, 8) and dof (8,).
     """
     score, parts, pooled, dof_repeat = shares.score, shares.parts, shares.pooled, shares.dof_repeat
-    known = _positive(complex_to_real_covariance(shares.repeat))
+    repeat_noise = _positive(complex_to_real_covariance(shares.repeat))
     g = len(score)
     spare = 4.0 * (g - 2)
     if g <= 2 or not (known_effect or chi_square > 1.0):
-        return known, np.full(8, max(dof_repeat, 1.0))
+        return repeat_noise, np.full(8, max(dof_repeat, 1.0))
     limit = 2.0 * gammaincinv(spare / 2, 0.95) / spare
     certain = min(1.0, (chi_square - 1.0) / (limit - 1.0)) if not known_effect else 1.0
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
@@ -130,17 +130,17 @@ def spread_of(
     if pooled is not None and g <= FEW_DIRECTIONS:
         # an effect that strikes one entry alone shows in the jackknife, and is spread over all in the pooled variance
         stretch = np.sqrt(np.maximum(np.diag(jackknife) / np.diag(pooled), 1.0))
-        total = known + certain * pooled * np.outer(stretch, stretch)
+        total = repeat_noise + certain * pooled * np.outer(stretch, stretch)
         between = np.full(8, POOLED_DOF * (g - 2))
-        return total, mixed_dof(np.diag(total), np.diag(known), dof_repeat, between)
+        return total, mixed_dof(np.diag(total), np.diag(repeat_noise), dof_repeat, between)
     # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
-    root = np.linalg.cholesky(known)
+    root = np.linalg.cholesky(repeat_noise)
     white = np.linalg.solve(root, np.linalg.solve(root, jackknife).T)
     values, vectors = np.linalg.eigh(0.5 * (white + white.T))
     extra = root @ (vectors * (certain * np.maximum(values - 1.0, 0.0))) @ vectors.T @ root.T
-    total = known + extra
+    total = repeat_noise + extra
     effective = np.maximum((moved**2).sum(axis=0) ** 2 / (moved**4).sum(axis=0) - 1.0, 1.0)
-    dof = mixed_dof(np.diag(total), np.diag(known), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
+    dof = mixed_dof(np.diag(total), np.diag(repeat_noise), dof_repeat, np.maximum(effective, 0.5 * (g - 1)))
     return 0.5 * (total + total.T), dof
 
 
@@ -201,7 +201,7 @@ def with_repeats(
     one_hot = np.zeros((g, len(table)))
     one_hot[table.direction, np.arange(len(table))] = weights
     count = one_hot.sum(axis=1)
-    kept = count > 1e-6
+    used = count > 1e-6
     residual = table.F - table.D @ h.T
     mean = one_hot @ np.concatenate([table.D, table.F, residual], axis=1) / np.maximum(count, 1e-12)[:, None]
     deviation = residual - mean[table.direction, 4:]
@@ -209,16 +209,16 @@ def with_repeats(
     noise = (weights[:, None] * deviation).T @ deviation.conj() / max(spare, 1e-12)
     if spare < 4.0 or np.linalg.eigvalsh(noise)[0] <= 0:
         return None
-    means = DirectionMeans(mean[kept, :2], mean[kept, 2:4], count[kept])
-    _, chi_square = direction_effect(mean[kept, 4:], means, noise)
+    means = DirectionMeans(mean[used, :2], mean[used, 2:4], count[used])
+    _, chi_square = direction_effect(mean[used, 4:], means, noise)
     scaled = means.D * means.count[:, None]
     parts = _regression_parts(table, weights)
     bread = np.linalg.inv(parts.sum(axis=0))
     small = correction * noise / means.count[:, None, None]
     meat = information(scaled, scaled, np.broadcast_to(small, (len(means), 2, 2)))
-    score = np.einsum("ga,gb->gab", mean[kept, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
-    pooled = pooled_effect(mean[kept, 4:], means) if kept.sum() > 2 else None
-    shares = VarianceByDirection(score, parts[kept], bread @ meat @ bread.conj().T, 2 * spare, pooled)
+    score = np.einsum("ga,gb->gab", mean[used, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
+    pooled = pooled_effect(mean[used, 4:], means) if used.sum() > 2 else None
+    shares = VarianceByDirection(score, parts[used], bread @ meat @ bread.conj().T, 2 * spare, pooled)
     return (*spread_of(shares, chi_square, table.directions_differ), chi_square)
 
 

@@ -48,8 +48,8 @@ class ZeroAmplitude:
 
     def conditions(self) -> tuple[Condition, ...]:
         """What to say of it."""
-        told = f"h at the runs' mean amplitude differs by {100 * self.share:.1f} % from that at none"
-        return (Condition("zero amplitude", f"{told}; K and C are those at none, by the runs' several amplitudes"),)
+        text = f"h at the runs' mean amplitude differs by {100 * self.share:.1f} % from that at none"
+        return (Condition("zero amplitude", f"{text}; K and C are those at none, by the runs' several amplitudes"),)
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> Am
     """Slope of h over the logarithm of the amplitude, from directions run at several amplitudes."""
     groups: dict[float, list[tuple[float, float]]] = {}
     for i, run in enumerate(data.runs):
-        mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
-        if run.direction is None or not mine.any() or not np.isfinite(h).all():
+        selected = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
+        if run.direction is None or not selected.any() or not np.isfinite(h).all():
             continue
-        D = np.average(data.D[mine], axis=0, weights=weights[mine])
-        F = np.average(data.F[mine], axis=0, weights=weights[mine])
+        D = np.average(data.D[selected], axis=0, weights=weights[selected])
+        F = np.average(data.F[selected], axis=0, weights=weights[selected])
         fitted = h @ D
         excess = float((fitted.conj() @ (F - fitted)).real / np.linalg.norm(fitted) ** 2)
         angle = round(float(np.degrees(run.direction)) % 180.0, 1)
@@ -146,11 +146,11 @@ def _beside_repeats(data: PointData) -> FloatArray:
     """Windows (n,) that are like the others of their run: 1, else 0. Runs of other amplitude are no outliers here."""
     good = np.zeros(len(data.D))
     for i in range(len(data.runs)):
-        mine = np.flatnonzero((data.run_index == i) & data.whole)
-        if len(mine):
-            turned = _one_phase(data.D[mine], data.F[mine])
+        places = np.flatnonzero((data.run_index == i) & data.whole)
+        if len(places):
+            turned = _one_phase(data.D[places], data.F[places])
             off = np.max([np.abs(z - complex_median(z)).max(axis=1) / np.abs(z).max() for z in turned], axis=0)
-            good[mine] = off <= FAR * np.median(off)
+            good[places] = off <= FAR * np.median(off)
     return good
 
 
@@ -193,10 +193,10 @@ def _row(
         gram = (design * root).conj().T @ (design * root)
         covariance = np.linalg.inv(gram + 2 * loose)
         found = covariance @ ((design * root).conj().T @ (F[:, None] * root))[:, 0]
-        rest = np.abs(F - design @ found) ** 2
+        residual = np.abs(F - design @ found) ** 2
         spent = float(np.trace(covariance @ gram).real)
         spare = max(len(F) - spent, 1.0)
-        share = max(float(np.sum((rest - 2 * noise**2) / force)) / (2 * spare), 1e-12)
+        share = max(float(np.sum((residual - 2 * noise**2) / force)) / (2 * spare), 1e-12)
     mixing = np.linalg.pinv(D) @ (square[:, None] * D)
     spread = mixing @ covariance[2:, 2:] @ mixing.conj().T
     # of a circular complex error: each part has the variance that the weights were made of

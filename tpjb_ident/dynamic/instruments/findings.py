@@ -33,17 +33,17 @@ class InstrumentFindings:
 
     def spreads(self, data: PointData, est: DynamicStiffness) -> dict[str, FloatArray]:
         """Covariance (8, 8) by source that the findings add to one point [N^2/m^2]; only what is not zero."""
-        found = {}
+        table = {}
         balance = self._balance(data)
         if balance.phase:
-            found["lag of the cells"] = balance.spread(est)
+            table["lag of the cells"] = balance.spread(est)
         if self.start:
             late = Balance(est.omega * self.start)
-            found["start of the clocks"] = late.spread(est)
+            table["start of the clocks"] = late.spread(est)
         doubt = self.clocks.doubt(data)
         if doubt:
-            found["rate of the clocks"] = Balance(est.omega * doubt).spread(est)
-        return found
+            table["rate of the clocks"] = Balance(est.omega * doubt).spread(est)
+        return table
 
     def _balance(self, data: PointData) -> Balance:
         return self.balances.get(frequency_key(data.runs[0].lines.excitation[data.lines[0]].frequency), Balance())

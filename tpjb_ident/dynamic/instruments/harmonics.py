@@ -91,10 +91,10 @@ def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: Complex
     squares = np.stack([d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], axis=1) / size
     fitted = squares @ np.linalg.lstsq(squares, bent, rcond=None)[0]
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
-    left = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
-    unseen = 3 * (DISTINCT - 1) * left / len(kept)
+    remaining = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
+    unseen = 3 * (DISTINCT - 1) * remaining / len(kept)
     # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
-    chance = left * float(fdtri(6, 2 * (len(kept) - 3), 1.0 - CHANCE))
+    chance = remaining * float(fdtri(6, 2 * (len(kept) - 3), 1.0 - CHANCE))
     return max(3 * (explained - chance) / len(kept), 0.0), unseen
 
 
@@ -112,23 +112,23 @@ def change_conditions(
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
     """
     if uncertain > REFUSED:
-        told = (
+        text = (
             f"the film answers at twice the excitation frequency with {100 * np.sqrt(change.share / CHANGE):.0f} % of"
         )
         return (
             Condition(
                 "film-not-linear",
-                f"{told} the force: the coefficients may be off by {100 * uncertain:.0f} %. Excite less",
+                f"{text} the force: the coefficients may be off by {100 * uncertain:.0f} %. Excite less",
             ),
         )
     if not clearance or not np.isfinite(est.h).all() or not amplitude > MAX_AMPLITUDE * clearance:
         return ()
     share = 100 * amplitude / clearance
     if amplitude > NEVER_LINEAR * clearance and not change.share:
-        told = f"amplitude {share:.0f} % of the clearance without a harmonic of the film: check probes and clearance"
-        return (Condition("large-amplitude", told),)
+        text = f"amplitude {share:.0f} % of the clearance without a harmonic of the film: check probes and clearance"
+        return (Condition("large-amplitude", text),)
     room = float(np.min(np.abs(est.half_width()[[0, 3]] / np.diag(est.h).real)))
     if change.hidden < room or uncertain < change.share:  # what stays unseen is less than the interval
         return ()
-    told = f"amplitude {share:.1f} % of the clearance > 5 %, and the second harmonic does not tell what it does"
-    return (Condition("large-amplitude", told),)
+    text = f"amplitude {share:.1f} % of the clearance > 5 %, and the second harmonic does not tell what it does"
+    return (Condition("large-amplitude", text),)

@@ -78,10 +78,10 @@ def balance_runs(data: PointData) -> list[BalanceRun]:
     found = []
     mass = data.runs[0].housing_mass
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
-        mine = (data.run_index == i) & data.whole & np.isfinite(data.A).all(axis=1)
-        if not mine.any():
+        selected = (data.run_index == i) & data.whole & np.isfinite(data.A).all(axis=1)
+        if not selected.any():
             continue
-        both = _one_phase(np.concatenate([data.F[mine], data.A[mine]], axis=1), data.D[mine])
+        both = _one_phase(np.concatenate([data.F[selected], data.A[selected]], axis=1), data.D[selected])
         both = both[_ordinary(both[:, :2]) & _ordinary(both[:, 2:])]
         F, A, n = both[:, :2].mean(axis=0), both[:, 2:].mean(axis=0), len(both)
         share = float(mass * np.linalg.norm(A) / max(float(np.linalg.norm(F)), 1e-300))
@@ -107,9 +107,9 @@ def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
     groups: dict[float, list[BalanceRun]] = {}
     for run in runs:
         groups.setdefault(frequency_key(run.frequency), []).append(run)
-    found = {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
-    lag = _shared_lag([(2 * np.pi * f, verdict) for f, verdict in found.items()])
-    return {f: replace(verdict, phase=2 * np.pi * f * lag) for f, verdict in found.items()}
+    table = {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
+    lag = _shared_lag([(2 * np.pi * f, verdict) for f, verdict in table.items()])
+    return {f: replace(verdict, phase=2 * np.pi * f * lag) for f, verdict in table.items()}
 
 
 def _shared_lag(verdicts: Sequence[tuple[float, Balance]]) -> float:
@@ -167,13 +167,13 @@ def _ratio(cells: ComplexArray, accelerations: ComplexArray, noise: float) -> tu
     for _ in range(10):
         root = np.sqrt(weight)[:, None]
         G = np.linalg.lstsq(cells * root, accelerations * root, rcond=None)[0].T.astype(np.complex128)
-        rest = np.linalg.norm(accelerations - cells @ G.T, axis=1)
-        scale = 1.4826 * float(np.median(rest)) + 1e-300
-        weight = np.minimum(1.0, 1.5 * scale / np.maximum(rest, 1e-300))
+        residual = np.linalg.norm(accelerations - cells @ G.T, axis=1)
+        scale = 1.4826 * float(np.median(residual)) + 1e-300
+        weight = np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-300))
     gram = (cells * weight[:, None]).conj().T @ cells
     if np.linalg.cond(gram) > 1e8:
         return None
-    spread = max(float(np.sum(weight * rest**2) / max(4 * (float(weight.sum()) - 2.0), 1.0)), noise)
+    spread = max(float(np.sum(weight * residual**2) / max(4 * (float(weight.sum()) - 2.0), 1.0)), noise)
     return G, float(np.sqrt(spread * np.linalg.inv(gram).real.diagonal().max()))
 
 
@@ -201,12 +201,12 @@ def _silence(group: Sequence[BalanceRun], G: ComplexArray, error: float) -> tupl
     if not silent:
         return ()
     share = group[0].mass * omega**2 / SOFT
-    what = (
+    text = (
         f"they show nothing along {' and '.join(silent)} at {group[0].frequency:g} Hz: the housing would stand on "
         f"springs of over {stiffness.max():.1e} N/m. Are they connected? On soft cells inertia is {100 * share:.2g} % "
         "of the force"
     )
-    return (Condition(_severity(share), what),)
+    return (Condition(_severity(share), text),)
 
 
 def _shown(G: ComplexArray) -> str:

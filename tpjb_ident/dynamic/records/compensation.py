@@ -53,11 +53,11 @@ class SlowerChannel:
         ratio = self.export_rate / self.rate
         even = abs(ratio - round(ratio)) < 1e-6 * ratio
         small = np.sin(np.pi * f / self.export_rate) * ratio if even else np.pi * f / self.rate
-        one = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
+        text = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
         if not self.held:
-            return np.asarray(one**2, dtype=complex)
+            return np.asarray(text**2, dtype=complex)
         late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
-        return np.asarray(one * np.exp(-2j * np.pi * f * late))
+        return np.asarray(text * np.exp(-2j * np.pi * f * late))
 
 
 def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
@@ -93,9 +93,9 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Meas
     """The gain, 1 at disturbing lines that a table does not reach."""
     known = np.isfinite(gain) & (np.abs(gain) > 1e-6)
     if not known[:driven].all():
-        what = f"its response at the excitation of {frequencies[~known][0]:g} Hz is not known, or nothing comes through"
+        text = f"its response at the excitation of {frequencies[~known][0]:g} Hz is not known, or nothing comes through"
         cure = "Extend filter_table, or check filter"
-        raise RigDataError(Problem("error", getattr(run, "file", ""), f"channel {name}", what, cure, run.id))
+        raise RigDataError(Problem("error", getattr(run, "file", ""), f"channel {name}", text, cure, run.id))
     return np.where(known, gain, 1.0)
 
 
@@ -188,6 +188,6 @@ def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:
     if share <= CLIPPED:
         return []
     unit = run.channels[name].unit
-    what = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"
+    text = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"
     cure = "Widen the channel's range and repeat the run; what was cut off cannot be had back"
-    return [Problem("error", run.file, f"channel {name}", what, cure, run.id)]
+    return [Problem("error", run.file, f"channel {name}", text, cure, run.id)]

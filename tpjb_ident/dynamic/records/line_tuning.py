@@ -138,8 +138,8 @@ def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
     """
     by_runout = speeds_from_runout(result, rate)
     speeds, doubt = (result.speeds, 0.0) if by_runout is None else by_runout
-    known = speeds[np.isfinite(speeds)]
-    if len(known) < 2 or np.ptp(known) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
+    finite_values = speeds[np.isfinite(speeds)]
+    if len(finite_values) < 2 or np.ptp(finite_values) / 2 <= max(MAX_WINDOW_SLIP / result.length, 4 * doubt):
         return None
     good = np.isfinite(speeds)
     return ShaftCourse(result.start[good] + 0.5 * result.length, speeds[good])

@@ -180,8 +180,8 @@ def _by_window(values: FloatArray) -> FloatArray:
 
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale, X and Y; infinite where none has; `scale` (n_windows, 2)."""
-    known = scale[np.isfinite(scale).all(axis=1)]
-    return np.median(known, axis=0) if len(known) else np.full(2, np.inf)
+    finite_values = scale[np.isfinite(scale).all(axis=1)]
+    return np.median(finite_values, axis=0) if len(finite_values) else np.full(2, np.inf)
 
 
 def _mean_of_present(rows: FloatArray) -> FloatArray:
@@ -216,5 +216,5 @@ def fit_uneven(values: FloatArray, time: FloatArray, frequencies: FloatArray, or
 
 def _refit(design: FloatArray, values: FloatArray, usual: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Fit one window without its glitches: coefficients (2, n_columns), residual scale (2,), share of samples lost."""
-    found = fit_without_glitches(design, values, usual)
-    return found.coefficients, found.scale, found.lost
+    robust_lines = fit_without_glitches(design, values, usual)
+    return robust_lines.coefficients, robust_lines.scale, robust_lines.lost

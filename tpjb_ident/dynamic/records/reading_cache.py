@@ -53,8 +53,10 @@ class ShortRecord:
         """As the run's own."""
         if self._speed is None:
             self._speed = (self._run.speed(0, self.length),)
-        (kept,) = self._speed
-        return None if kept is None else replace(kept, values=kept.values[start:stop], time=kept.time[start:stop])
+        (record,) = self._speed
+        return (
+            None if record is None else replace(record, values=record.values[start:stop], time=record.time[start:stop])
+        )
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:
         """Rows of what is kept."""

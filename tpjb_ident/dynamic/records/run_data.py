@@ -96,8 +96,8 @@ class RunPhasors:
     @property
     def blocks(self) -> dict[str, PhasorBlock]:
         """What was measured, by quantity."""
-        found = {"displacement": self.displacement, "force": self.cell_force, "acceleration": self.acceleration}
-        return {quantity: block for quantity, block in found.items() if block is not None}
+        table = {"displacement": self.displacement, "force": self.cell_force, "acceleration": self.acceleration}
+        return {quantity: block for quantity, block in table.items() if block is not None}
 
     def changed(self, change: Callable[[str, ComplexArray], ComplexArray]) -> RunPhasors:
         """The run with other phasors."""

@@ -26,12 +26,12 @@ def run_phasors(run: MeasuredRun, housing_mass: float, settings: PhasorSettings 
     settings = settings or PhasorSettings()
     kind = getattr(run, "excitation_kind", "sine")
     if kind != "sine":
-        what = f"is excited by {kind}; coefficients come from sines, one frequency per run"
+        text = f"is excited by {kind}; coefficients come from sines, one frequency per run"
         cure = "Excite with sines, or leave the run out"
-        raise RigDataError(Problem("error", getattr(run, "file", ""), "excitation", what, cure, run.id))
-    slower, told = inspect_readings(run)
+        raise RigDataError(Problem("error", getattr(run, "file", ""), "excitation", text, cure, run.id))
+    slower, conditions = inspect_readings(run)
     result = compensated(_fitted(run, housing_mass, settings), run, slower)
-    return replace(result, conditions=merged(result.conditions, told)) if told else result
+    return replace(result, conditions=merged(result.conditions, conditions)) if conditions else result
 
 
 def _fitted(run: MeasuredRun, housing_mass: float, settings: PhasorSettings) -> RunPhasors:

@@ -87,8 +87,8 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
             turns = _by_first_line(phasors, line.frequency / n)
         if turns is None:
             continue
-        known = turns[np.isfinite(turns)]
-        mean = complex(np.sum(known**n)) / max(len(known), 1)
+        finite_values = turns[np.isfinite(turns)]
+        mean = complex(np.sum(finite_values**n)) / max(len(finite_values), 1)
         if abs(mean) > LOCKED:
             found[i] = mean / abs(mean)
     return found

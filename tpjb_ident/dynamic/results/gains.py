@@ -68,8 +68,8 @@ def _of_sweep(run: Run) -> list[SweptProbe]:
         if name not in readings:
             continue
         values = readings[name]
-        known = values[np.isfinite(values)]
-        low, high = np.quantile(known, [0.01, 0.99]) if len(known) >= FEWEST else (np.nan, np.nan)
+        finite_values = values[np.isfinite(values)]
+        low, high = np.quantile(finite_values, [0.01, 0.99]) if len(finite_values) >= FEWEST else (np.nan, np.nan)
         centre = swept_centre(load, values) if load is not None and len(load) == len(values) else None
         found.append(SweptProbe(run.id, name, 0.5 * float(high - low), centre))
     return found
@@ -106,21 +106,23 @@ def with_probe_doubts(
     """
     if clearance is None or not clearance > 0:
         return tuple(points)
-    said = [*_sweeps(sweeps, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
-    if not said:
+    sentences = [*_sweeps(sweeps, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
+    if not sentences:
         return tuple(points)
     cure = "is the probes' sensitivity right in the manifest?"
-    doubt = Condition("probes-contradict-clearance", f"{'; '.join(said)} (clearance {1e6 * clearance:.0f} um): {cure}")
+    doubt = Condition(
+        "probes-contradict-clearance", f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
+    )
     return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
 
 
 def _sweeps(sweeps: Sequence[SweptProbe], clearance: float) -> list[str]:
-    said: dict[str, str] = {}
+    table: dict[str, str] = {}
     for probe in sweeps:
         if probe.half_travel <= TRAVEL[0] * clearance or probe.half_travel >= TRAVEL[1] * clearance:
             um = 1e6 * probe.half_travel
-            said[probe.name] = f"{probe.name} travels {um:.3g} um to either side in the sweep {probe.run}"
-    return list(said.values())
+            table[probe.name] = f"{probe.name} travels {um:.3g} um to either side in the sweep {probe.run}"
+    return list(table.values())
 
 
 def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
@@ -132,16 +134,16 @@ def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
 
 
 def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
-    found = []
+    soft_points = []
     for p in points:
         load, direction = p.point.static_load, p.point.static_load_direction
         along = np.array([np.cos(direction), np.sin(direction)])
         stiffness = float(along @ p.stiffness.k @ along)
         if load > 0 and 0 < stiffness < LEAST_STIFF * load / clearance:
-            found.append((stiffness * clearance / load, load, stiffness))
-    if not found:
+            soft_points.append((stiffness * clearance / load, load, stiffness))
+    if not soft_points:
         return []
-    _, load, stiffness = min(found)
+    _, load, stiffness = min(soft_points)
     return [
         f"{load / 1e3:g} kN on a stiffness of {stiffness / 1e6:.3g} MN/m would move the shaft by more than "
         f"{1e6 * load / stiffness:.3g} um"
@@ -164,8 +166,8 @@ def channel_pairs(campaign: Campaign, sweeps: Sequence[SweptProbe] = ()) -> Pair
 
 
 def _centre(sweeps: Sequence[SweptProbe], probe: str) -> float | None:
-    known = [sweep.centre for sweep in sweeps if sweep.name == probe and sweep.centre is not None]
-    return float(np.median(known)) if known else None
+    centres = [sweep.centre for sweep in sweeps if sweep.name == probe and sweep.centre is not None]
+    return float(np.median(centres)) if centres else None
 
 
 def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
@@ -176,22 +178,22 @@ def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
     if pairs is None:
         return ()
     medians = [_medians(data, k) for k in range(len(data.runs))]
-    kept = [k for k, values in enumerate(medians) if all(np.isfinite(v).all() for v in values)]
-    if not kept:
+    complete = [k for k, values in enumerate(medians) if all(np.isfinite(v).all() for v in values)]
+    if not complete:
         return ()
-    found = wrong_gains(_readings(data, [medians[k] for k in kept], kept, pairs))
+    gains = wrong_gains(_readings(data, [medians[k] for k in complete], complete, pairs))
     doubts = []
-    for one in sorted(found, key=lambda f: f.run):
-        names = [pairs.names[i] for i in one.channels]
-        doubts.append(f"{data.runs[kept[one.run]].run}: {names[0]} {gain_in_words(one, names)}")
+    for gain in sorted(gains, key=lambda f: f.run):
+        names = [pairs.names[i] for i in gain.channels]
+        doubts.append(f"{data.runs[complete[gain.run]].run}: {names[0]} {gain_in_words(gain, names)}")
     return (Condition(RUN_GAIN_OFF, "; ".join(doubts)),) if doubts else ()
 
 
 def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Displacement, cell force and oil force of one run, X and Y, medians over its windows; NaN where it has none."""
-    mine = data.run_index == k
+    selected = data.run_index == k
     run, line = data.runs[k], data.lines[k]
-    blocks = (data.D[mine], run.cell_force.phasors[:, line], data.F[mine])
+    blocks = (data.D[selected], run.cell_force.phasors[:, line], data.F[selected])
     good = np.logical_and.reduce([np.isfinite(block).all(axis=1) for block in blocks])
     if not good.any():
         nothing = np.full(2, np.nan + 0j)

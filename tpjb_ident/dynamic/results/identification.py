@@ -153,10 +153,10 @@ class Identification(Presented):
             for condition in () if band.points else band.quality:
                 place = f"{band.point.static_load / 1e3:g} kN, {band.kind}"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
-        for name, found in places.items():
-            others = len(found) - 1
+        for name, sentences in places.items():
+            others = len(sentences) - 1
             more = f" (and at {others} more point{'s' if others > 1 else ''})" if others else ""
-            remarks.append(f"{name} at {found[0]}{more}")
+            remarks.append(f"{name} at {sentences[0]}{more}")
         return tuple(remarks)
 
     def _groups(self) -> dict[int, LoadFits]:

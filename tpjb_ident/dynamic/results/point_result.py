@@ -99,18 +99,22 @@ def named_at_points(
     points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
 ) -> tuple[PointResult, ...]:
     """The points, each saying which of its runs were left out."""
-    return tuple(_named(point, [one.run for one in left if _same(one, point, any_excitation)]) for point in points)
+    return tuple(
+        _named(point, [excluded.run for excluded in left if _same(excluded, point, any_excitation)]) for point in points
+    )
 
 
 def lost_points(
     points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
 ) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
-    lost = [one for one in left if not any(_same(one, point, any_excitation) for point in points)]
-    places = dict.fromkeys(f"{one.point.static_load / 1e3:g} kN, {one.point.excitation_hz:g} Hz" for one in lost)
+    lost = [excluded for excluded in left if not any(_same(excluded, point, any_excitation) for point in points)]
+    places = dict.fromkeys(
+        f"{excluded.point.static_load / 1e3:g} kN, {excluded.point.excitation_hz:g} Hz" for excluded in lost
+    )
     if not places:
         return ()
-    runs = ", ".join(one.run for one in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
     return (Condition("point-lost", f"no usable run at {'; '.join(places)}: {runs}"),)
 
 
@@ -122,10 +126,10 @@ def _named(point: PointResult, runs: list[str]) -> PointResult:
 
 
 def _same(one: ExcludedRun, result: PointResult, any_excitation: bool) -> bool:
-    mine, other = one.point, result.point
-    alike = (mine.static_load, mine.static_load_direction_deg, mine.shaft_speed_hz) == (
-        other.static_load,
-        other.static_load_direction_deg,
-        other.shaft_speed_hz,
+    run_point, result_point = one.point, result.point
+    alike = (run_point.static_load, run_point.static_load_direction_deg, run_point.shaft_speed_hz) == (
+        result_point.static_load,
+        result_point.static_load_direction_deg,
+        result_point.shaft_speed_hz,
     )
-    return alike and (any_excitation or mine.excitation_hz == other.excitation_hz)
+    return alike and (any_excitation or run_point.excitation_hz == result_point.excitation_hz)

@@ -38,9 +38,9 @@ def amplitude(data: PointData, weights: FloatArray) -> float:
     """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]; `weights` (n,)."""
     largest = 0.0
     for i in range(len(data.runs)):
-        mine = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
-        if mine.any():
-            z = np.average(data.D[mine], axis=0, weights=weights[mine])
+        selected = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
+        if selected.any():
+            z = np.average(data.D[selected], axis=0, weights=weights[selected])
             sizes = np.linalg.svd(np.stack([z.real, z.imag]), compute_uv=False)
             largest = max(largest, float(sizes[0]))
     return largest
@@ -48,15 +48,15 @@ def amplitude(data: PointData, weights: FloatArray) -> float:
 
 def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
     """Windows without weight, each with the reason that shows in its own numbers; `h` (2, 2) [N/m], `weights` (n,)."""
-    found = []
+    verdicts = []
     answered = bool(np.isfinite(h).all())
     for i in np.flatnonzero(weights < REJECTED_WEIGHT):
         run = data.runs[data.run_index[i]]
         k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
         direction = float("nan") if run.direction is None else run.direction
         reason = _reason(data, run.displacement.lost[k], run.cell_force.lost[k], int(i), weights, answered)
-        found.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
-    return tuple(found)
+        verdicts.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
+    return tuple(verdicts)
 
 
 def _reason(data: PointData, lost_d: float, lost_f: float, i: int, weights: FloatArray, answered: bool) -> str:
@@ -85,20 +85,20 @@ def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
 
 def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
     """Conditions that the point's figures give rise to."""
-    found = []
+    conditions = []
     if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
-        found.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
-    found += _missing(data)
+        conditions.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
+    conditions += _missing(data)
     if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
-        found.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
-    return (*found, *feeds_motion(stiffness))
+        conditions.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
+    return (*conditions, *feeds_motion(stiffness))
 
 
 def _inertia_left(mass: float, omega: float) -> Condition:
     """What the housing's inertia may come to where nothing measures it: on soft cells."""
     share = mass * omega**2 / SOFT
-    told = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
-    return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", told)
+    text = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
+    return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", text)
 
 
 def _missing(data: PointData) -> list[Condition]:
@@ -108,8 +108,8 @@ def _missing(data: PointData) -> list[Condition]:
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
     if whole.mean() < 1 - MAX_LOST:
-        told = f"{int((~whole).sum())} of {len(whole)} windows gave no phasors"
-        return [Condition("most-windows-lost", told)]
+        text = f"{int((~whole).sum())} of {len(whole)} windows gave no phasors"
+        return [Condition("most-windows-lost", text)]
     if whole.mean() < 0.9:
         return [Condition("windows-missing", f"{int((~whole).sum())} of {len(whole)} windows gave no phasors")]
     return []
@@ -123,8 +123,8 @@ def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
     doubt = 3 * float(stiffness.standard_error[4:].max())
     if not np.linalg.eigvalsh((h - h.conj().T) / 2j)[0] < -doubt:
         return ()
-    told = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
-    return (Condition("negative-damping", told),)
+    text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
+    return (Condition("negative-damping", text),)
 
 
 def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:
@@ -140,8 +140,8 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     total = int(bad.sum())
     named = []
     for i, run in enumerate(data.runs):
-        mine = (data.run_index == i) & whole
-        n, hits = int(mine.sum()), int(bad[mine].sum())
+        selected = (data.run_index == i) & whole
+        n, hits = int(selected.sum()), int(bad[selected].sum())
         others = (total - hits + 0.5) / (int(whole.sum()) - n + 1.0)
         if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(others, 1.0)) < 1e-3:
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
@@ -158,20 +158,20 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, know
     good = data.whole & (weights > 0)
     shares, sizes = [], []
     for i in range(len(data.runs)):
-        mine = good & (data.run_index == i)
-        if mine.any():
+        selected = good & (data.run_index == i)
+        if selected.any():
             # repeats of one motion, whatever phase the drive had in each
-            gram = data.D[mine].conj().T @ data.D[mine]
+            gram = data.D[selected].conj().T @ data.D[selected]
             first = np.linalg.eigh(gram)[1][:, -1]
-            along = data.D[mine] @ first.conj()
-            rest = (data.F[mine] - data.D[mine] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
-            sizes.append(float(np.linalg.norm(data.F[mine], axis=1).mean()))
-            shares.append(float(np.linalg.norm(rest.mean(axis=0))) / sizes[-1])
+            along = data.D[selected] @ first.conj()
+            residual = (data.F[selected] - data.D[selected] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
+            sizes.append(float(np.linalg.norm(data.F[selected], axis=1).mean()))
+            shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
     if len(shares) < 3:
         return None
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
     if share <= np.hypot(MAX_DISAGREEMENT, KNOWN_SCATTERS * known / float(np.mean(sizes))):
         return None
-    told = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * MAX_DISAGREEMENT:.0f} %)"
-    return Condition("runs-disagree", told)
+    text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * MAX_DISAGREEMENT:.0f} %)"
+    return Condition("runs-disagree", text)

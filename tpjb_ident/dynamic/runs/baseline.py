@@ -29,11 +29,11 @@ class Baseline:
 
     def at(self, omega: float) -> tuple[ComplexArray, FloatArray] | None:
         """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them."""
-        known = np.array([est.omega for est in self.estimates])
-        if not len(known) or not 0.98 * known[0] <= omega <= 1.02 * known[-1]:
+        frequencies = np.array([est.omega for est in self.estimates])
+        if not len(frequencies) or not 0.98 * frequencies[0] <= omega <= 1.02 * frequencies[-1]:
             return None
-        k = int(np.clip(np.searchsorted(known, omega), 1, max(len(known) - 1, 1)))
-        if len(known) == 1:
+        k = int(np.clip(np.searchsorted(frequencies, omega), 1, max(len(frequencies) - 1, 1)))
+        if len(frequencies) == 1:
             return self.estimates[0].h, self.estimates[0].covariance
         low, high = self.estimates[k - 1], self.estimates[k]
         t = float(np.clip((omega - low.omega) / (high.omega - low.omega), 0.0, 1.0))
@@ -41,21 +41,21 @@ class Baseline:
 
     def taken_off(self, data: PointData) -> PointData:
         """The point's windows with the film's force alone."""
-        found = self.at(data.omega)
-        return data if found is None else replace(data, F=data.F - data.D @ found[0].T)
+        rig = self.at(data.omega)
+        return data if rig is None else replace(data, F=data.F - data.D @ rig[0].T)
 
     def missing(self, data: PointData) -> tuple[Condition, ...]:
         """Say where a campaign has a baseline, but not at a point's frequency."""
         if not self.estimates or self.at(data.omega) is not None:
             return ()
         low, high = (est.omega / (2 * np.pi) for est in (self.estimates[0], self.estimates[-1]))
-        told = f"measured from {low:g} to {high:g} Hz: at this excitation the rig's own stiffness is still inside"
-        return (Condition("baseline-missing", told),)
+        text = f"measured from {low:g} to {high:g} Hz: at this excitation the rig's own stiffness is still inside"
+        return (Condition("baseline-missing", text),)
 
     def spread(self, data: PointData) -> dict[str, FloatArray]:
         """Covariance (8, 8) that the baseline's own errors leave in H [N^2/m^2], by source."""
-        found = self.at(data.omega)
-        return {} if found is None else {"baseline": found[1]}
+        rig = self.at(data.omega)
+        return {} if rig is None else {"baseline": rig[1]}
 
 
 def measured_baseline(campaign: Campaign, settings: PhasorSettings, method: str) -> Baseline:
@@ -64,8 +64,8 @@ def measured_baseline(campaign: Campaign, settings: PhasorSettings, method: str)
     if not runs:
         return Baseline()
     points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])
-    found = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
-    good = sorted((est for est in found if np.isfinite(est.h).all()), key=lambda est: est.omega)
-    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in found if not np.isfinite(est.h).all()]
-    told = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
-    return Baseline(tuple(good), (Condition("baseline-missing", told),) if bad else ())
+    estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
+    good = sorted((est for est in estimates if np.isfinite(est.h).all()), key=lambda est: est.omega)
+    bad = [f"{est.omega / (2 * np.pi):g} Hz" for est in estimates if not np.isfinite(est.h).all()]
+    text = f"the baseline runs at {', '.join(bad)} give no answer: two directions are needed"
+    return Baseline(tuple(good), (Condition("baseline-missing", text),) if bad else ())

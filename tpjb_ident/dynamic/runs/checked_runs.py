@@ -17,7 +17,7 @@ CONTRADICTED, DOUBTFUL = "records-contradicted", "records-doubtful"
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     """Judge all finished runs beside each other; those with an error of their own are left out."""
-    seen = [one for digest in finished.digests for one in digest.seen]
+    seen = [observation for digest in finished.digests for observation in digest.seen]
     if not seen:  # runs that are no files
         return Verdicts()
     found = campaign_verdicts(campaign, seen)
@@ -27,9 +27,9 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     return found
 
 
-def campaign_verdicts(campaign: Campaign, seen: Sequence[Observation]) -> Verdicts:
+def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
     """What the checks say of dynamic runs beside each other, by run."""
-    found = verdicts([one.report for one in judged(campaign, seen)])
+    found = verdicts([observation.report for observation in judged(campaign, observations)])
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in found.shared.items():

@@ -61,12 +61,12 @@ class ClockRates:
         """What to say of it at every point."""
         if not (self.force or self.acceleration):
             return ()
-        told = [f"cells {1e6 * self.force:+.1f} ppm (standard error {1e6 * self.error:.1f})"] if self.force else []
-        told += [f"accelerometers {1e6 * self.acceleration:+.1f} ppm"] if self.acceleration else []
+        text = [f"cells {1e6 * self.force:+.1f} ppm (standard error {1e6 * self.error:.1f})"] if self.force else []
+        text += [f"accelerometers {1e6 * self.acceleration:+.1f} ppm"] if self.acceleration else []
         return (
             Condition(
                 "clocks-differ",
-                f"against the probes' clock: {', '.join(told)}; put right from the start of each record on",
+                f"against the probes' clock: {', '.join(text)}; put right from the start of each record on",
             ),
         )
 
@@ -74,16 +74,16 @@ class ClockRates:
 def rate_samples(data: PointData) -> RateSamples:
     """What the runs of one point show of the clocks."""
     cells = data.F - data.mass * data.A
-    found: dict[str, list[FloatArray]] = {"force": [], "acceleration": []}
+    table: dict[str, list[FloatArray]] = {"force": [], "acceleration": []}
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
-        mine = data.run_index == i
+        selected = data.run_index == i
         omega = 2 * np.pi * run.lines.excitation[line].frequency
-        for name, z in (("force", cells[mine]), ("acceleration", data.A[mine])):
-            told = _drift(z, data.D[mine], run.start)
+        for name, z in (("force", cells[selected]), ("acceleration", data.A[selected])):
+            told = _drift(z, data.D[selected], run.start)
             if told is not None:
                 span = run.start[-1] - run.start[0] + run.length
-                found[name].append(np.array([told[0] / omega, told[1] / omega, told[0] * span]))
-    return RateSamples(*(np.array(found[name]).reshape(-1, 3) for name in ("force", "acceleration")))
+                table[name].append(np.array([told[0] / omega, told[1] / omega, told[0] * span]))
+    return RateSamples(*(np.array(table[name]).reshape(-1, 3) for name in ("force", "acceleration")))
 
 
 def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, float] | None:
@@ -99,10 +99,10 @@ def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, 
     for _ in range(5):
         design = np.stack([np.ones_like(middle), middle], axis=1) * np.sqrt(weight)[:, None]
         found = np.linalg.lstsq(design, phase * np.sqrt(weight), rcond=None)[0]
-        rest = np.abs(phase - found[0] - found[1] * middle)
-        scale = 1.4826 * float(np.median(rest)) + 1e-15
-        weight = np.minimum(1.0, 2.0 * scale / np.maximum(rest, 1e-300))
-    spread = float(np.sum(weight * rest**2) / max(float(weight.sum()) - 2.0, 1.0))
+        residual = np.abs(phase - found[0] - found[1] * middle)
+        scale = 1.4826 * float(np.median(residual)) + 1e-15
+        weight = np.minimum(1.0, 2.0 * scale / np.maximum(residual, 1e-300))
+    spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
     return float(found[1]), float(np.sqrt(spread / np.sum(weight * middle**2)) + 1e-15)
 
 

@@ -36,6 +36,6 @@ def named_runs(left: Sequence[ExcludedRun], of: int) -> tuple[Condition, ...]:
     """What the campaign has to say: which of its `of` dynamic runs take no part, and why."""
     if not left:
         return ()
-    listed = "; ".join(f"{one.run} ({one.reason})" for one in left[:LISTED])
+    listed = "; ".join(f"{excluded.run} ({excluded.reason})" for excluded in left[:LISTED])
     more = f"; and {len(left) - LISTED} more" if len(left) > LISTED else ""
     return (Condition("runs-left-out", f"{len(left)} of {of} dynamic runs take no part: {listed}{more}"),)

@@ -182,8 +182,8 @@ class FinishedRuns:
             return self._memory[index]
         run, mark = self._runs[index], self._marks.get(index, "")
         store = self._store if mark and self._store is not None else self._own()
-        found = store.load(run, mark or _OWN, self._mass)
-        return _slim((found or self._again(run)).phasors)
+        result = store.load(run, mark or _OWN, self._mass)
+        return _slim((result or self._again(run)).phasors)
 
     def _own(self) -> RunStore:
         if self._folder is None:

@@ -120,15 +120,15 @@ def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> floa
 
 def mean_temperatures(run: Run) -> dict[int, float]:
     """Mean temperature per pad over a run [K]; pads with several sensors give their mean."""
-    found: dict[int, list[float]] = {}
+    table: dict[int, list[float]] = {}
     for sensor in run.temperatures():
         if sensor.pad is None:
             continue
         values = run.record(sensor.name, 0, TEMPERATURE_SAMPLES).values
-        known = values[np.isfinite(values)]
-        if len(known):
-            found.setdefault(sensor.pad, []).append(float(known.mean()))
-    return {pad: float(np.mean(values)) for pad, values in sorted(found.items())}
+        finite_values = values[np.isfinite(values)]
+        if len(finite_values):
+            table.setdefault(sensor.pad, []).append(float(finite_values.mean()))
+    return {pad: float(np.mean(values)) for pad, values in sorted(table.items())}
 
 
 def pad_means(runs: Sequence[dict[int, float]]) -> dict[int, float]:

@@ -139,14 +139,14 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
     """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
     beginning = beginning_of(kept)
-    found = [line.frequency for line in phasors.lines.excitation]
+    observations = [line.frequency for line in phasors.lines.excitation]
     if beginning is None:
         return ()
-    if len(found) == 1:
-        point = replace(run.point, excitation=2 * np.pi * found[0])
+    if len(observations) == 1:
+        point = replace(run.point, excitation=2 * np.pi * observations[0])
         return (of_run(observe(replace(beginning, point=point)), run),)
-    points = [point_of(run.point, frequency) for frequency in found]
-    return tuple(of_run(observe(replace(beginning, point=p), found), replace(run, point=p)) for p in points)
+    points = [point_of(run.point, frequency) for frequency in observations]
+    return tuple(of_run(observe(replace(beginning, point=p), observations), replace(run, point=p)) for p in points)
 
 
 def _mended(run: Run) -> tuple[Condition, ...]:
@@ -185,10 +185,10 @@ def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
 
 def _silent(block: PhasorBlock, axis: float) -> bool:
     """Whether no window shows any line along an axis; False where no window shows anything at all."""
-    known = np.isfinite(block.phasors).all(axis=(1, 2))
-    if not known.any():
+    finite = np.isfinite(block.phasors).all(axis=(1, 2))
+    if not finite.any():
         return False
-    vector, mean = block.phasors[known], block.mean[known]
+    vector, mean = block.phasors[finite], block.mean[finite]
     along = np.array([np.cos(axis), np.sin(axis)])
     size = float(np.abs(vector @ along).max())
     return size <= max(NOTHING * float(np.abs(vector).max()), ROUNDING * float(np.abs(mean).max()))

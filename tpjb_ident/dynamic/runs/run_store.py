@@ -77,8 +77,8 @@ class RunStore:
 
     def known(self, run_id: str) -> str:
         """Fingerprint under which a run is kept, "" if it is not."""
-        found = self._read(run_id)
-        return "" if found is None else str(found[0]["fingerprint"])
+        stored = self._read(run_id)
+        return "" if stored is None else str(stored[0]["fingerprint"])
 
     def _read(self, run_id: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
         try:
@@ -105,7 +105,7 @@ class RunStore:
             "lines": _packed_lines(phasors.lines),
             "conditions": _packed_conditions(phasors.conditions),
             "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
-            "seen": [packed(seen) for seen in result.seen],
+            "seen": [packed(observation) for observation in result.seen],
         }
         text = np.array(json.dumps(meta))
         with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
@@ -114,10 +114,10 @@ class RunStore:
 
     def load(self, run: Run, mark: str, housing_mass: float) -> RunResult | None:
         """Give a kept run back; None if it is not there, or not under this fingerprint."""
-        found = self._read(run.id)
-        if not mark or found is None or found[0]["fingerprint"] != mark:
+        stored = self._read(run.id)
+        if not mark or stored is None or stored[0]["fingerprint"] != mark:
             return None
-        meta, arrays = found
+        meta, arrays = stored
         blocks = {
             name: PhasorBlock(*(arrays[f"{name}.{part}"] for part in _PARTS))
             for name in _BLOCKS
@@ -138,7 +138,7 @@ class RunStore:
             _unpacked_conditions(meta["conditions"]),
             arrays["shaft_phase"],
         )
-        seen = tuple(unpacked(each, run) for each in meta["seen"])
+        seen = tuple(unpacked(entry, run) for entry in meta["seen"])
         return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)
 
     def clear(self) -> None:
@@ -174,24 +174,28 @@ def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
     )
 
 
-def of_run(seen: Observation, run: Run) -> Observation:
+def of_run(observation: Observation, run: Run) -> Observation:
     """The same observation, of `run` in place of the one that was looked at: what that kept in memory may go."""
-    return replace(seen, run=run, report=Reporter(run, list(seen.report.found), set(seen.report.doubts)))
+    return replace(
+        observation, run=run, report=Reporter(run, list(observation.report.found), set(observation.report.doubts))
+    )
 
 
-def packed(seen: Observation) -> dict[str, Any]:
+def packed(observation: Observation) -> dict[str, Any]:
     """What JSON can hold; samples are left out, dynamic runs have none."""
-    lines = None if seen.lines is None else {name: _plain(value) for name, value in vars(seen.lines).items()}
+    lines = (
+        None if observation.lines is None else {name: _plain(value) for name, value in vars(observation.lines).items()}
+    )
     return {
-        "excitation": seen.run.point.excitation,
-        "channels": [c.name for c in seen.channels],
+        "excitation": observation.run.point.excitation,
+        "channels": [c.name for c in observation.channels],
         "lines": lines,
-        "spread": seen.spread.tolist(),
-        "other_line": seen.other_line,
-        "speed": seen.speed,
-        "digest": seen.digest,
-        "found": [[asdict(f.problem), f.key] for f in seen.report.found],
-        "doubts": sorted(seen.report.doubts),
+        "spread": observation.spread.tolist(),
+        "other_line": observation.other_line,
+        "speed": observation.speed,
+        "digest": observation.digest,
+        "found": [[asdict(f.problem), f.key] for f in observation.report.found],
+        "doubts": sorted(observation.report.doubts),
     }
 
 
@@ -201,7 +205,7 @@ def unpacked(stored: Mapping[str, Any], run: Run) -> Observation:
         run = replace(run, point=replace(run.point, excitation=stored["excitation"]))
     channels = tuple(run.channels[name] for name in stored["channels"])
     lines = stored["lines"]
-    found = [Finding(Problem(**problem), key) for problem, key in stored["found"]]
+    observation = [Finding(Problem(**problem), key) for problem, key in stored["found"]]
     return Observation(
         run=run,
         channels=channels,
@@ -211,7 +215,7 @@ def unpacked(stored: Mapping[str, Any], run: Run) -> Observation:
         samples=np.empty((0, len(channels))),
         speed=stored["speed"],
         digest=stored["digest"],
-        report=Reporter(run, found, set(stored["doubts"])),
+        report=Reporter(run, observation, set(stored["doubts"])),
     )
 
 

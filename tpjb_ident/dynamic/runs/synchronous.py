@@ -44,10 +44,10 @@ def without_shaft(data: PointData) -> PointData:
     design = np.concatenate([z[:, :2] / scale, s[:, None]], axis=1)
     found = np.linalg.lstsq(design, z[:, 2:], rcond=None)[0]
     r = -np.linalg.solve(found[:2].T / scale, found[2])
-    told = f"{n}X as of {1e6 * np.linalg.norm(r):.3g} um of runout, by the shaft's phase in {len(s)} runs"
+    text = f"{n}X as of {1e6 * np.linalg.norm(r):.3g} um of runout, by the shaft's phase in {len(s)} runs"
     # taken off the displacements: what the load does to H acts on the motion without it
     moved = data.D - s[data.run_index][:, None] * r
-    return replace(_saying(data, name, Condition(FITTED, told)), D=moved, shaft=s)
+    return replace(_saying(data, name, Condition(FITTED, text)), D=moved, shaft=s)
 
 
 def without_synchronous(data: PointData) -> PointData:
@@ -58,9 +58,9 @@ def without_synchronous(data: PointData) -> PointData:
     if data.shaft is None:
         return data
     rows = [_whole(data, i) for i in range(len(data.runs))]
-    count = min(len(each) for each in rows)
+    count = min(len(row) for row in rows)
     combine = np.linalg.svd(data.shaft[None, :])[2][1:].conj()
-    picked = np.array([each[:count] for each in rows])
+    picked = np.array([row[:count] for row in rows])
 
     def combined(z: ComplexArray) -> ComplexArray:
         return np.asarray(np.einsum("ji,iwk->jwk", combine, z[picked]).reshape(-1, 2))
