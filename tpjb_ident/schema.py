@@ -129,8 +129,6 @@ _ESTIMATES = (
     Column("inertia_corrected", "truth value", "", "whether the housing's inertia was added to the cells' force"),
     Column("baseline_subtracted", "truth value", "", "whether a rig without bearing was taken off"),
     Column("frequency_model", "text", "", "what the load's frequencies support: K-C, K-C-M, raw H, or a single line"),
-    Column("frequency_chi_square", "number", "", "of that model"),
-    Column("frequency_dof", "count", "", "its degrees of freedom"),
     *_position(("_se",)),
     Column("temperature_N_K", "temperature", "K", "mean film temperature of pad N"),
 )

@@ -84,8 +84,15 @@ def test_answers_without_an_interval_have_the_shape_of_one(method):
         assert np.isnan(est.dof).all()
         assert est.half_width().shape == (8,)
     assert np.isfinite(two.h).all()
+    assert "no-residual" in two.status
     np.testing.assert_array_equal(two.weights, np.ones((2, 2)))
     np.testing.assert_array_equal(none.weights, np.zeros((1, 2)))
+
+
+def test_two_directions_are_used_with_a_word_of_warning():
+    est = estimate_dynamic_stiffness(*_with_omega(windows(5, g=2, noise=2e-3)))
+    assert "no-spare-direction" in est.status
+    np.testing.assert_allclose(est.h, H, atol=0.02)
 
 
 def test_instruments_that_are_missing_are_named():

@@ -195,7 +195,9 @@ def test_columns_are_phasors_and_a_straight_drift():
 
 def test_inflation_is_the_variance_of_a_phasor_over_that_of_the_line_alone():
     """One line over whole cycles: one; a neighbour half a beat away: from the Gram matrix of both."""
-    assert variance_inflation(np.array([20.0]), 1, 1.0, 1000.0) == pytest.approx(1.0, abs=0.02)
+    for alone in ([20.0], [25.0, 20.0]):
+        assert variance_inflation(np.array(alone), 1, 1.0, 1000.0) == pytest.approx(1.0, abs=0.02)
+    assert variance_inflation(np.array([25.0, 25.0]), 1, 1.0, 1000.0) == math.inf
     frequencies, length = np.array([20.0, 21.3, 33.0]), 0.5
     design = line_design(np.arange(500) / 1000.0, frequencies)
     covariance = np.linalg.inv(design.T @ design) * 500 / 2

@@ -142,11 +142,6 @@ def test_a_record_too_short_is_refused_with_the_length_it_takes():
         plan_windows(60_000, RATE, close, WindowSettings(length=0.3))
 
 
-def test_inflation_of_orthogonal_lines_is_one_and_of_one_line_twice_is_infinite():
-    assert variance_inflation(np.array([25.0, 20.0]), 1, 1.0, RATE) == pytest.approx(1.0, abs=2e-2)
-    assert np.isinf(variance_inflation(np.array([25.0, 25.0]), 1, 1.0, RATE))
-
-
 def test_inertia_is_added_to_the_cell_force():
     f = oil_force(np.array([[100.0 + 0j, 0.0]]), np.array([[-0.5 + 0j, 2.0]]), 30.0)
     np.testing.assert_allclose(f, [[85.0, 60.0]])

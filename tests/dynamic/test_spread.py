@@ -444,12 +444,6 @@ def test_directions_that_were_heard_in_part_or_are_too_short_are_left_as_they_ar
     np.testing.assert_array_equal(windows_used_again(short, rejected(short, [3])), rejected(short, [3]))
 
 
-def test_information_of_unit_weights_is_the_gram_matrix():
-    D = complex_normal(np.random.default_rng(5), 9, 2)
-    inverse = np.broadcast_to(np.eye(2, dtype=complex), (9, 2, 2))
-    np.testing.assert_allclose(information(D, D, inverse), np.kron(np.eye(2), D.conj().T @ D), atol=1e-12)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("q", "enough"), [(1, 8), (2, 8), (3, 10), (4, 12)])
 def test_a_robust_fit_takes_two_windows_more_than_twice_what_a_core_must_hold(q, enough):
@@ -486,6 +480,7 @@ def test_a_fit_that_is_not_left_to_settle_says_so():
     label = np.arange(40) % 5
     endless = mm_fit(X, Y, label, tolerance=-1.0)
     assert endless.iterations == 200
+    assert mm_fit(X, Y, label, tolerance=1e9).iterations == 1
     assert endless.conditions == ("iteration-limit",)
     fine, rough = mm_fit(X, Y, label), mm_fit(X, Y, label, tolerance=1e-3)
     assert 1 <= rough.iterations < fine.iterations < 100
@@ -502,34 +497,6 @@ def test_six_tenths_of_a_direction_must_agree(spoilt, heard):
     F[odd] += 4.0 * np.exp(2j * np.pi * np.arange(spoilt) / spoilt)[:, None]
     weights = windows_used_again(dataclasses.replace(table, F=F), rejected(table, [3]))
     assert bool(weights[table.direction == 3].sum() >= 7) is heard
-
-
-@pytest.mark.parametrize("discord", [0.0, 0.3])
-@pytest.mark.parametrize(("factor", "heard"), [(0.97, True), (1.03, False)])
-def test_how_far_off_a_direction_may_lie(discord, factor, heard):
-    """An F test at one in ten thousand: twice the others' noise of a mean, as far as they themselves disagree."""
-    from scipy.stats import f as fisher_f
-
-    table = exact_repeats(23, g=7, n=12)
-    rng = np.random.default_rng(24)
-    noise_D = 1e-3 * complex_normal(rng, 7, 12, 2)
-    D = table.D + (noise_D - noise_D.mean(axis=1, keepdims=True)).reshape(-1, 2)
-    F = table.F + 0.1 * discord * complex_normal(rng, 7, 2)[table.direction]
-    table = dataclasses.replace(table, D=D, F=F)
-    weights = rejected(table, [3])
-    others = repeats(table, weights)
-    fit = eiv_fit(others)
-    assert (fit.chi_square > 1.5) is (discord > 0)
-    mine = table.direction == 3
-    A = np.concatenate([-fit.h, np.eye(2)], axis=1)
-    spread = 2.0 * max(fit.chi_square, 1.0) * (A @ others.noise @ A.conj().T) / 12
-    limit = float(fisher_f.isf(1e-4, 4, 4.0 * (6 - 2)))
-    aim = np.array([1.0, 0.5j])
-    reach = np.sqrt(2.0 * limit / (aim.conj() @ np.linalg.solve(spread, aim)).real)
-    exact = fit.h @ D[mine].mean(axis=0) - F[mine].mean(axis=0)
-    placed = dataclasses.replace(table, F=F + np.outer(mine, exact + factor * reach * aim))
-    found = windows_used_again(placed, weights)
-    assert bool(found[mine].sum() > 8) is heard
 
 
 def test_chi_square_of_directions_is_against_the_noise_within_them():
@@ -567,13 +534,6 @@ def test_a_tight_core_in_every_direction_is_heard_against_a_scattered_majority()
     start = robust_start(Regression(X, Y), label, 1)
     np.testing.assert_allclose(start.coefficients, H, atol=0.03)
     assert np.trace(start.scatter).real < 10 * 2 * 0.01**2
-
-
-def test_one_step_is_counted_as_one():
-    rng = np.random.default_rng(22)
-    X = complex_normal(rng, 40, 2)
-    Y = X @ H.T + 0.1 * complex_normal(rng, 40, 2)
-    assert mm_fit(X, Y, np.arange(40) % 5, tolerance=1e9).iterations == 1
 
 
 def test_who_is_looked_at_once_more_and_who_can_judge():

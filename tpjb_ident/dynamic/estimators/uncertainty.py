@@ -38,15 +38,9 @@ class DirectionMeans:
         return len(self.count)
 
 
-def complex_to_real_covariance(hermitian: ComplexArray, pseudo: ComplexArray | None = None) -> FloatArray:
-    """Covariance of [Re h, Im h] from E[e e^H] and E[e e^T], (2 m, 2 m); `hermitian` (m, m), `pseudo` (m, m)."""
-    P = np.zeros_like(hermitian) if pseudo is None else pseudo
-    real = 0.5 * np.block(
-        [
-            [(hermitian + P).real, (P - hermitian).imag],
-            [(P + hermitian).imag, (hermitian - P).real],
-        ]
-    )
+def complex_to_real_covariance(hermitian: ComplexArray) -> FloatArray:
+    """Covariance of [Re h, Im h] from E[e e^H] of circular errors, (2 m, 2 m); `hermitian` (m, m)."""
+    real = 0.5 * np.block([[hermitian.real, -hermitian.imag], [hermitian.imag, hermitian.real]])
     return 0.5 * (real + real.T)  # rounding apart, it is symmetric
 
 

@@ -16,6 +16,11 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 
+#: How far the mains and the shaft's speed may be from what is stated [Hz].
+MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
+#: Harmonics of the shaft that are named where they coincide with the excitation.
+NAMED_HARMONICS = 3
+
 
 @dataclass(frozen=True)
 class Line:
@@ -54,12 +59,9 @@ class LineSettings:
     """Which disturbing lines to expect."""
 
     mains: float = 50.0
-    mains_wander: float = 0.15
-    speed_wander: float = 0.08
     shaft_harmonics: int = 2
     drive_harmonics: int = 2
     mains_harmonics: int = 1
-    named_harmonics: int = 3
 
 
 def known_lines(
@@ -80,9 +82,9 @@ def known_lines(
     conditions: list[Condition] = []
     nuisance: list[Line] = []
     others = [Line("found", f, 1e-6) for f in extra]
-    for n in range(settings.shaft_harmonics + 1, settings.named_harmonics + 1):
+    for n in range(settings.shaft_harmonics + 1, NAMED_HARMONICS + 1):
         line = Line(f"{n}X", n * speed)
-        coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * settings.speed_wander]
+        coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * SPEED_DRIFT]
         conditions += [_on_excitation(line, e) for e in coincident[:1]]
     for line in _candidates(driven, speed, settings) + others:
         if not 0.0 < line.frequency < top:
@@ -96,16 +98,12 @@ def known_lines(
 
 
 def _candidates(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
-    shaft = [
-        Line(f"{n}X", n * speed, n * settings.speed_wander if n > 1 else settings.speed_wander)
-        for n in range(1, settings.shaft_harmonics + 1)
-        if speed > 0
-    ]
+    shaft = [Line(f"{n}X", n * speed, n * SPEED_DRIFT) for n in range(1, settings.shaft_harmonics + 1) if speed > 0]
     drive = [
         Line(f"harmonic {n}", n * e.frequency, 1e-6) for e in driven for n in range(2, settings.drive_harmonics + 1)
     ]
     mains = [
-        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, settings.mains_wander)
+        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT)
         for n in range(1, settings.mains_harmonics + 1)
         if settings.mains > 0
     ]

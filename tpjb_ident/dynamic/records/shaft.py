@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run, pulse_times
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import LineSettings
+from tpjb_ident.dynamic.records.lines import NAMED_HARMONICS, SPEED_DRIFT
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 
 #: Samples from which the speed of the run is taken.
@@ -65,9 +65,8 @@ def window_speeds(speed: FloatArray | None, count: int, nominal: float) -> Float
 
 def shaft_order(frequency: float, speed: float) -> int:
     """Harmonic of the shaft that an excitation stands on; 0 where it stands on none."""
-    settings = LineSettings()
     n = round(frequency / speed) if speed > 0 else 0
-    near = 0 < n <= settings.named_harmonics and abs(frequency - n * speed) <= n * settings.speed_wander
+    near = 0 < n <= NAMED_HARMONICS and abs(frequency - n * speed) <= n * SPEED_DRIFT
     return n if near else 0
 
 

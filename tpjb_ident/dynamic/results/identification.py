@@ -197,7 +197,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None)
         attenuation=float(est.attenuation[0]),
         inertia_corrected=p.inertia_corrected,
         baseline_subtracted="baseline" in p.budget,
-        **_model_columns(group),
+        frequency_model="single line" if group is None else group.supported,
         x_m=p.position[0],
         y_m=p.position[1],
         x_m_se=p.position_se[0],
@@ -205,16 +205,6 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None)
     )
     row.update({f"temperature_{pad}_K": value for pad, value in p.temperatures.items()})
     return row
-
-
-def _model_columns(group: LoadFits | None) -> dict[str, Any]:
-    """Which model over frequency the data of the point's load support, and its chi-square."""
-    fit = None if group is None else group.fits.get(group.supported)
-    return {
-        "frequency_model": "single line" if group is None else group.supported,
-        "frequency_chi_square": np.nan if fit is None else fit.chi_square,
-        "frequency_dof": 0 if fit is None else fit.dof,
-    }
 
 
 def _fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
