@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rigdata import load_campaign
+from tests.dynamic.phasor_cases import FILM_H as H
+from tests.dynamic.phasor_cases import point_of, run
 from tests.dynamic.test_figures import stiff
-from tests.dynamic.test_quality import H, point_of, run
 from tests.rigs.campaign_file import plans_of, write_campaign
 from tests.rigs.closed_form_bearing import Bearing
 from tests.rigs.field_rig import Rig

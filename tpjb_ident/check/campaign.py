@@ -135,14 +135,14 @@ def _files(campaign: Campaign) -> list[str]:
     known = {p.resolve() for p in campaign.files.values()}
     records = [p for n, p in campaign.files.items() if n not in {"campaign.toml", campaign.bearing_name}]
     suffixes = {p.suffix.lower() for p in records}
-    sentences: list[Path] = []
+    unlisted: list[Path] = []
     for folder in sorted({p.parent for p in records}):
         try:
             beside = list(itertools.islice(folder.iterdir(), _MAX_LOOKED_AT))
         except OSError:  # the folder is not there: the runs themselves say so
             continue
-        sentences += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
-    return sorted(p.name for p in sentences)
+        unlisted += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
+    return sorted(p.name for p in unlisted)
 
 
 def _groups(campaign: Campaign) -> list[str]:

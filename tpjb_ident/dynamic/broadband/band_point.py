@@ -184,11 +184,11 @@ def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition
         return 0.0, ()
     free = np.flatnonzero(~np.any([s.taken for s in spectra], axis=0))
     parts = np.array_split(free, min(PARTS, max(len(free) // LEAST, 1)))
-    table = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
-    conditions = merged(*(table[f].conditions for f in sorted(table, reverse=True)))
+    verdicts = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
+    conditions = merged(*(verdicts[f].conditions for f in sorted(verdicts, reverse=True)))
     if "accelerometers-contradict-cells" in conditions:  # where the housing's inertia is larger
         conditions = tuple(c for c in conditions if c != "accelerometers-doubtful")
-    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in table.items()]
+    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in verdicts.items()]
     return max(lags, default=0.0), conditions
 
 

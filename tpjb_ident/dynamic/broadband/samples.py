@@ -54,8 +54,10 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     for quantity, rows in found.rows.items():
         values[quantity], share = _bridged(run, quantity, rows)
         lost = max(lost, share)
-    text = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > TOLD_LOST else ()
-    return Samples(rate, values, _command(run, n), _angle(run, n, rate), text)
+    conditions = (
+        (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > TOLD_LOST else ()
+    )
+    return Samples(rate, values, _command(run, n), _angle(run, n, rate), conditions)
 
 
 def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:

@@ -227,7 +227,7 @@ def _result(
     all_weights[table.valid] = per_axis
     used = len(np.unique(table.direction[joint > 0]))
     checks = (_ill_conditioned(condition), _many_rejected(joint), _no_spare(used))
-    estimate = [c for c in checks if c is not None]
+    raised = [c for c in checks if c is not None]
     return DynamicStiffness(
         h * table.h_scale,
         omega,
@@ -235,7 +235,7 @@ def _result(
         dof,
         name,
         all_weights,
-        merged(conditions, tuple(estimate)),
+        merged(conditions, tuple(raised)),
         condition,
         chi_square,
         4 * (used - 2),

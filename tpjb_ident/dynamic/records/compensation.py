@@ -53,11 +53,11 @@ class SlowerChannel:
         ratio = self.export_rate / self.rate
         even = abs(ratio - round(ratio)) < 1e-6 * ratio
         small = np.sin(np.pi * f / self.export_rate) * ratio if even else np.pi * f / self.rate
-        text = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
+        gain = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
         if not self.held:
-            return np.asarray(text**2, dtype=complex)
+            return np.asarray(gain**2, dtype=complex)
         late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
-        return np.asarray(text * np.exp(-2j * np.pi * f * late))
+        return np.asarray(gain * np.exp(-2j * np.pi * f * late))
 
 
 def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:

@@ -61,12 +61,12 @@ class ClockRates:
         """What to say of it at every point."""
         if not (self.force or self.acceleration):
             return ()
-        text = [f"cells {1e6 * self.force:+.1f} ppm (standard error {1e6 * self.error:.1f})"] if self.force else []
-        text += [f"accelerometers {1e6 * self.acceleration:+.1f} ppm"] if self.acceleration else []
+        clocks = [f"cells {1e6 * self.force:+.1f} ppm (standard error {1e6 * self.error:.1f})"] if self.force else []
+        clocks += [f"accelerometers {1e6 * self.acceleration:+.1f} ppm"] if self.acceleration else []
         return (
             Condition(
                 "clocks-differ",
-                f"against the probes' clock: {', '.join(text)}; put right from the start of each record on",
+                f"against the probes' clock: {', '.join(clocks)}; put right from the start of each record on",
             ),
         )
 

@@ -67,7 +67,7 @@ def all_runs(
 
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
-        as_completed(workers or InProcessWorkers(), unless_known, list(jobs), finished)
+        as_completed(workers or InProcessWorkers(), process_run, list(jobs), finished)
         kept.leave_out_dead_accelerometers()
         if runs and not kept.places:
             raise kept.left_out[0].error
@@ -77,7 +77,7 @@ def all_runs(
     return kept
 
 
-def unless_known(
+def process_run(
     run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
 ) -> tuple[str, RunResult | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
@@ -86,12 +86,12 @@ def unless_known(
     is kept anywhere (`known` is None) it is not asked for.
     """
     try:
-        return _unless_known(run, housing_mass, settings, known)
+        return _process_run(run, housing_mass, settings, known)
     except (RigDataError, RecordTooShortError) as error:
         return "", ExcludedRun(run.id, run.point, error)
 
 
-def _unless_known(
+def _process_run(
     run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
 ) -> tuple[str, RunResult | None]:
     if known is None:
@@ -131,7 +131,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
             phasors = run_phasors(kept, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, _dead_accelerometers(kept, phasors), _mended(run))
+        conditions = merged(phasors.conditions, _dead_accelerometers(kept, phasors), _repaired(run))
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(kept, phasors))
         return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
 
@@ -139,21 +139,21 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
     """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
     beginning = beginning_of(kept)
-    observations = [line.frequency for line in phasors.lines.excitation]
+    frequencies = [line.frequency for line in phasors.lines.excitation]
     if beginning is None:
         return ()
-    if len(observations) == 1:
-        point = replace(run.point, excitation=2 * np.pi * observations[0])
+    if len(frequencies) == 1:
+        point = replace(run.point, excitation=2 * np.pi * frequencies[0])
         return (of_run(observe(replace(beginning, point=point)), run),)
-    points = [point_of(run.point, frequency) for frequency in observations]
-    return tuple(of_run(observe(replace(beginning, point=p), observations), replace(run, point=p)) for p in points)
+    points = [point_of(run.point, frequency) for frequency in frequencies]
+    return tuple(of_run(observe(replace(beginning, point=p), frequencies), replace(run, point=p)) for p in points)
 
 
-def _mended(run: Run) -> tuple[Condition, ...]:
-    """What the reader had to mend in the record."""
+def _repaired(run: Run) -> tuple[Condition, ...]:
+    """What the reader had to repair in the record."""
     problems = run.reader.problems() if hasattr(run, "reader") else ()
-    corrected = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
-    return (Condition("record-damaged", "; ".join(corrected)),) if corrected else ()
+    repairs = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
 
 
 def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
