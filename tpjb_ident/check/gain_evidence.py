@@ -157,10 +157,7 @@ def dynamic_difference(
 
 def _bearing_changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
     """Force by stiffness and by damping alone, (4, 2) as `_stacked` [N]: what a stiffer, a more damped bearing adds."""
-    return np.stack(
-        [_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)],
-        axis=1,
-    )
+    return np.stack([_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)], axis=1)
 
 
 def _bearing_wander(readings: PointReadings, runs: Sequence[int], stiffness: ComplexArray) -> FloatArray:

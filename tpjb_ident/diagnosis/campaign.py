@@ -188,10 +188,7 @@ def _diagnose_measured(
     )  # fmt: skip
     observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
     result = diagnose(
-        observations,
-        setup,
-        settings,
-        lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100),
+        observations, setup, settings, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100)
     )
     return CampaignDiagnosis(result, identification, setup)
 

@@ -63,10 +63,7 @@ class Diagnosis:
 
 
 def diagnose(
-    observations: Observations,
-    setup: Setup,
-    settings: DiagnoseSettings | None = None,
-    progress: Progress | None = None,
+    observations: Observations, setup: Setup, settings: DiagnoseSettings | None = None, progress: Progress | None = None
 ) -> Diagnosis:
     """Find the effects that a baseline lacks to describe a campaign."""
     settings = settings or DiagnoseSettings()

@@ -225,15 +225,11 @@ def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArr
     families = np.array([e.family for e in elements])
     first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
     line = np.array([e.place("excitation") for e in elements])
-    usual_line = line == _usual(line[np.isfinite(line)])
+    # the frequency that is there at the most loads, the middle one among equals
+    frequencies, counts = np.unique(line[np.isfinite(line)], return_counts=True)
+    usual = frequencies[counts == counts.max()]
+    usual_line = line == usual[len(usual) // 2]
     direct = np.array([e.observable in DIRECT for e in elements])
     masks = {"A": direct & usual_line & first}
     masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in FAMILIES.items()}
     return {**masks, "E": np.ones(len(elements), dtype=bool)}
-
-
-def _usual(lines: FloatArray) -> float:
-    """The frequency that is there at the most loads, the middle one among equals."""
-    frequencies, counts = np.unique(lines, return_counts=True)
-    most = frequencies[counts == counts.max()]
-    return float(most[len(most) // 2])

@@ -53,8 +53,10 @@ class Candidate:
     @property
     def width(self) -> FloatArray:
         """Standard deviations of the prior, (k,)."""
-        return np.array([DIRECTION_WIDTH if n in self.about else PRIOR_WIDTH * s
-                         for n, s in zip(self._names, self.steps, strict=True)])  # fmt: skip
+        width = PRIOR_WIDTH * self.steps
+        if not self.basis:
+            width[[p.name in self.about for p in self.free]] = DIRECTION_WIDTH
+        return width
 
     @property
     def steps(self) -> FloatArray:
@@ -71,10 +73,6 @@ class Candidate:
             return np.full(len(self.basis), -reach), np.full(len(self.basis), reach)
         ends = np.array([sorted(p.to_linear(v) for v in (p.low, p.high)) for p in self.free])
         return ends[:, 0], ends[:, 1]
-
-    @property
-    def _names(self) -> list[str]:
-        return [""] * len(self.basis) if self.basis else [p.name for p in self.free]
 
     @property
     def neutral(self) -> float:

@@ -124,26 +124,21 @@ def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
     return out
 
 
-def columns_of(
-    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray
-) -> FloatArray:
-    """Change of the observation vector per standard deviation of every nuisance, (n, m); `at` (m,), `base` (n,)."""
-    return np.column_stack([column_of(forward, effects, known, at, base, i) for i in range(len(known))])
-
-
 def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
     bearing_nuisances = nuisances(forward.elements, setup, known, by_pad=False)
-    return columns_of(forward, effects, bearing_nuisances, np.zeros(len(bearing_nuisances)), base)
+    at = np.zeros(len(bearing_nuisances))
+    columns = [column_of(forward, effects, bearing_nuisances, at, base, i) for i in range(len(at))]
+    return np.column_stack(columns)
 
 
 def column_of(
     forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
     index: int,
 ) -> FloatArray:  # fmt: skip
-    """One column of `columns_of`; `at` (m,), `base` (n,)."""
+    """Change of the observation vector per standard deviation of one nuisance, (n,); `at` (m,), `base` (n,)."""
     if known[index].column is not None:
         return np.asarray(known[index].column)
     # towards zero: there the model surely has an equilibrium

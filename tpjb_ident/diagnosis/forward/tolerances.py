@@ -44,7 +44,9 @@ DEFAULTS: dict[str, tuple[float, str]] = {
 class Tolerances:
     """Everything that may be off without being a finding."""
 
-    stated: Mapping[str, StatedTolerance] = field(default_factory=lambda: dict(_defaults()))
+    stated: Mapping[str, StatedTolerance] = field(
+        default_factory=lambda: {name: StatedTolerance(value) for name, (value, _) in DEFAULTS.items()}
+    )
     probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
     cell_gain: StatedTolerance = StatedTolerance(0.002)
     centre: float = 10e-6
@@ -75,7 +77,3 @@ class Tolerances:
         """Return a copy with what a bearing file states where the command line states nothing."""
         typed = {k: v.value for k, v in self.stated.items() if v.source == "command line"}
         return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
-
-
-def _defaults() -> dict[str, StatedTolerance]:
-    return {name: StatedTolerance(value) for name, (value, _) in DEFAULTS.items()}

@@ -20,6 +20,7 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.pivot.curve import PivotCurve
 
 
@@ -135,11 +136,7 @@ class _Builder:
     covariance: list[FloatArray] = field(default_factory=list)
 
     def add(
-        self,
-        elements: Sequence[Element],
-        value: FloatArray,
-        covariance: FloatArray,
-        tolerance: FloatArray | float,
+        self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray, tolerance: FloatArray | float
     ) -> None:
         value = np.atleast_1d(value)
         keep = np.isfinite(value) & np.isfinite(np.diag(covariance))
@@ -183,7 +180,8 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
         base = (("load", load), ("direction", direction), ("speed", speed))
         for i in members:
             _add_stiffness(builder, points[i], base, tolerance)
-        temperature = _mean_temperatures([points[i].temperatures for i in members])
+        kelvin = pad_means([points[i].temperatures for i in members])
+        temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
         names = [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in temperature]
         if temperature:
             noise = np.eye(len(names)) * TEMPERATURE_SE**2
@@ -211,18 +209,7 @@ def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance)
     covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
         covariance = covariance + np.diag((UNSEEN_DIFFERENCE * scale) ** 2)
-    builder.add(
-        elements,
-        value,
-        covariance,
-        tolerance.stiffness * scale,
-    )
-
-
-def _mean_temperatures(rows: Sequence[dict[int, float]]) -> dict[int, float]:
-    pads = sorted({pad for row in rows for pad in row})
-    mean = {pad: float(np.mean([row[pad] for row in rows if pad in row])) for pad in pads}
-    return {pad: t - 273.15 for pad, t in mean.items()}
+    builder.add(elements, value, covariance, tolerance.stiffness * scale)
 
 
 def _add_locus(

@@ -14,13 +14,7 @@ from rigdata.run import Run
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.clock_rate import common_rates
 from tpjb_ident.dynamic.broadband.line_rows import LinePlan, LineRows, line_plan, line_rows
-from tpjb_ident.dynamic.broadband.run_spectra import (
-    OPEN_ENDS,
-    RunSpectra,
-    SpectraSettings,
-    run_clocks,
-    run_spectra,
-)
+from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_clocks, run_spectra
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.instruments.housing_balance import BalanceRun, balances
 from tpjb_ident.dynamic.runs.baseline import Baseline

@@ -145,11 +145,7 @@ def _over(at: FloatArray, frequencies: FloatArray, estimates: list[LineEstimates
 
 
 def _finish(
-    point: BandPoint,
-    miss: LoadMiss,
-    slopes: ComplexArray | None,
-    sources: SharedSources,
-    told: tuple[Condition, ...],
+    point: BandPoint, miss: LoadMiss, slopes: ComplexArray | None, sources: SharedSources, told: tuple[Condition, ...]
 ) -> BandResult:
     every = [
         (k, point.rows(k, miss, None if slopes is None else slopes[k])) for k in range(len(point.plan.frequencies))

@@ -123,10 +123,7 @@ def _with_force_pickup(scatter: float, data: PointData, force: FloatArray) -> fl
 
 
 def _turns(
-    points: list[PointSource],
-    first: list[DynamicStiffness],
-    misses: list[LoadMiss],
-    slopes: list[ComplexArray | None],
+    points: list[PointSource], first: list[DynamicStiffness], misses: list[LoadMiss], slopes: list[ComplexArray | None]
 ) -> list[DirectionSensitivity | None]:
     """How H turns with the load, from windows whose load's size is put right; what mains struck tells nothing."""
     ratios = [

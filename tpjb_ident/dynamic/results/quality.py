@@ -70,10 +70,7 @@ def _reason(data: PointData, lost_d: float, lost_f: float, i: int, weights: Floa
     siblings = (data.run_index == data.run_index[i]) & (weights >= REJECTED_WEIGHT)
     if not siblings.any():
         return "whole run disagrees with the other directions"
-    moves = {
-        "displacement": _shift(data.D[i], data.D[siblings]),
-        "force": _shift(data.F[i], data.F[siblings]),
-    }
+    moves = {"displacement": _shift(data.D[i], data.D[siblings]), "force": _shift(data.F[i], data.F[siblings])}
     worst = max(moves, key=lambda name: moves[name])
     return f"{worst} phasor {100 * moves[worst]:.1f} % away from its repeats"
 

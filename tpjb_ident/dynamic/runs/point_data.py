@@ -79,12 +79,7 @@ def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[Op
     for k, (stated, frequencies) in enumerate(runs):
         for i, frequency in enumerate(frequencies):
             point = point_of(stated, frequency)
-            key = (
-                point.static_load,
-                point.static_load_direction_deg,
-                point.shaft_speed_hz,
-                point.excitation_hz,
-            )
+            key = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
             groups.setdefault(key, (point, []))[1].append((k, i))
     return [groups[key] for key in sorted(groups)]
 
