@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import itertools
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -87,9 +88,10 @@ class _HeadFinder:
             header, first = self._header_by_numbers()
         lines = (split_line(line, header.delimiter) for line in self.lines[first : first + _SAMPLE])
         sample = [cells for cells in lines if cells]
-        if not any(looks_like(cell) or is_missing(cell) for cells in sample for cell in cells):
+        all_cells = list(itertools.chain.from_iterable(sample))
+        if not any(looks_like(cell) or is_missing(cell) for cell in all_cells):
             raise self._refuse(header.line, "no samples follow the names", "Export the run again")
-        decimal = self._decimal(sample)
+        decimal = self._decimal(all_cells)
         names = self._names_of_all_cells(header, sample)
         return Head(
             encoding=self.encoding,
@@ -141,7 +143,7 @@ class _HeadFinder:
                 if not matched:
                     continue
                 below = self.lines[number + 1 : number + 2 + _MAX_UNIT_LINES]
-                rank = (matched, any(looks_like(cell) for line in below for cell in split_line(line, delimiter)))
+                rank = (matched, any(_holds_a_number(line, delimiter) for line in below))
                 if rank > best_rank:
                     best, best_rank = _NamesLine(number + 1, delimiter, names, matched), rank
             if best_rank == (len(self.channels), True):
@@ -228,9 +230,8 @@ class _HeadFinder:
                 raise self._refuse(number + 1, fault, "Check [csv] delimiter and decimal")
         raise self._refuse(header.line, "no samples follow the names", "Export the run again")
 
-    def _decimal(self, sample: list[list[str]]) -> str | None:
+    def _decimal(self, cells: list[str]) -> str | None:
         """Decimal mark; None where the sample holds whole numbers only."""
-        cells = [cell for row in sample for cell in row]
         commas = [cell for cell in cells if "," in cell and is_number(cell, ",")]
         points = [cell for cell in cells if "." in cell and is_number(cell, ".")]
         stated = self.spec.decimal
@@ -248,7 +249,9 @@ class _HeadFinder:
         width = max(set(widths), key=widths.count)
         names = header.names
         if len(names) < width:
-            extra = [cell for row in sample if len(row) == width for cell in row[len(names) :]]
+            extra = []
+            for row in sample:
+                extra += row[len(names) :] if len(row) == width else []
             if any(extra):
                 fault = f"has {len(names)} names, but the samples have {width} cells (the first extra is {extra[0]!r})"
                 raise self._refuse(header.line, fault, "Check [csv] delimiter and decimal; name every column")
@@ -270,6 +273,10 @@ class _HeadFinder:
             text = bracket[1] if bracket else "".join(below[i : i + 1])
             units.append(text.strip().strip("[]()"))
         return tuple(units)
+
+
+def _holds_a_number(line: str, delimiter: str) -> bool:
+    return any(map(looks_like, split_line(line, delimiter)))
 
 
 def _is_row_of_numbers(cells: list[str]) -> bool:
