@@ -50,6 +50,12 @@ class Campaign:
         Of the housing's mass, one standard deviation [kg].
     mains : float or None
         Mains frequency as the manifest states it [Hz].
+
+    Examples
+    --------
+    >>> campaign = load_campaign(demo)
+    >>> print(campaign)
+    campaign demo: 58 runs (42 dynamic, 10 locus, 5 dry_pivot, 1 clearance), 12 channels
     """
 
     id: str
@@ -84,6 +90,11 @@ class Campaign:
         ------
         RigDataError
             There is none; names the nearest.
+
+        Examples
+        --------
+        >>> print(load_campaign(demo).run("d-02500-25-01").point)
+        2500 N at -90 deg, shaft 22 Hz, excited at 25 Hz
         """
         for run in self.runs:
             if run.id == run_id:
@@ -99,6 +110,11 @@ class Campaign:
         ----------
         kind : str
             ``"dynamic"``, ``"dry_pivot"``, ``"locus"`` or ``"clearance"``.
+
+        Examples
+        --------
+        >>> [run.pad for run in load_campaign(demo).of_kind("dry_pivot")]
+        [1, 2, 3, 4, 5]
         """
         return tuple(r for r in self.runs if r.kind == kind)
 
@@ -136,6 +152,11 @@ def load_campaign(path: str | Path) -> Campaign:
     ------
     RigDataError
         Every problem of the manifest at once, each with its line.
+
+    Examples
+    --------
+    >>> load_campaign(demo).housing_mass
+    30.0
     """
     source = Path(path)
     try:
@@ -197,25 +218,18 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
     problems: list[Problem] = []
     bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
-    channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
     cache = ReadingCache()
-    runs = []
-    for entry in manifest.runs:
+
+    def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
         place = f"[[runs]] no. {entry.index + 1} file"
-        try:
-            target = inside(folder, entry.file, manifest_path.name, place, entry.id)
-        except RigDataError as error:
-            problems.extend(error.problems)
-            continue
+        target = inside(folder, entry.file, manifest_path.name, place, entry.id)
         files[entry.file] = target
-        rate = entry.sample_rate or manifest.sample_rate
-        reader: RunReader
         if is_foreign(target):
-            reader = ForeignReader(target, entry.file, entry.id, manifest.channels, rate, cache)
-        else:
-            reader = CsvReader(target, entry.file, entry.id, manifest.channels, rate, cache, manifest.csv)
-        runs.append(_make_run(entry, channels, reader))
-    return _finish(manifest, _Opened(folder, bearing, files), channels, runs, problems)
+            return ForeignReader(target, entry.file, entry.id, manifest.channels, rate, cache)
+        return CsvReader(target, entry.file, entry.id, manifest.channels, rate, cache, manifest.csv)
+
+    campaign = _assembled(manifest, reader_of, problems)
+    return replace(campaign, path=folder, bearing_text=bearing, files=files)
 
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
@@ -261,31 +275,12 @@ def _load_hdf5(path: Path) -> Campaign:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
         problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))
         bearing = ""
-    channels = {n: c for n, c in manifest.channels.items() if c.quantity != "ignore"}
-    described = frozenset(manifest.channels)
-    clock = next((c for c in channels.values() if c.quantity == "time"), None)
-    runs = []
-    for entry in manifest.runs:
-        rate = entry.sample_rate or manifest.sample_rate
-        reader = Hdf5Reader(path, entry.id, path.name, rate, described, clock)
-        runs.append(_make_run(entry, channels, reader))
-    return _finish(manifest, _Opened(path, bearing, files), channels, runs, problems)
+    clock = next((c for c in manifest.channels.values() if c.quantity == "time"), None)
 
+    def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
+        return Hdf5Reader(path, entry.id, path.name, rate, frozenset(manifest.channels), clock)
 
-def _make_run(entry: RunEntry, channels: Mapping[str, Channel], reader: RunReader) -> Run:
-    return Run(
-        id=entry.id,
-        kind=entry.kind,
-        point=entry.point,
-        excitation_direction=entry.excitation_direction,
-        pad=entry.pad,
-        branch=entry.branch,
-        channels=channels,
-        stated=entry.stated,
-        reader=reader,
-        excitation_kind=entry.excitation,
-        band=entry.band,
-    )
+    return replace(_assembled(manifest, reader_of, problems), path=path, bearing_text=bearing, files=files)
 
 
 def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[str, str], str]:
@@ -298,31 +293,44 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
     return read
 
 
-@dataclass(frozen=True)
-class _Opened:
-    """A campaign on the disk: folder or file, text of the bearing, every file that was read."""
-
-    path: Path
-    bearing: str
-    files: dict[str, Path]
-
-
-def _finish(
-    manifest: Manifest, opened: _Opened, channels: Mapping[str, Channel], runs: list[Run], problems: list[Problem]
+def _assembled(
+    manifest: Manifest, reader_of: Callable[[RunEntry, float | None], RunReader], problems: list[Problem]
 ) -> Campaign:
+    """The campaign of a manifest, with a reader for each run; refused if anything is wrong with either."""
+    channels = {name: channel for name, channel in manifest.channels.items() if channel.quantity != "ignore"}
+    runs = []
+    for entry in manifest.runs:
+        try:
+            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate)
+        except RigDataError as error:
+            problems.extend(error.problems)
+            continue
+        run = Run(
+            id=entry.id,
+            kind=entry.kind,
+            point=entry.point,
+            excitation_direction=entry.excitation_direction,
+            pad=entry.pad,
+            branch=entry.branch,
+            channels=channels,
+            stated=entry.stated,
+            reader=reader,
+            excitation_kind=entry.excitation,
+            band=entry.band,
+        )
+        runs.append(run)
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     return Campaign(
         id=manifest.id,
         description=manifest.description,
-        path=opened.path,
+        path=Path(),
         bearing_name=manifest.bearing,
-        bearing_text=opened.bearing,
+        bearing_text="",
         housing_mass=manifest.housing_mass,
         channels=channels,
         runs=tuple(runs),
         notes=(*manifest.notes, *problems),
-        files=opened.files,
         mass_uncertainty=manifest.mass_uncertainty,
         mains=manifest.mains,
     )

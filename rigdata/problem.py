@@ -31,6 +31,11 @@ class Problem:
         What to do.
     run : str or None
         Run id, where the problem belongs to one run.
+
+    Examples
+    --------
+    >>> print(Problem("warning", "campaign.toml", "line 3", "mass is missing", "Add it"))
+    campaign.toml, line 3: mass is missing. Add it
     """
 
     severity: Severity
@@ -79,7 +84,16 @@ class Condition(str):
 
 
 class RigDataError(RigError):
-    """A campaign, manifest or record file that cannot be used; carries every problem found."""
+    """A campaign, manifest or record file that cannot be used; carries every problem found.
+
+    Examples
+    --------
+    >>> try:
+    ...     ti.load_campaign("nowhere")
+    ... except RigDataError as error:
+    ...     print(error.problems[0].what)
+    there is no such file or folder
+    """
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
