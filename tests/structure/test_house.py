@@ -35,7 +35,7 @@ MAY_IMPORT = {
     "diagnosis": {"rigdata", "model", "dynamic", "pivot", "clearance", "compare", "runtime"},
     "watch": {"rigdata", "check", "dynamic", "pivot", "clearance", "runtime"},
     "report": {"rigdata", "dynamic", "pivot", "clearance", "compare", "diagnosis", "runtime", "watch"},
-    "view": {"rigdata", "runtime"},
+    "view": {"rigdata", "compare", "report", "runtime"},
     "cli": {"rigdata", "model", "check", "dynamic", "pivot", "clearance", "compare", "diagnosis", "report", "exports",
             "view", "watch", "runtime"},
 }  # fmt: skip
