@@ -14,6 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.good_campaigns import rocker_rig, written
+
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")]
 ROOT = Path(__file__).parents[2]
 TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
@@ -105,7 +107,7 @@ def test_the_bits_do_not_depend_on_the_number_of_workers(small_campaign, tmp_pat
 
 
 def test_a_file_that_vanishes_costs_its_run_and_no_other(tmp_path):
-    folder = _as_csv(tmp_path / "csv")
+    folder = written(tmp_path / "csv", rocker_rig(2), "csv")
     victim = next((folder / "runs").glob("d-*-02.csv"))
     victim.unlink()
     code, told, errors = end(command("identify", folder, "--workers", 1, "--out", tmp_path / "out"))
@@ -115,20 +117,3 @@ def test_a_file_that_vanishes_costs_its_run_and_no_other(tmp_path):
         assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["n_records"].tolist() == [2]
     else:
         assert not (tmp_path / "out").exists()
-
-
-def _as_csv(path):
-    import math
-
-    import numpy as np
-
-    from rigdata.virtual_rig import Noise, RigPlan, RigTruth, Timing, VirtualRig, operating_points, write_campaign
-
-    truth = RigTruth.constant(np.diag([1.0e8, 2.0e8]), np.diag([5e5, 7e5]))
-    plan = RigPlan(
-        dynamic=operating_points([(5000.0, 25.0)]),
-        directions=tuple(math.radians(45.0 * i) for i in range(3)),
-        timing=Timing(dynamic_seconds=1.0),
-    )
-    write_campaign(path, VirtualRig(truth, plan, noise=Noise.like_samples(), seed=2), "csv")
-    return path
