@@ -21,13 +21,13 @@ LIMITS = {
     "diagnosis": (43.7, 5_320),
     "cli": (27.0, 3_880),
     "report": (27.0, 3_560),
-    "pivot": (20.9, 2_820),
+    "pivot": (19.2, 2_620),
     "compare": (8.5, 1_290),
     "top level": (6.9, 1_370),
-    "clearance": (9.5, 1_250),
+    "clearance": (8.9, 1_160),
     "runtime": (5.7, 1_010),
-    "watch": (6.7, 850),
-    "exports": (4.6, 790),
+    "watch": (6.4, 830),
+    "exports": (4.4, 730),
     "view": (6.2, 650),
 }
 MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "results")

@@ -166,6 +166,13 @@ class PivotCurve(Presented):
         Named conditions; empty when all is well.
     runs : tuple of str
         Where it came from.
+
+    Examples
+    --------
+    >>> pads = ti.load_bearing(rocker).pads
+    >>> curve = ti.fit_pivots(ti.load_campaign(demo), [pad.pivot_angle for pad in pads])[0]
+    >>> curve.stiffness([1000.0, 2000.0]).shape
+    (2,)
     """
 
     pad: int
