@@ -16,52 +16,52 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
 
 
-def as_campaign(given: Any, name: str) -> Campaign:
+def as_campaign(value: Any, name: str) -> Campaign:
     """Return the campaign given, or open it."""
-    if isinstance(given, (str, Path)):
+    if isinstance(value, (str, Path)):
         from rigdata import load_campaign
 
-        return load_campaign(given)
-    if not hasattr(given, "runs"):
-        raise ArgumentError(f"{name}: must be a Campaign or the path of one, got {type(given).__name__}.")
-    campaign: Campaign = given
+        return load_campaign(value)
+    if not hasattr(value, "runs"):
+        raise ArgumentError(f"{name}: must be a Campaign or the path of one, got {type(value).__name__}.")
+    campaign: Campaign = value
     return campaign
 
 
-def as_bearing(given: Any, name: str) -> Bearing:
+def as_bearing(value: Any, name: str) -> Bearing:
     """Return the bearing given, or read its file."""
     from model.bearing import Bearing
     from model.bearing_file import load_bearing
 
-    if isinstance(given, Bearing):
-        return given
-    if isinstance(given, (str, Path)):
-        return load_bearing(given)
-    raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(given).__name__}.")
+    if isinstance(value, Bearing):
+        return value
+    if isinstance(value, (str, Path)):
+        return load_bearing(value)
+    raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(value).__name__}.")
 
 
-def _path(given: Any, name: str) -> Any:
-    if not isinstance(given, (str, os.PathLike)):
-        raise ArgumentError(f"{name}: must be a path, got {type(given).__name__}.")
-    return given
+def _path(value: Any, name: str) -> Any:
+    if not isinstance(value, (str, os.PathLike)):
+        raise ArgumentError(f"{name}: must be a path, got {type(value).__name__}.")
+    return value
 
 
-def _folder(given: Any, name: str) -> Path:
-    return Path(_path(given, name))
+def _folder(value: Any, name: str) -> Path:
+    return Path(_path(value, name))
 
 
-def _curves(given: Any, name: str) -> Any:
-    curves = tuple(given) if isinstance(given, Iterable) else (given,)
-    for one in curves:
-        if not hasattr(one, "stiffness_band"):
-            raise ArgumentError(f"{name}: must hold what fit_pivots gives, got {type(one).__name__}.")
+def _curves(value: Any, name: str) -> Any:
+    curves = tuple(value) if isinstance(value, Iterable) else (value,)
+    for curve in curves:
+        if not hasattr(curve, "stiffness_band"):
+            raise ArgumentError(f"{name}: must hold what fit_pivots gives, got {type(curve).__name__}.")
     return curves
 
 
-def _comparison(given: Any, name: str) -> Any:
-    if not hasattr(given, "variants"):
-        raise ArgumentError(f"{name}: must be what compare_campaign gives, got {type(given).__name__}.")
-    return given
+def _comparison(value: Any, name: str) -> Any:
+    if not hasattr(value, "variants"):
+        raise ArgumentError(f"{name}: must be what compare_campaign gives, got {type(value).__name__}.")
+    return value
 
 
 #: What arguments of these names may be.
@@ -77,10 +77,10 @@ def checked(function: Callable[..., Any], called: str, names: str) -> Callable[.
 
     @functools.wraps(function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
-        given = signature.bind(*args, **kwargs)
+        bound = signature.bind(*args, **kwargs)
         for name in names.split():
-            if name in given.arguments:
-                given.arguments[name] = _CHECKS[name](given.arguments[name], f"{called}: {name}")
-        return function(*given.args, **given.kwargs)
+            if name in bound.arguments:
+                bound.arguments[name] = _CHECKS[name](bound.arguments[name], f"{called}: {name}")
+        return function(*bound.args, **bound.kwargs)
 
     return wrapper

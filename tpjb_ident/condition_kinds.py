@@ -26,11 +26,11 @@ class ConditionKind:
 
 #: With one of these a number is not to be trusted: the command ends with exit code 3.
 ERRORS = {
-    "1X on excitation line": "The excitation stands on the running speed: unbalance and runout cannot be told "
+    "1X on excitation line": "The excitation is on the running speed: unbalance and runout cannot be separated "
     "from it. Excite beside the running speed, or record a keyphasor.",
-    "2X on excitation line": "The excitation stands on twice the running speed: runout cannot be told from it. "
+    "2X on excitation line": "The excitation is on twice the running speed: runout cannot be separated from it. "
     "Excite beside it.",
-    "3X on excitation line": "The excitation stands on three times the running speed: runout cannot be told from it. "
+    "3X on excitation line": "The excitation is on three times the running speed: runout cannot be separated from it. "
     "Excite beside it.",
     "accelerometers-contradict-cells": "The housing's acceleration is not what its springs, the load cells, make of "
     "their force: accelerometers are exchanged, dead, or have the wrong sign. Check channels, axes and polarity.",
@@ -76,8 +76,8 @@ WARNINGS = {
     "too small a part of the force to matter here. Check channels, axes and polarity of the accelerometers.",
     "cells-not-tared": "The load cells read something at no load: a constant in their mean over the campaign's loads. "
     "It was taken off before runs were held against their set points. Tare the cells.",
-    "clocks-differ": "Probes and cells were recorded by clocks of different rate; the drift of their phase gave it "
-    "away and was put right. How exactly they were started together the records do not tell: state delay and "
+    "clocks-differ": "Probes and cells were recorded by clocks of different rate; the drift of their phase showed "
+    "it and was corrected. How exactly they were started together the records do not tell: state delay and "
     "delay_uncertainty in the manifest.",
     "slower-channels": "Channels were sampled slower than the export says and filled up by interpolation; what that "
     "does to a sine was taken out. Export them at their own rate.",
@@ -97,14 +97,14 @@ WARNINGS = {
     "large-amplitude": "The vibration is more than 5 % of the clearance, and the film's harmonics do not show that it "
     "is still linear; or it is so large that no film is. Excite less, or check the probes.",
     "load-off-set-point": "The measured load of some runs misses its set point in size or direction.",
-    "mains on excitation line": "The excitation stands on the mains frequency: pick-up cannot be told from "
+    "mains on excitation line": "The excitation is on the mains frequency: pick-up cannot be separated from "
     "signal, and the interval allows for it. Excite beside the mains frequency.",
     "methods-disagree": "Other estimators give another answer beyond both intervals, as they do where glitches or "
     "displacement noise pull them. See estimators.csv.",
     "misfit": "The points scatter more than their noise: something moved during the test.",
     "moves-aside": "The shaft slides far across the pad while it is pressed: only the part along the pad counts, "
     "but look at the pad's fit and at the probes.",
-    "no-holds": "The load never stood still, so drift cannot be told from deflection.",
+    "no-holds": "The load never stood still, so drift cannot be separated from deflection.",
     "no-instrument": "Neither a command channel nor repeats tell signal from noise over the band: noise on the "
     "displacements lowers H1, noise on the force raises H2, and the intervals reach from one to the other. Record the "
     "command, or excite periodically.",
@@ -116,7 +116,7 @@ WARNINGS = {
     "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
     "probe-gains-differ": "The sides of the clearance polygon stand at other angles to each other than the pads "
     "do, as where one probe reads more than the other. Check both sensitivities.",
-    "record-damaged": "A record had to be mended when it was read, and part of it is lost. Copy it again from the rig.",
+    "record-damaged": "A record had to be repaired when read, and part of it is lost. Copy it again from the rig.",
     "records-doubtful": "A check of the records found something to look at; `tpjb check` lists it all.",
     "run-gain-off": "In one run a probe or cell reads some per cent more or less than in the others of this "
     "point. Check its amplifier, range and cable there; leave the run out or repeat it.",
@@ -137,9 +137,9 @@ NOTES = {
     "bad-steps": "Some load steps were left out because the record was disturbed there.",
     "contact-incomplete": "At low load the shaft is not fully in contact with this pad; the curve holds above the "
     "load named.",
-    "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be told from a position. "
+    "drift-unknown": "No load direction was repeated, so a drift of the probes cannot be separated from a position. "
     "Repeat the first direction at the end.",
-    "drive-not-locked": "The excitation's phase wandered between windows; they were turned to one phase first.",
+    "drive-not-locked": "The excitation's phase drifted between windows; they were turned to one phase first.",
     "excitation off set point": "The excitation was found at another frequency than the manifest says; the found "
     "one was used to fit.",
     "inertia-negligible": "There are no accelerometers; by its mass the housing's inertia is a small part of the "
@@ -147,7 +147,7 @@ NOTES = {
     "give-extrapolated": "The sweep pushes with less than the dry tests did: what the pivots give is "
     "extrapolated, and the sweep itself corrects it.",
     "give-from-sweep": "There are no pivot curves: what the pivots give under the push load was extrapolated.",
-    "lines-left-out": "Lines of the shaft or the mains stand in the band; the bins next to them are left out.",
+    "lines-left-out": "Lines of the shaft or the mains are in the band; the bins next to them are left out.",
     "law-undecided": "Several laws fit about equally well; the band holds their difference.",
     "load-off-pad": "The load is off the pad's direction; it was projected.",
     "mains corrected": "Pick-up on the mains frequency was estimated from the other runs and taken off.",
@@ -160,13 +160,13 @@ NOTES = {
     "zero amplitude": "The runs have several amplitudes: K and C were extrapolated to none, where they are those of "
     "small motion.",
     "shaft lines fitted": "The drive turns with the shaft: what the shaft itself brings into the readings (runout, "
-    "unbalance) was told from the motion by the shaft's phase in runs of different directions, and taken off.",
+    "unbalance) was separated from the motion by the shaft's phase in runs of different directions, and taken off.",
     "speed drifts": "The shaft speed moved during the record; its lines were followed window by window.",
     "unexpected lines": "The records hold lines that the manifest does not explain; they were fitted along.",
 }
 #: Lines that may stand on the excitation beside those above: higher harmonics, and lines found in the record.
 WARNINGS |= {
-    f"{line} on excitation line": "Another line stands on the excitation, and cannot be told from it. Excite elsewhere."
+    f"{line} on excitation line": "Another line is on the excitation and cannot be separated from it. Excite elsewhere."
     for line in (
         *(f"{n}X" for n in range(4, 11)),
         *(f"{kind} {n}" for kind in ("mains", "harmonic") for n in range(2, 11)),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import importlib
 import math
 import re
 from collections.abc import Mapping
@@ -58,17 +57,20 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     """A table in MN/m, kN s/m, kN and µm to four digits; of coefficients without the columns that only scripts want."""
     import pandas as pd
 
-    wanted = [name for name in frame.columns if _FOR_PEOPLE.fullmatch(name)]
-    shown: dict[str, Any] = {}
-    for name in wanted if any(_COEFFICIENT.match(name) for name in wanted) else frame.columns:
-        found = _WITH_UNIT.fullmatch(name)
-        words, unit, end = (found[1], found[2], found[3] or "") if found else (name, "", "")
+    names = list(frame.columns)
+    for_people = [name for name in names if _FOR_PEOPLE.fullmatch(name)]
+    if any(_COEFFICIENT.match(name) for name in for_people):
+        names = for_people
+    table: dict[str, Any] = {}
+    for name in names:
+        match = _WITH_UNIT.fullmatch(name)
+        words, unit, end = (match[1], match[2], match[3] or "") if match else (name, "", "")
         label, scale = _DISPLAYED.get(unit, (unit, 1.0))
         values = frame[name]
         if pd.api.types.is_float_dtype(values):
             values = (values / scale).map("{:.4g}".format)
-        shown[(words + end).replace("_", " ") + (f", {label}" if label else "")] = values
-    return pd.DataFrame(shown)
+        table[(words + end).replace("_", " ") + (f", {label}" if label else "")] = values
+    return pd.DataFrame(table)
 
 
 def json_data(value: Any) -> Any:
@@ -86,11 +88,9 @@ def json_data(value: Any) -> Any:
 def changed(settings: Any) -> str:
     """Settings as a call with what differs from the defaults: ``IdentifySettings(method='ols')``."""
     default = type(settings)()
-    named = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    other = [f"{name}={value!r}" for name, value in named.items() if value != getattr(default, name)]
-    return f"{type(settings).__name__}({', '.join(other)})"
-
-
-def shown_by(module: str, function: str) -> Any:
-    """A function of a room above the result's own, looked up when it is asked for: no file imports upwards."""
-    return getattr(importlib.import_module(f"tpjb_ident.{module}"), function)
+    differing = []
+    for setting in fields(settings):
+        value = getattr(settings, setting.name)
+        if value != getattr(default, setting.name):
+            differing.append(f"{setting.name}={value!r}")
+    return f"{type(settings).__name__}({', '.join(differing)})"

@@ -41,7 +41,7 @@ MAY_IMPORT = {
 }  # fmt: skip
 #: What a result may import inside the methods that show it: its picture, its table, its sentences.
 SHOWS = ("plot", "to_dataframe", "to_frame", "summary")
-SHOWN_BY = ("tpjb_ident/report/plots/", "tpjb_ident/report/diagnosis_words.py", "tpjb_ident/compare/tables.py",
+SHOWN_BY = ("tpjb_ident/report/plots/", "tpjb_ident/report/diagnosis_words.py",
             "tpjb_ident/compare/summary.py", "tpjb_ident/pivot/tables.py")  # fmt: skip
 #: The one way back: a campaign is checked with the line fit and the oil force of identification, and with nothing else.
 ONE_WAY_BACK = ("check", ("tpjb_ident/dynamic/records/",))
