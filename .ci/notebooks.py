@@ -1,4 +1,7 @@
-"""Execute every notebook from top to bottom, in memory, two at a time: one that no longer runs fails the build."""
+"""Execute every notebook from top to bottom, two at a time: one that no longer runs fails the build.
+
+The executed copies go to ``build/notebooks``, where the site takes its outputs and pictures from.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent.parent / "notebooks"
+EXECUTED = FOLDER.parent / "build" / "notebooks"
 
 
 def executed(path: Path) -> list[str]:
@@ -27,6 +31,8 @@ def executed(path: Path) -> list[str]:
         client.execute()
     except CellExecutionError as error:
         told.append(f"failed\n{error}")
+    EXECUTED.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, EXECUTED / path.name)
     return told or [f"ran in {time.perf_counter() - began:.1f} s"]
 
 

@@ -36,7 +36,7 @@ SLOW = 20  # samples of the fast clock per temperature
 MOST_LINES = 10
 PAGE = ROOT / "docs" / "guide" / "tutorial.md"
 BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
-HEAD = "| export | commands | lines edited | processor minutes | K beside what was simulated |\n|---|---|---|---|---|\n"
+HEAD = "| export | commands | lines edited | processor minutes | K against the simulation |\n|---|---|---|---|---|\n"
 Table = dict[str, np.ndarray]
 #: What a person fills in: (channel or table, key) -> value, "" deletes the mark of comment before the key.
 Edits = Mapping[tuple[str, str], str]

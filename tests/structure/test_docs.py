@@ -14,15 +14,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-#: Pages of notebooks, whose blocks belong together; `.ci/notebooks.py` runs them.
-NOTEBOOKS = ROOT / "docs" / "notebooks"
 #: Blocks that describe files of a user, so they are checked for being Python and are not run.
 NEEDS_FILES_OF_YOUR_OWN = ("rocker-A",)
 LANGUAGES = {"python", "toml", "sh", "text", "json", "math"}
 
 
 def blocks():
-    for page in (p for p in PAGES if p.parent != NOTEBOOKS):
+    for page in PAGES:
         text = page.read_text(encoding="utf-8")
         for i, match in enumerate(re.finditer(r"^```(\w*)\n(.*?)^```", text, flags=re.S | re.M), start=1):
             yield pytest.param(match[1], match[2], id=f"{page.relative_to(ROOT).as_posix()}:{match[1] or 'plain'}{i}")
@@ -55,8 +53,17 @@ def test_links_lead_somewhere(page):
 def test_the_site_lists_pages_that_exist_and_the_whole_guide():
     listed = set(re.findall(r":\s+(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), flags=re.M))
     pages = {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}
-    assert listed <= pages
+    notebooks = {f"notebooks/{p.stem}.md" for p in (ROOT / "notebooks").glob("*.ipynb")}  # made by docs/site_hooks.py
+    assert listed == pages | notebooks
     assert {p for p in pages if p.startswith("guide/")} <= listed
+
+
+def test_troubleshooting_names_every_condition():
+    from tpjb_ident.condition_kinds import KINDS
+
+    text = (ROOT / "docs" / "guide" / "troubleshooting.md").read_text(encoding="utf-8")
+    by_line = {name for name in KINDS if name.endswith(" on excitation line")}  # one row for many lines
+    assert {name for name in set(KINDS) - by_line if f"`{name}`" not in text} == set()
 
 
 @pytest.mark.parametrize(("language", "text"), [p for p in BLOCKS if not p.values[0]] or [pytest.param("", "")])
