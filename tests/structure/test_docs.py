@@ -58,6 +58,16 @@ def test_the_site_lists_pages_that_exist_and_the_whole_guide():
     assert {p for p in pages if p.startswith("guide/")} <= listed
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_files_that_a_page_names_exist(page):
+    """As a path from the checkout or as the end of one; NAME and the like stand for the reader's own."""
+    named = re.findall(r"`([a-z_.]+/[\w./]*\.py)[^`]*`", page.read_text(encoding="utf-8"))
+    folders = re.findall(r"`((?:tests|model|rigdata|tpjb_ident|docs)/[\w/]*)/`", page.read_text(encoding="utf-8"))
+    own = [name for name in named if re.search(r"\b[A-Z]{4,}\.py", name)]
+    missing = [name for name in {*named, *folders} - {*own} if not (ROOT / name).exists()]
+    assert [name for name in missing if not list(ROOT.glob(f"*/{name}")) and not list(ROOT.glob(f"*/*/{name}"))] == []
+
+
 def test_troubleshooting_names_every_condition():
     from tpjb_ident.condition_kinds import KINDS
 

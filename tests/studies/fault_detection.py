@@ -12,12 +12,13 @@ various make (number of directions, noise, points, bearings that wander from run
 from __future__ import annotations
 
 import argparse
-import json
 import math
+import sys
 import tempfile
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise, operating_points
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
-from tests.studies.results import table, write_section
+from tests.studies.results import Rows, table, write_section
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 
@@ -100,17 +101,6 @@ MIXED = "mixed bearings: every third run of another"
 USUAL = {"calibration-uncertainty-unstated", "cells-against-set-points"}
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What one campaign with one fault led to; the last two are those of identification."""
-
-    named: bool
-    blamed_others: bool
-    severity: str
-    error: float = math.nan
-    said: frozenset[str] = frozenset()
-
-
 def write(path: Path, seed: int, fault: Fault | None, stiffness: float = 1.0) -> None:
     """Write a campaign."""
     faults = () if fault is None else (fault,)
@@ -175,8 +165,8 @@ def amplify(path: Path, channel: str, factor: float) -> None:
         file[f"runs/{RUN}/{channel}"][...] *= factor
 
 
-def judge(path: Path, struck: str | None) -> Outcome:
-    """What the check says."""
+def judge(path: Path, struck: str | None) -> tuple[bool, bool, str]:
+    """Whether the check names the run with the fault, whether it names others, and how severely."""
     known = check_campaign(path)
     campaign = rigdata.load_campaign(path)
     found = [
@@ -186,10 +176,10 @@ def judge(path: Path, struck: str | None) -> Outcome:
     ]
     mine = [p for p in found if struck is None or p.run == struck or struck == "*"]
     worst = "error" if any(p.severity == "error" for p in mine) else "warning" if mine else "-"
-    return Outcome(bool(mine), any(p not in mine for p in found), worst)
+    return bool(mine), any(p not in mine for p in found), worst
 
 
-def identified(path: Path) -> tuple[float, frozenset[str]]:
+def identified(path: Path) -> tuple[float, list[str]]:
     """Largest error of the direct terms at the struck point; names of what identification says."""
     from tpjb_ident.dynamic.identify import identify
     from tpjb_ident.dynamic.settings import IdentifySettings
@@ -197,51 +187,26 @@ def identified(path: Path) -> tuple[float, frozenset[str]]:
     try:
         result = identify(rigdata.load_campaign(path), IdentifySettings(methods=(), clearance=CLEARANCE))
     except ValueError as error:
-        return math.nan, frozenset({f"refused: {error}"})
+        return math.nan, [f"refused: {error}"]
     # a wrong label makes a point of its own
     point = max((p for p in result.points if p.point.excitation_hz == 25.0), key=lambda p: p.n_windows)
     h = point.stiffness.h
     omega = 2 * math.pi * 25.0
     errors = [abs(h[i, i] - STIFFNESS[i, i] - 1j * omega * DAMPING[i, i]) / abs(STIFFNESS[i, i]) for i in (0, 1)]
     said = {str(c) for c in (*result.conditions, *(c for p in result.points for c in p.quality))}
-    return float(max(errors)), frozenset(said - USUAL)
+    return float(max(errors)), sorted(said - USUAL)
 
 
-def row(name: str, outcomes: list[Outcome]) -> list[str]:
-    """One line of the table."""
-    n = len(outcomes)
-    named, others = sum(o.named for o in outcomes), sum(o.blamed_others for o in outcomes)
-    errors = [o.error for o in outcomes if not math.isnan(o.error)]
+def cells(name: str, outcomes: list[dict[str, Any]]) -> list[str]:
+    """One row of the table."""
+    count = len(outcomes)
+    named, others = sum(o["named"] for o in outcomes), sum(o["others"] for o in outcomes)
+    errors = [o["error"] for o in outcomes if o["error"] is not None]
     worst = f"{100 * max(errors):.1f} %" if errors else "-"
-    severity = ", ".join(sorted({o.severity for o in outcomes}))
-    counts = Counter(c for o in outcomes for c in o.said)
-    said = ", ".join(f"{c} {k}" for c, k in counts.most_common()) or "-"
-    return [name, f"{named} of {n}", severity, f"{others} of {n}", worst, said]
-
-
-class Rows:
-    """Outcomes by fault and seed, kept in a file as they come."""
-
-    def __init__(self, path: Path | None) -> None:
-        self.path = path
-        lines = path.read_text("utf-8").splitlines() if path is not None and path.exists() else []
-        self.known = {(row["what"], row["fault"], row["seed"]): row for row in map(json.loads, lines)}
-
-    def take(self, what: str, fault: str, seed: int, values: dict[str, object]) -> None:
-        """Keep one result."""
-        row = {"what": what, "fault": fault, "seed": seed, **values}
-        self.known[what, fault, seed] = row
-        if self.path is not None:
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
-
-    def outcome(self, fault: str, seed: int) -> Outcome:
-        """What is known of one campaign."""
-        checked = self.known["check", fault, seed]
-        found = self.known["identify", fault, seed]
-        named, others, severity = (checked[k] for k in ("named", "others", "severity"))
-        error = math.nan if found["error"] is None else found["error"]
-        return Outcome(named, others, severity, error, frozenset(found["said"]))
+    severity = ", ".join(sorted({o["severity"] for o in outcomes}))
+    conditions = Counter(c for o in outcomes for c in o["said"])
+    text = ", ".join(f"{c} {k}" for c, k in conditions.most_common()) or "-"
+    return [name, f"{named} of {count}", severity, f"{others} of {count}", worst, text]
 
 
 def make(path: Path, name: str, seed: int) -> str | None:
@@ -262,25 +227,15 @@ def make(path: Path, name: str, seed: int) -> str | None:
     return None if fault is None else fault.run
 
 
-def work(name: str, seed: int, rows: Rows, folder: Path) -> None:
-    """Do what is missing of one campaign."""
-    missing = [step for step in ("check", "identify") if (step, name, seed) not in rows.known]
-    if not missing:
-        return
+def run_seed(name: str, seed: int, folder: Path) -> dict[str, Any]:
+    """One campaign through `check` and `identify`."""
     path = folder / "c.h5"
     struck = make(path, name, seed)
-    if "check" in missing:
-        found = judge(path, struck)
-        rows.take(
-            "check",
-            name,
-            seed,
-            {"named": found.named, "others": found.blamed_others, "severity": found.severity},
-        )
-    if "identify" in missing:
-        error, said = identified(path)
-        rows.take("identify", name, seed, {"error": None if math.isnan(error) else error, "said": sorted(said)})
+    named, others, severity = judge(path, struck)
+    error, conditions = identified(path)
     path.unlink()
+    row = {"fault": name, "seed": seed, "named": named, "others": others, "severity": severity}
+    return {**row, "error": None if math.isnan(error) else error, "said": conditions}
 
 
 def main() -> None:
@@ -291,21 +246,22 @@ def main() -> None:
     parser.add_argument("--faults", nargs="*", help="parts of names")
     parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    given = parser.parse_args()
-    rows, entries = Rows(given.rows), []
+    asked = parser.parse_args()
+    stored, entries = Rows(asked.rows, "fault", "seed"), []
     with tempfile.TemporaryDirectory() as scratch:
         for name in (GOOD, WANDERING, *FAULTS, *AMPLIFIED, MIXED):
-            if given.faults and not any(part in name for part in given.faults):
+            if asked.faults and not any(part in name for part in asked.faults):
                 continue
-            seeds = range(given.first, given.first + (given.good if name in (GOOD, WANDERING) else given.seeds))
+            seeds = range(asked.first, asked.first + (asked.good if name in (GOOD, WANDERING) else asked.seeds))
             for seed in seeds:
-                work(name, seed, rows, Path(scratch))
-            entries.append(row(name, [rows.outcome(name, seed) for seed in seeds]))
+                if (name, seed) not in stored.known:
+                    stored.add(run_seed(name, seed, Path(scratch)))
+            entries.append(cells(name, [stored.known[name, seed] for seed in seeds]))
             print(entries[-1], flush=True)
-    if given.write:
-        seeds = f"--seeds {given.seeds} --first {given.first} --good {given.good}"
+    if asked.write:
         head = ("fault", "named", "as", "others blamed", "worst error", "identify says")
-        write_section("faults", f"python -m tests.studies.fault_detection {seeds} --write", table(head, entries))
+        command = f"python -m tests.studies.fault_detection {' '.join(sys.argv[1:])}"
+        write_section("faults", command, table(head, entries))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ that has not converged does not say so. Rows are stored as they come: called aga
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 import warnings
@@ -32,7 +31,7 @@ from model.predict import predict
 from model.prediction import Prediction
 from model.statics.pad_film import PadFilm
 from tests.rigs.random_bearings import Case, draw
-from tests.studies.results import table, write_section
+from tests.studies.results import Rows, table, write_section
 
 
 def turbulence(case: Case, rng: np.random.Generator) -> Prediction:
@@ -189,25 +188,19 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     chosen = parser.parse_args()
     warnings.simplefilter("error")
-    kept: list[dict[str, Any]] = []
-    if chosen.rows is not None and chosen.rows.exists():
-        kept = [json.loads(line) for line in chosen.rows.read_text(encoding="utf-8").splitlines()]
-    known = {(r["kind"], r["case"]) for r in kept}
+    stored = Rows(chosen.rows, "kind", "case")
     cases = draw(chosen.cases, chosen.seed)
     share = chosen.cases // 4
     for kind in chosen.only or KINDS:
         first = min(list(KINDS).index(kind), 3) * share
         for number in range(first, first + share):
-            if (kind, number) in known:
-                continue
-            kept.append(row := judged(kind, number, cases[number]))
-            if row["fault"] or not row["converged"]:
-                print(row, flush=True)
-            if chosen.rows is not None:
-                with chosen.rows.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
+            if (kind, number) not in stored.known:
+                row = judged(kind, number, cases[number])
+                stored.add(row)
+                if row["fault"] or not row["converged"]:
+                    print(row, flush=True)
     head = ("physics", "bearings", "converged", "the rest, all named", "silently wrong")
-    made = table(head, table_rows(kept))
+    made = table(head, table_rows([*stored.known.values()]))
     print(made)
     if chosen.write:
         command = f"python -m tests.studies.random_bearings --cases {chosen.cases} --seed {chosen.seed} --write"

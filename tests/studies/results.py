@@ -6,13 +6,35 @@ made it, on which commit and on which day.
 
 from __future__ import annotations
 
+import json
 import subprocess
 from collections.abc import Iterable, Sequence
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "RESULTS.md"
+
+
+class Rows:
+    """Outcomes of a long study by what identifies them, stored as JSON lines: a study that was stopped goes on."""
+
+    def __init__(self, path: Path | None, *keys: str) -> None:
+        self.path, self.keys = path, keys
+        lines = path.read_text("utf-8").splitlines() if path is not None and path.exists() else []
+        self.known: dict[tuple[Any, ...], dict[str, Any]] = {self._key(row): row for row in map(json.loads, lines)}
+
+    def _key(self, row: dict[str, Any]) -> tuple[Any, ...]:
+        return tuple(row[name] for name in self.keys)
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Store one outcome."""
+        self.known[self._key(row)] = row
+        if self.path is not None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row, default=float) + "\n")
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -15,7 +15,6 @@ rows that are there are not drawn again; the tables are made from it.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 from collections.abc import Sequence
@@ -32,6 +31,7 @@ from model.setup import Setup
 from rigdata.arrays import FloatArray
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
+from tests.studies.results import Rows
 from tpjb_ident.diagnosis.diagnose import ACCURACY, MESH, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
@@ -309,19 +309,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("mixtures.jsonl"))
     asked = parser.parse_args()
-    done = set()
-    if asked.rows.exists():
-        kept = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
-        done = {(row["bearing"], row["seed"]) for row in kept}
+    stored = Rows(asked.rows, "bearing", "seed")
     one = bench(asked.bearing, asked.rows.parent)
     settings = DiagnoseSettings(workers=1, skip=SKIPPED)
     for number in range(asked.count):
         seed = asked.seed + number
-        row = None if (asked.bearing, seed) in done else run(one, KINDS[number % len(KINDS)], seed, settings)
-        if row is not None:
-            with asked.rows.open("a", encoding="utf-8") as out:
-                out.write(json.dumps({"bearing": asked.bearing, **row}, default=float) + "\n")
-    print(tables([json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]))
+        if (asked.bearing, seed) not in stored.known:
+            row = run(one, KINDS[number % len(KINDS)], seed, settings)
+            if row is not None:
+                stored.add({"bearing": asked.bearing, **row})
+    print(tables([*stored.known.values()]))
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ from model.setup import Setup
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
 from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw, hidden
 from tests.studies.diagnosis.tables import tables
-from tests.studies.results import write_section
+from tests.studies.results import Rows, write_section
 from tpjb_ident.compare.rig_from_model import (
     INSTRUMENT_ERRORS,
     ModelConvergenceError,
@@ -149,19 +149,15 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.core is not None:
         os.sched_setaffinity(0, {asked.core})
-    rows = [json.loads(line) for line in asked.rows.read_text("utf-8").splitlines()] if asked.rows.exists() else []
-    done = {(row["bearing"], row["seed"]) for row in rows}
+    stored = Rows(asked.rows, "bearing", "seed")
     one = bench(asked.bearing, None, SKIPPED)
     for number in range(asked.count):
         seed, began = asked.seed + number, time.time()
-        if (asked.bearing, seed) in done:
-            continue
-        row = run(one, asked.bearing, KINDS[number % len(KINDS)], seed)
-        if row is not None:
-            rows.append({"bearing": asked.bearing, "wall": time.time() - began, **row})
-            asked.rows.parent.mkdir(parents=True, exist_ok=True)
-            with asked.rows.open("a", encoding="utf-8") as out:
-                out.write(json.dumps(rows[-1], default=float) + "\n")
+        if (asked.bearing, seed) not in stored.known:
+            row = run(one, asked.bearing, KINDS[number % len(KINDS)], seed)
+            if row is not None:
+                stored.add({"bearing": asked.bearing, "wall": time.time() - began, **row})
+    rows = [*stored.known.values()]
     text = tables([row for row in rows if "failed" not in row])
     print(text)
     if asked.write:
