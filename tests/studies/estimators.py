@@ -2,13 +2,12 @@
 
 Prints, for every case of `estimator_cases` and every method: RMSE of H in % of its norm, bias of kxx
 and kyy in %, coverage of the 95 % intervals in % (all eight entries), milliseconds per H. The default
-method gets all replicates, the others a quarter of them. Ends with exit code 1 if a target is missed.
+method gets all replicates, the others a quarter of them.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import dataclass
 
@@ -49,12 +48,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Row:
-    """One case of the study: windows per direction, targets that the default method misses."""
+    """One case of the study: windows per direction."""
 
     case: str
     windows: int
     scores: dict[str, Score]
-    missed: list[str]
 
 
 def score(case: Case, method: str, replicates: int, seed: int) -> Score:
@@ -100,28 +98,24 @@ def study(replicates: int, seed: int, count: int) -> list[Row]:
 
 def score_case(case: Case, replicates: int, seed: int) -> Row:
     """Score every method in one case."""
-    scores, missed = {}, []
+    scores = {}
     for method in METHODS:
         scores[method] = score(case, method, replicates if method == DEFAULT else max(replicates // 4, 1), seed)
-        if method == DEFAULT:
-            missed = [f"{case.name}: {what}" for what in shortfalls(case, scores[method])]
-    return Row(case.name, case.windows, scores, missed)
+    return Row(case.name, case.windows, scores)
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Print the table; 1 if a target is missed."""
+def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(description="Accuracy, coverage and speed of every estimator")
     parser.add_argument("--replicates", type=int, default=400)
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
     print(f"{options.replicates} replicates, seed {options.seed}: RMSE % (bias kxx, kyy %, coverage %)")
     print("| case | " + " | ".join(METHODS) + " |")
     print("|---|" + "---|" * len(METHODS))
     rows = study(options.replicates, options.seed, options.workers)
-    missed = [text for row in rows for text in row.missed]
-    print("\n".join(["targets missed:", *missed]) if missed else "all targets met")
     if options.write:
         full = [row for row in rows if row.windows == 20]
         times = [np.median([row.scores[m].milliseconds for row in full]) for m in METHODS]
@@ -132,24 +126,7 @@ def main(arguments: list[str] | None = None) -> int:
         write_section(
             "estimators", "python -m tests.studies.estimators --write", note + table(head, [*entries, ratios])
         )
-    return 1 if missed else 0
-
-
-def shortfalls(case: Case, result: Score) -> list[str]:
-    """Targets of the default method that a result misses (for 400 replicates or so)."""
-    found = []
-    low, high = (93, 98) if case.windows == 20 else (92, 98)
-    if not low <= round(result.coverage, 1) <= high:
-        found.append(f"coverage {result.coverage:.1f} % outside {low}-{high} %")
-    if case.windows != 20 or case.kind == "gain" or case.relx not in (0.05, 0.2):
-        return found
-    rmse, bias = (3.5, 0.3) if case.relx == 0.2 else (1.1 if case.share > 0.35 else 1.0, 0.15)
-    if result.rmse > rmse:
-        found.append(f"RMSE {result.rmse:.2f} % > {rmse} %")
-    if np.abs(result.bias).max() > bias and case.share <= 0.3:
-        found.append(f"bias {np.abs(result.bias).max():.2f} % > {bias} %")
-    return found
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

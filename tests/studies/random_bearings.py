@@ -70,11 +70,6 @@ def thd(case: Case, rng: np.random.Generator) -> Prediction:
     return predict(as_workshop(case), case.load, case.direction, case.speed, pivots=case.stiffness, thermal="thd")
 
 
-def thd_cold(case: Case, rng: np.random.Generator) -> Prediction:
-    """The same with the clearances taken as the workshop's, at 20 degC: narrow, fast bearings seize."""
-    return predict(case.bearing, case.load, case.direction, case.speed, pivots=case.stiffness, thermal="thd")
-
-
 def as_workshop(case: Case) -> Bearing:
     """The bearing at 20 degC that has the drawn clearances when it runs."""
     bearing, supply = case.bearing, case.bearing.oil.supply_temperature
@@ -95,14 +90,12 @@ KINDS: dict[str, Callable[[Case, np.random.Generator], Prediction]] = {
     "rolling": rolling,
     "mixing": mixing,
     "thd": thd,
-    "thd-cold": thd_cold,
 }
 NAMES = {
     "turbulence": "turbulence, Re to ten thousand",
     "rolling": "pivots that roll or slide",
     "mixing": "hot oil round the ring, lambda 0.3 to 0.95",
     "thd": "`thd`, clearances drawn as they run",
-    "thd-cold": "`thd`, the same clearances cold",
 }
 #: The heat that does not leave, as a share of what is made: the balances are second order in the mesh.
 HEAT_LIMIT = 0.1
