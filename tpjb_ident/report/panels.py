@@ -74,7 +74,10 @@ def position_panels(
     predicted: Mapping[str, FloatArray],
     others: Sequence[ClearancePolygon] = (),
 ) -> list[Panel]:
-    """Draw polygon and locus in one square panel."""
+    """Draw polygon and locus in one square panel.
+
+    `drawn` is the drawing's (n_pads,) pad angles [rad] and clearances [m]; positions are (n, 2) [m].
+    """
     nothing = measured is None or (isinstance(measured, np.ndarray) and not len(measured))
     if polygon is None and nothing:
         return []
