@@ -174,8 +174,8 @@ def test_one_field_marches_as_three_do():
     operator = balanced()
     rng = np.random.default_rng(5)
     sources = rng.standard_normal((80, 7))
-    operator.made[:] = 0.0
-    operator.made[:, ::6] = sources
+    operator.dissipation[:] = 0.0
+    operator.dissipation[:, ::6] = sources
     many, taken = marched(operator)
     one = np.zeros((81, 42))
     assert march_one(operator, one, sources) == pytest.approx(taken[0], rel=1e-12)
@@ -211,9 +211,9 @@ def balanced() -> CrossOperator:
 
 def marched(operator: CrossOperator) -> tuple[np.ndarray, np.ndarray]:
     """Its three fields, and what the journal takes."""
-    fields = np.zeros((operator.made.shape[0] + 1, operator.made.shape[1], 3))
+    fields = np.zeros((operator.dissipation.shape[0] + 1, operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
-    return fields, march_cross(operator, fields, operator.made)
+    return fields, march_cross(operator, fields, operator.dissipation)
 
 
 @pytest.mark.slow
