@@ -29,7 +29,7 @@ from tests.report.plot_cases import (
 )
 from tpjb_ident.report import plots
 from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.plots.residuals import residual_frame
+from tpjb_ident.report.drawing.residual_frame import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0
@@ -167,10 +167,11 @@ def test_a_figure_shows_itself_in_a_notebook():
     assert dict(matplotlib.rcParams) == before
 
 
-def test_plots_are_reached_lazily_and_misspelt_names_get_the_nearest():
+def test_a_plot_is_a_function_by_the_name_of_its_file():
     assert ti.plots is plots
-    with pytest.raises(AttributeError, match="did you mean 'pivot_stiffness'"):
-        _ = plots.pivot_stifness
+    files = {path.stem for path in Path(plots.__file__).parent.glob("*.py")} - {"__init__"}
+    assert files == set(plots.__all__)
+    assert all(getattr(plots, name).__module__ == f"{plots.__name__}.{name}" for name in files)
 
 
 def test_extrapolation_is_drawn_apart():

@@ -30,7 +30,7 @@ EXTENSION_POINTS = {
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
     "a motion of the virtual rig": ("rigdata/virtual_rig/motion.py:Motion",),
-    "a plot": ("tpjb_ident/report/plots/*.py:[!_]*",),
+    "a plot": ("tpjb_ident/report/plots/*.py:=",),
     "what a face returns": (
         "model/bearing.py:Pad",
         "model/bearing.py:Oil",

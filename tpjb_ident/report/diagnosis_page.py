@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from tpjb_ident.compare.effect_words import UNITS, finding, label_in_words, words_of
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
+from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels
-from tpjb_ident.report.plots.diagnoses import gap
-from tpjb_ident.report.plots.residuals import residual_frame, residual_map, residual_series
+from tpjb_ident.report.plots.gap import gap
+from tpjb_ident.report.plots.residual_map import residual_map
+from tpjb_ident.report.plots.residual_series import residual_series
 from tpjb_ident.rounding import signed
 
 if TYPE_CHECKING:

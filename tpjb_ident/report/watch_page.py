@@ -11,7 +11,7 @@ import numpy as np
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
-from tpjb_ident.report.plots.coefficients import direct_coefficients
+from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located

@@ -14,9 +14,10 @@ from tpjb_ident.report.comparison_page import measured_table
 from tpjb_ident.report.drawing.series import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.page import Section, render_section
-from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
-from tpjb_ident.report.plots.points import window_weights
-from tpjb_ident.report.plots.residuals import residual_map
+from tpjb_ident.report.plots.coefficient import coefficient
+from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
+from tpjb_ident.report.plots.residual_map import residual_map
+from tpjb_ident.report.plots.window_weights import window_weights
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 if TYPE_CHECKING:

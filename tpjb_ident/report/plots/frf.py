@@ -1,168 +1,27 @@
-"""Pictures of coefficients: of several bearings (Fig. 15, 16), with predictions (Fig. 17 to 20), h over frequency."""
+"""Draw the real and the imaginary part of h over frequency with 95 % intervals, over a band the coherence below."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
-from tpjb_ident.report.drawing.picture import add_legend, label, new_picture, new_pictures
-from tpjb_ident.report.drawing.series import AXES, DIRECT, as_table, longest_series, with_errors
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, STATIC_COLUMNS, coefficient_column
+from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.series import longest_series, with_errors
+from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import pandas as pd
 
-    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.dynamic.broadband.band_result import BandResult
     from tpjb_ident.dynamic.results.identification import Identification
-
-
-def coefficient(
-    comparison: Comparison | pd.DataFrame,
-    name: str,
-    *,
-    over: Literal["load", "frequency"] = "load",
-    title: str | None = None,
-) -> Figure:
-    """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
-
-    Parameters
-    ----------
-    comparison : Comparison or DataFrame
-        What `compare_campaign` gives, or its table (``comparison.csv``). A prediction that needed a pivot beyond its
-        measured loads stands in a frame.
-    name : str
-        ``"kxx"``, ``"kxy"``, .. ``"cyy"``.
-    over : {"load", "frequency"}
-        The longest series over it is drawn.
-    title : str, optional
-
-    Raises
-    ------
-    ValueError
-        For an unknown coefficient, or when nothing varies over `over`.
-    """
-    names = [column[:3] for column in COEFFICIENT_COLUMNS]
-    if name not in names:
-        raise ValueError(f"name must be one of {', '.join(names)}; got {name!r}")
-    series = longest_series(_comparison_table(comparison), over)
-    if series is None:
-        raise ValueError(f"the campaign has no two points that differ in {over} alone")
-    kind = KINDS[name[0]]
-    scale, key = kind.display_scale, coefficient_column(name)
-    column, axis_scale, axis_label = AXES[over]
-    figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
-    for variant in dict.fromkeys(series["pivots"]):
-        rows = series[series["pivots"] == variant].sort_values(column)
-        _draw_predicted(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
-    measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
-    value, errors = with_errors(measured, key, scale)
-    axes.errorbar(
-        measured[column] / axis_scale, value, yerr=errors, fmt="o", color=INK,
-        markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
-    )  # fmt: skip
-    axes.margins(x=0.06, y=0.1)
-    if name in DIRECT:
-        axes.set_ylim(bottom=0.0)
-    add_legend(axes)
-    return figure
-
-
-def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
-    if isinstance(comparison, pd.DataFrame):
-        return comparison
-    from tpjb_ident.compare.comparison import comparison_frame
-
-    return comparison_frame(comparison)
-
-
-def _draw_predicted(axes: Axes, over: pd.Series, predicted: pd.Series, rows: pd.DataFrame, variant: str) -> None:
-    colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
-    x, y = over.to_numpy(float), predicted.to_numpy(float)
-    axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
-              label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
-    if variant == "measured" and "pivot_extrapolated" in rows:
-        extrapolated = rows["pivot_extrapolated"].to_numpy(bool)
-        if extrapolated.any():
-            axes.plot(x[extrapolated], y[extrapolated], linestyle="none", marker=marker, markersize=8.5,
-                      color=LIGHT[colour], markerfacecolor="none", label="beyond the dry tests")  # fmt: skip
-
-
-_BEARING_COLOURS = ("blue", "red", "green", "purple")
-#: Marker, line and fill of the entry: full lines for the loaded direction.
-_ENTRY_STYLE: dict[str, tuple[str, Any, str | None]] = {
-    "xx": ("s", (0, (4, 2)), "paper"),
-    "yy": ("o", "-", None),
-    "xy": ("<", (0, (1, 1.5)), "paper"),
-    "yx": (">", (0, (3, 1, 1, 1)), "paper"),
-}
-
-
-def direct_coefficients(
-    bearings: Mapping[str, Identification | pd.DataFrame],
-    part: Literal["k", "c"] = "k",
-    *,
-    over: Literal["load", "frequency"] = "load",
-    entries: tuple[str, ...] = ("xx", "yy"),
-    title: str | None = None,
-) -> Figure:
-    """Draw measured coefficients of one or several bearings with their 95 % intervals (the paper's Fig. 15, 16).
-
-    Parameters
-    ----------
-    bearings : mapping of str to Identification or DataFrame
-        By name; a table as ``coefficients.csv`` or ``comparison.csv``.
-    part : {"k", "c"}
-        Stiffness or damping.
-    over : {"load", "frequency"}
-        The longest series over it is drawn; the points that lie apart from it are not.
-    entries : tuple of str
-        Out of ``"xx"``, ``"xy"``, ``"yx"``, ``"yy"``.
-    title : str, optional
-
-    Raises
-    ------
-    ValueError
-        When no bearing was measured at two loads or frequencies.
-    """
-    kind = KINDS[part]
-    column, axis_scale, axis_label = AXES[over]
-    figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
-    drawn = False
-    for (name, source), colour in zip(bearings.items(), _BEARING_COLOURS * len(bearings), strict=False):
-        series = longest_series(as_table(source), over)
-        if series is None:
-            continue
-        drawn = True
-        rows = series.drop_duplicates(column).sort_values(column)
-        for entry in entries:
-            marker, dashes, face = _ENTRY_STYLE[entry]
-            key = kind.column(entry)
-            value, errors = with_errors(rows, key, kind.display_scale)
-            axes.errorbar(
-                rows[column] / axis_scale, value, yerr=errors, marker=marker,
-                markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour], linestyle=dashes,
-                linewidth=1.3, capsize=3, label=f"{name}, {part}{entry}",
-            )  # fmt: skip
-    if not drawn:
-        raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
-    if set(entries) <= {"xx", "yy"}:
-        axes.set_ylim(bottom=0.0)
-    axes.margins(x=0.06)
-    add_legend(axes)
-    return figure
-
 
 _FRF_STYLE = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
 

@@ -1,4 +1,4 @@
-"""Fig. 14: measured clearance polygons and the locus of the shaft centre over the load's direction."""
+"""Draw clearance polygons and shaft positions about the bearing centre (the paper's Fig. 14)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
 
-
 _POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
     ("ink", "-"),
     ("red", (0, (6, 2, 1, 2))),
     ("green", (0, (4, 2))),
     ("purple", (0, (1, 1.5))),
 )
+
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
 
 

@@ -1,0 +1,90 @@
+"""Draw the multiple coherence of each force component with both displacements, over frequency (Welch's method)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
+
+if TYPE_CHECKING:
+    from rigdata.run import Run
+
+_FORCE_STYLE: tuple[tuple[str, Any], ...] = (("blue", "-"), ("red", (0, (5, 2))))
+
+_FEWEST_SEGMENTS = 5
+
+_LEVEL = 0.95
+
+
+def coherence_spectrum(
+    run: Run, *, up_to: float | None = None, segment: float | None = None, title: str | None = None
+) -> Figure:
+    """Draw the multiple coherence of each force component with both displacements, over frequency (Welch's method).
+
+    It is near one where something drives the bearing, and scatters below the dashed line where nothing does.
+
+    Parameters
+    ----------
+    run : Run
+        A dynamic run.
+    up_to : float, optional
+        Highest frequency [Hz]; default: four times the excitation frequency, half the sample rate without one.
+    segment : float, optional
+        Length of the averaged pieces [s]; default: as many pieces as give 16 averages at half overlap.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        When the run is too short for the segments.
+    """
+    force, move = run.vector("force"), run.vector("displacement")
+    n = min(len(force), len(move))
+    rate = run.sample_rate
+    piece = int(segment * rate) if segment else n // 8
+    if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
+        raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
+    frequency, value, averages = _multiple_coherence(force.values[:n], move.values[:n], rate, piece)
+    drive = run.point.excitation_hz
+    top = up_to or (4.0 * drive if drive else 0.5 * rate)
+    figure, axes = new_picture("frequency, Hz", "multiple coherence", title=title)
+    for row, name, (colour, dashes) in zip(value, ("horizontal force", "vertical force"), _FORCE_STYLE, strict=True):
+        axes.plot(frequency, row, color=LIGHT[colour], linestyle=dashes, linewidth=1.3, label=name)
+    # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
+    from scipy.special import betaincinv
+
+    chance = float(betaincinv(2, max(averages - 2, 1), _LEVEL))
+    axes.axhline(chance, color=INK, linestyle=(0, (4, 2)), linewidth=0.9, label="by chance, 95 %")
+    if drive:
+        axes.axvline(drive, color=GREY, linewidth=0.9)
+        axes.text(drive, 0.03, f" {drive:g} Hz", color=INK, fontsize=FONT_SIZE - 1, va="bottom")
+    axes.set_xlim(0.0, top)
+    axes.set_ylim(0.0, 1.02)
+    add_legend(axes)
+    return figure
+
+
+def _multiple_coherence(
+    force: FloatArray, move: FloatArray, rate: float, piece: int
+) -> tuple[FloatArray, FloatArray, int]:
+    """Frequencies (m,) [Hz], coherence (2, m), and the number of independent averages."""
+    good = np.isfinite(force).all(axis=1) & np.isfinite(move).all(axis=1)
+    signals = np.column_stack([move, force])
+    signals = np.where(np.asarray(good)[:, None], signals, signals[good].mean(axis=0))
+    window = np.hanning(piece)
+    starts = range(0, len(signals) - piece + 1, piece // 2)
+    spectra = np.array([np.fft.rfft((s - s.mean(axis=0)) * window[:, None], axis=0)
+                        for s in (signals[a : a + piece] for a in starts)])  # fmt: skip
+    cross = np.einsum("kfi,kfj->fij", spectra.conj(), spectra)
+    inputs, joint, power = cross[:, :2, :2], cross[:, :2, 2:], np.einsum("fii->fi", cross[:, 2:, 2:]).real
+    explained = np.einsum("fij,fij->fj", joint.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ joint).real
+    value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)
+    # half-overlapping Hann windows: about 11/9 of the pieces that fit side by side count as independent
+    averages = max(math.floor(11.0 / 18.0 * len(spectra)), 3)
+    return np.asarray(np.fft.rfftfreq(piece, 1.0 / rate), float), np.asarray(value.T, float), averages

@@ -1,0 +1,93 @@
+"""Draw (measured - predicted) / sigma as a heat map: coefficients by rows, operating points by columns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import SymLogNorm
+from matplotlib.figure import Figure
+
+from tpjb_ident.report.drawing.colours import DIVERGING, INK, VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import (
+    FONT_SIZE,
+    add_colour_bar,
+    label,
+    new_pictures,
+    shrink,
+)
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
+from tpjb_ident.report.drawing.residual_frame import residual_frame
+
+_ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
+
+_ON_COLOUR = "#1b1f23"  # ink that stays dark on its coloured ground when the page turns dark
+
+_CELL, _SHORTEST = 0.42, 4.4  # width of a cell and of the whole picture [inches]
+
+_HEIGHT = 2.9
+
+_LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
+
+
+def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | None = None) -> Figure:
+    """Draw (measured - predicted) / sigma as a heat map: coefficients by rows, operating points by columns.
+
+    Operating points stand in order of load, then of excitation frequency. One panel per model: baseline and model with
+    the effects found, of a diagnosis; one per pivot law, of a comparison. The colours are the same in all panels;
+    they grow with the logarithm beyond 2 sigma.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        See `residual_frame`.
+    title : str, optional
+    """
+    frame = residual_frame(source)
+    models = list(dict.fromkeys(frame["model"]))
+    if not models:
+        raise ValueError("there are no residuals of coefficients to draw")
+    points = sorted(set(zip(frame["static_load_N"], frame["excitation_Hz"], strict=True)))
+    width = max(_SHORTEST, _CELL * len(points) + 1.9)
+    figure, grid = new_pictures(len(models), 1, title=title, width=width, height=_HEIGHT)
+    limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
+    norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
+    for (axes,), model in zip(grid, models, strict=True):
+        _draw_map(axes, frame[frame["model"] == model], points, norm, VARIANT_LABEL.get(model, str(model)))
+    return figure
+
+
+def _draw_map(axes: Axes, frame: pd.DataFrame, points: list[tuple[float, float]], norm: Any, name: str) -> None:
+    table = np.full((len(_ENTRIES), len(points)), np.nan)
+    column = {point: j for j, point in enumerate(points)}
+    for entry, load, frequency, z in frame[["entry", "static_load_N", "excitation_Hz", "z"]].to_numpy():
+        table[_ENTRIES.index(entry), column[load, frequency]] = z
+    size = float(np.sqrt(np.nanmean(table**2)))
+    label(axes, "static load, kN, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
+    shrink(axes, bottom=0.25)
+    image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+    axes.grid(False)
+    axes.set_yticks(range(len(_ENTRIES)), _ENTRIES)
+    axes.set_xticks(range(len(points)), [f"{w / 1e3:g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.5)
+    axes.axhline(3.5, color=INK, linewidth=0.8)
+    for (i, j), z in np.ndenumerate(table):
+        if np.isfinite(z):
+            strong = abs(norm(z) - 0.5) > 0.3
+            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 2.5,
+                      color="white" if strong else _ON_COLOUR)  # fmt: skip
+    add_colour_bar(axes, image, "(measured - predicted) / sigma")
+    bar = axes.figure.axes[-1]
+    ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
+    bar.set_yticks(ticks, [str(t) for t in ticks])
+    bar.minorticks_off()
+
+
+def _short(z: float) -> str:
+    return f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
