@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.dynamic.phasor_cases import FILM_H as H
+from tests.dynamic.phasor_cases import OMEGA
 from tpjb_ident.dynamic.estimators.estimate import METHODS, SOLVERS, estimate_dynamic_stiffness
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix, real_rows
-from tpjb_ident.dynamic.estimators.rlm import NORMS, ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-
-OMEGA = 2 * np.pi * 25.0
-H = np.array([[2.1e8 + 6.3e7j, 2.0e7 + 3.1e6j], [-1.5e7 + 1.6e6j, 5.0e8 + 9.4e7j]])
+from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit, solve_rlm
 
 
 def sample(seed: int, directions: int = 6, windows: int = 10, noise: float = 0.02, bad: float = 0.0):
@@ -105,14 +104,6 @@ def test_r_matrix_is_eq_14_row_by_row():
         r_matrix(D, F[:1])
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_two_windows_give_h_exactly_and_no_interval(method: str):
-    est = run(method, *sample(8, directions=2, windows=1, noise=0.0))
-    np.testing.assert_allclose(est.h, H, rtol=1e-9, atol=1e-9 * abs(H).max())
-    assert "no-residual" in est.status
-    assert np.isnan(est.covariance).all()
-
-
 def test_conditions_are_named():
     D, F, label, command = sample(6)
     one = run("mm-eiv", D[:10], F[:10], label[:10], command[:10])
@@ -121,15 +112,10 @@ def test_conditions_are_named():
     collinear = D.copy()
     collinear[:, 1] = 2 * collinear[:, 0]
     assert "fewer-than-two-directions" in run("ols", collinear, F, label, command).status
-    nearly = D.copy()
-    nearly[:, 1] = 2 * nearly[:, 0] + 0.02 * nearly[:, 1]
-    assert "ill-conditioned" in run("ols", nearly, F, label, command).status
     single = estimate_dynamic_stiffness(D, F, OMEGA)  # every window a direction of its own
     assert "no-repeats" in single.status
     few = run("mm", *sample(7, directions=3, windows=1))
     assert "no-robust-start" in few.status
-    many = run("mm", *sample(8, directions=8, windows=12, bad=0.46))
-    assert "many-windows-rejected" in many.status
     assert run("mm-eiv", *sample(9)).status == ()
 
 
@@ -152,10 +138,9 @@ def test_arguments_are_checked():
         estimate_dynamic_stiffness(D, F, OMEGA, label, method="rlm", norm="hubert")
     with pytest.raises(ValueError, match="belongs to"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, norm="huber")
-    with pytest.raises(ValueError, match="omega"):
-        estimate_dynamic_stiffness(D, F, 0.0, label)
-    with pytest.raises(ValueError, match="one label per window"):
-        estimate_dynamic_stiffness(D, F, OMEGA, label[:-1])
+    for wrong in (0.0, -1.0, np.inf, np.nan):
+        with pytest.raises(ValueError, match="omega must be a positive number"):
+            estimate_dynamic_stiffness(D, F, wrong, label)
     with pytest.raises(ValueError, match="needs reference"):
         estimate_dynamic_stiffness(D, F, OMEGA, label, method="iv")
 
@@ -166,8 +151,9 @@ def test_pint_quantities_are_converted_and_wrong_ones_named():
     ureg = pint.UnitRegistry()
     D, F, label, _ = sample(12)
     plain = estimate_dynamic_stiffness(D, F, OMEGA, label)
-    est = estimate_dynamic_stiffness(D * 1e6 * ureg.um, F / 1e3 * ureg.kN, OMEGA * ureg.rad / ureg.s, label)
+    est = estimate_dynamic_stiffness(D * 1e6 * ureg.um, F / 1e3 * ureg.kN, 60 * OMEGA * ureg.rad / ureg.min, label)
     np.testing.assert_allclose(est.h, plain.h, rtol=1e-9)
+    assert est.omega == pytest.approx(OMEGA, rel=1e-12)
     with pytest.raises(ValueError, match="F must be convertible to N"):
         estimate_dynamic_stiffness(D, F * ureg.m, OMEGA, label)
 
@@ -226,17 +212,10 @@ def test_without_statsmodels_it_is_statsmodels_to_the_last_bit(norm: str, name: 
 def test_rlm_traps_are_guarded():
     D, F, _, _ = sample(15, noise=0.05)
     d, f = np.abs(D).max(), np.abs(F).max()
-    with pytest.raises(ComplexInputError, match="Stack real and imaginary"):
-        solve_rlm(D / d, F[:, 0] / f)
     short = rlm_fit(D / d, F / f, RlmSettings(max_iterations=2))
     assert "iteration-limit" in short.conditions
-    exact = rlm_fit(*_exact())
-    assert "zero-scale" in exact.conditions
-
-
-def _exact():
     D, F, _, _ = sample(16, noise=0.0)
-    return D / np.abs(D).max(), F / np.abs(F).max()
+    assert "zero-scale" in rlm_fit(D / np.abs(D).max(), F / np.abs(F).max()).conditions
 
 
 def test_thousands_of_windows_start_from_a_share_of_them():

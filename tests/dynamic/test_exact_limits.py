@@ -21,10 +21,7 @@ from tpjb_ident.dynamic.estimators.robust_constants import (
 )
 from tpjb_ident.dynamic.estimators.uncertainty import (
     DirectionMeans,
-    complex_to_real_covariance,
-    direction_covariances,
     direction_effect,
-    homoscedastic,
     information,
     mixed_dof,
 )
@@ -79,13 +76,6 @@ def test_without_noise_on_displacements_errors_in_variables_are_least_squares():
     np.testing.assert_allclose(eiv_fit(given).h, plain, rtol=0, atol=1e-9)
 
 
-def test_without_noise_on_forces_they_are_the_inverse_regression():
-    noise = np.diag([1e-2, 1e-2, 1e-14, 1e-14]).astype(complex)
-    given = means_of(3, noise)
-    inverse = np.linalg.lstsq(given.means.F, given.means.D, rcond=None)[0].T
-    np.testing.assert_allclose(eiv_fit(given).h, np.linalg.inv(inverse), rtol=0, atol=1e-8)
-
-
 def test_exchanging_cause_and_effect_inverts_h():
     mix = complex_normal(np.random.default_rng(4), 4, 4)
     noise = 1e-3 * (mix @ mix.conj().T + np.eye(4))
@@ -106,23 +96,6 @@ def test_attenuation_is_noise_over_noise_and_signal():
     noise = np.diag([power, power, power, power]).astype(complex)
     given = Repeats(DirectionMeans(D, D @ H.T, np.full(4, count)), noise, 4 * count, np.ones(4))
     np.testing.assert_allclose(eiv_fit(given).attenuation, power / (1 + power), rtol=1e-6)
-
-
-def test_stated_covariance_of_errors_in_variables_is_that_of_draws():
-    noise = 4e-4 * np.array([[1, 0.3j, 0, 0], [-0.3j, 1, 0, 0], [0, 0, 2, 0.5], [0, 0, 0.5, 3]], dtype=complex)
-    rng = np.random.default_rng(6)
-    D = complex_normal(rng, 6, 2)
-    exact, count = np.concatenate([D, D @ H.T], axis=1), np.full(6, 20.0)
-    root = np.linalg.cholesky(noise) / np.sqrt(20.0)
-    found, stated = [], []
-    for _ in range(300):
-        z = exact + complex_normal(rng, 6, 4) @ root.T
-        fit = eiv_fit(Repeats(DirectionMeans(z[:, :2], z[:, 2:], count), noise, 114.0, np.ones(120)))
-        found.append(np.concatenate([fit.h.real.ravel(), fit.h.imag.ravel()]))
-        if fit.chi_square < 1:  # directions agree as their repeats say: nothing is added for them
-            stated.append(np.diag(fit.covariance))
-    assert len(stated) > 100
-    np.testing.assert_allclose(np.mean(stated, axis=0), np.var(found, axis=0), rtol=0.35)
 
 
 def windows(seed: int, noise: np.ndarray, g: int = 6, n: int = 300):
@@ -146,20 +119,6 @@ def test_pooled_noise_of_repeats_is_that_of_the_draws():
     np.testing.assert_allclose(state.means.D, mean, atol=5e-3 * np.abs(mean).max())
 
 
-def test_too_few_repeats_give_no_noise():
-    table, _ = windows(8, 1e-3 * np.eye(4, dtype=complex), g=3, n=3)
-    assert repeats(table, np.ones(len(table))) is None
-
-
-def test_covariance_of_real_and_imaginary_parts():
-    rng = np.random.default_rng(9)
-    root = complex_normal(rng, 2, 2)
-    hermitian = root @ root.conj().T
-    draws = complex_normal(rng, 100_000, 2) @ root.T
-    real = np.cov(np.concatenate([draws.real, draws.imag], axis=1).T)
-    np.testing.assert_allclose(complex_to_real_covariance(hermitian), real, atol=0.02 * np.abs(hermitian).max())
-
-
 def test_information_is_a_sum_of_kronecker_products():
     rng = np.random.default_rng(10)
     D, star, inverse = complex_normal(rng, 3, 2), complex_normal(rng, 3, 2), complex_normal(rng, 3, 2, 2)
@@ -176,7 +135,7 @@ def test_degrees_of_freedom_in_the_limits():
     np.testing.assert_allclose(mixed_dof(one, one, 0.2, between), 1.0)
 
 
-def test_direction_effect_is_nothing_without_cause_and_found_where_it_is():
+def test_direction_effect_is_nothing_without_cause_and_unknown_without_a_spare_direction():
     rng = np.random.default_rng(11)
     D, noise = complex_normal(rng, 40, 2), 1e-4 * np.eye(2, dtype=complex)
     means = DirectionMeans(D, D @ H.T, np.full(40, 10.0))
@@ -185,40 +144,13 @@ def test_direction_effect_is_nothing_without_cause_and_found_where_it_is():
     assert not T.any()
     two = DirectionMeans(D[:2], D[:2], np.full(2, 10.0))
     assert np.isnan(direction_effect(0 * D[:2], two, noise)[1])
-    size = np.linalg.norm(D, axis=1)[:, None]
-    effect = np.array([[4.0, 1.0j], [-1.0j, 2.0]]) * 1e-2
-    off = size * (complex_normal(rng, 40, 2) @ np.linalg.cholesky(effect).T)
-    hat = D @ np.linalg.lstsq(D, off, rcond=None)[0]
-    T, chi = direction_effect(off - hat, means, noise)
-    assert chi > 100
-    np.testing.assert_allclose(T, effect, atol=0.4 * 4e-2)
-    np.testing.assert_allclose(T, T.conj().T)
-    V = direction_covariances(means, noise, T)
-    np.testing.assert_allclose(V[3], noise / 10 + T * size[3] ** 2)
-
-
-def test_covariance_without_repeats_is_that_of_least_squares():
-    rng = np.random.default_rng(12)
-    D = complex_normal(rng, 12, 2)
-    F = D @ H.T + 0.1 * complex_normal(rng, 12, 2)
-    residual = F - D @ np.linalg.lstsq(D, F, rcond=None)[0]
-    covariance, dof = homoscedastic(D, residual, np.ones(12))
-    np.testing.assert_array_equal(dof, 20.0)
-    for axis in range(2):
-        design, _ = real_rows(D, F[:, axis])
-        s2 = (np.abs(residual[:, axis]) ** 2).sum() / 20
-        own = s2 * np.linalg.inv(design.T @ design)
-        rows = np.array([2 * axis, 2 * axis + 1, 4 + 2 * axis, 5 + 2 * axis])
-        np.testing.assert_allclose(covariance[np.ix_(rows, rows)], own, atol=1e-12)
 
 
 def test_either_complex_argument_is_refused_by_rlm():
     design, response = np.eye(4)[:, :2], np.arange(4.0)
     for a, b in ((design + 0j, response), (design, response + 0j)):
-        with pytest.raises(ComplexInputError):
+        with pytest.raises(ComplexInputError, match="Stack real and imaginary"):
             solve_rlm(a, b)
-    with pytest.raises(ValueError, match="did you mean 'huber'"):
-        solve_rlm(design, response, RlmSettings(norm="hubr"))
     with pytest.raises(ValueError, match="unknown scale 'iqr'"):
         solve_rlm(design, response, RlmSettings(scale="iqr"))
 
@@ -250,19 +182,6 @@ def test_rlm_of_two_axes_keeps_places_weights_and_freedom():
     np.testing.assert_array_equal(fit.covariance[np.ix_(rows, rows)], own.covariance)
     np.testing.assert_array_equal(fit.covariance[np.ix_(rows, [0, 1, 4, 5])], 0.0)
     np.testing.assert_array_equal(fit.h[1], own.params[:2] + 1j * own.params[2:])
-
-
-def test_few_windows_are_plain_least_squares_with_its_scatter():
-    rng = np.random.default_rng(15)
-    X = complex_normal(rng, 7, 2)
-    Y = X @ H.T + 0.1 * complex_normal(rng, 7, 2)
-    fit = mm_fit(X, Y, np.arange(7))
-    plain = np.linalg.lstsq(X, Y, rcond=None)[0]
-    residual = Y - X @ plain
-    assert "no-robust-start" in fit.conditions
-    np.testing.assert_allclose(fit.coefficients, plain.T)
-    np.testing.assert_allclose(fit.scatter, residual.T @ residual.conj() / 5)
-    np.testing.assert_array_equal(fit.weights, 1.0)
 
 
 def test_mm_solves_its_own_estimating_equation():
