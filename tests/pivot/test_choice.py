@@ -15,6 +15,7 @@ from tpjb_ident.pivot.law_fit import (
     ALIKE,
     HOPELESS,
     SMALLEST_SHARE,
+    FitData,
     LawFit,
     keep_likely,
     posterior_weights,
@@ -209,3 +210,35 @@ def test_a_hopeless_law_is_not_fitted_again(behind, asked, monkeypatch):
     shared = with_shared_shape(pads, [np.array([0.5, 0.5])] * 2, ["first", "second"])
     assert ("first" in calls) is asked
     assert shared[0][0].log_evidence == pytest.approx(-behind)
+
+
+NAMES = ("hertz-point", "point-in-series", "power")
+
+
+def blocks_of_a_sphere(lam, low=250.0, seed=0, noise=1.5e-8):
+    """Blocks of a sphere on a housing with linear share `lam`, from `low` [N] up."""
+    load = np.linspace(low, 5000.0, 120)
+    deflection = 3e-9 * REFERENCE * LAWS["point-in-series"].phi(load / REFERENCE, np.array([lam]))[0]
+    deflection = deflection + noise * np.random.default_rng(seed).standard_normal(120)
+    return FitData(load, deflection - deflection[0], np.ones(120), np.eye(120) / noise, REFERENCE, (0.0, 1e-4))
+
+
+def test_a_pad_that_shows_half_its_law_takes_the_shape_from_the_others():
+    pads = [blocks_of_a_sphere(0.12, seed=k) for k in range(4)]
+    pads.append(blocks_of_a_sphere(0.12, low=2600.0, seed=11, noise=4e-8))
+    found = [[law_fit.fit_law(LAWS[name], False, one) for name in NAMES] for one in pads]
+    weights = posterior_weights(found)
+    shared = with_shared_shape(found, weights, pads)
+    series = NAMES.index("point-in-series")
+    assert abs(shared[4][series].shape[0] - 0.12) < abs(found[4][series].shape[0] - 0.12)
+    assert posterior_weights(shared)[4][NAMES.index("hertz-point")] < weights[4][NAMES.index("hertz-point")]
+
+
+def test_evidence_is_that_of_the_prior_given():
+    one = blocks_of_a_sphere(0.3)
+    law = LAWS["point-in-series"]
+    known = law_fit.ShapePrior(law.prior_mean, law.prior_precision)
+    plain = law_fit.fit_law(law, False, one).log_evidence
+    assert law_fit.fit_law(law, False, one, known).log_evidence == pytest.approx(plain)
+    sharp = dataclasses.replace(known, mean=np.array([0.3]), precision=np.array([[400.0]]))
+    assert law_fit.fit_law(law, False, one, sharp).log_evidence > plain

@@ -338,3 +338,37 @@ def test_the_smallest_loads_are_taken_as_they_are(load):
     assert fit.log_compliance_gradient(at)[0, 3] == pytest.approx(math.log(u), rel=1e-9)
     assert fit.log_deflection_gradient(at)[0, 3] == pytest.approx(math.log(u) - 1.0 / p, rel=1e-9)
     assert fit.reading(at, np.zeros(1))[0] == pytest.approx(fit.theta[0] + fit.deflection(at)[0], rel=1e-12)
+
+
+def test_a_straight_line_is_found_with_the_error_of_a_straight_line():
+    fit = fit_law(LAWS["linear"], False, data(3e-6 + 4e-9 * LOAD, sigma=1e-9, friction=(0.0, 1e-9)))
+    assert fit.theta[0] == pytest.approx(3e-6, abs=1e-12)
+    assert np.exp(fit.theta[2]) == pytest.approx(4e-9, rel=1e-6)
+    design = np.column_stack([np.ones(24), LOAD])
+    own = 1e-18 * np.linalg.inv(design.T @ design)
+    assert fit.covariance[0, 0] == pytest.approx(own[0, 0], rel=1e-4)
+    assert fit.covariance[2, 2] * (4e-9) ** 2 == pytest.approx(own[1, 1], rel=1e-3)
+    assert fit.chi_square == pytest.approx(0.0, abs=1e-3)
+    assert fit.freedom == 24 - 3
+
+
+def test_readings_have_the_derivatives_that_are_said():
+    both, way = np.r_[LOAD, LOAD[::-1]], np.r_[np.ones(24), -np.ones(24)]
+    given = data(1e-6 + 4e-9 * both**0.95, both, way, sigma=1e-9, friction=(0.0, 0.02))
+    fit = fit_law(LAWS["power"], True, given)
+    theta = fit.theta.copy()
+    theta[1], theta[-2] = 0.04, 2e-6
+    fit = dataclasses.replace(fit, theta=theta)
+    value, jacobian = fit.reading_gradient(both, way)
+    np.testing.assert_array_equal(value, fit.reading(both, way))
+    for j, size in enumerate(np.maximum(np.abs(theta), 1e-6) * 1e-5):
+        up, down = theta.copy(), theta.copy()
+        up[j] += size
+        down[j] -= size
+        ends = [dataclasses.replace(fit, theta=t).reading(both, way) for t in (up, down)]
+        numeric = (ends[0] - ends[1]) / (2 * size)
+        np.testing.assert_allclose(jacobian[:, j], numeric, rtol=1e-4, atol=1e-6 * np.abs(numeric).max())
+    # contact loss is what the reading lacks of the pivot's own deflection, and its slope is the compliance it adds
+    lack = theta[0] + fit.deflection(LOAD) - dataclasses.replace(fit, theta=theta).reading(LOAD, np.zeros(24))
+    np.testing.assert_allclose(lack, theta[-2] * np.exp(-LOAD / np.exp(theta[-1])), rtol=1e-9)
+    np.testing.assert_allclose(fit.missing_compliance(LOAD), lack / np.exp(theta[-1]), rtol=1e-9)

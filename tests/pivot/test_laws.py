@@ -75,3 +75,40 @@ def test_line_contact_is_the_printed_rocker_formula():
     assert ours == pytest.approx(printed, rel=1e-12)
     tangent = front / 2.0 / (logarithm - 1.0 / 3.0)
     assert 1.0 / (scale * law.psi(load / reference, np.array([kappa]))[0]) == pytest.approx(tangent, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "other"),
+    [
+        ("hertz-line", (0.0,), "linear"),
+        ("power", (1.0,), "linear"),
+        ("point-in-series", (1.0,), "linear"),
+        ("point-in-series", (0.0,), "hertz-point"),
+        ("power", (2 / 3,), "hertz-point"),
+        ("bilinear", (0.0, 0.3), "linear"),
+    ],
+)
+def test_laws_turn_into_one_another(name, values, other):
+    """At these shapes they are the same law, deflection and compliance."""
+    u, q = np.geomspace(0.05, 4.0, 30), np.array(values)
+    for kind in ("phi", "psi"):
+        np.testing.assert_allclose(getattr(LAWS[name], kind)(u, q)[0], getattr(LAWS[other], kind)(u, ())[0], rtol=1e-12)
+
+
+def test_a_bilinear_law_has_its_two_compliances_far_from_the_bend():
+    u, q = np.array([1e-3, 0.2, 3.0, 50.0]), np.array([np.log(3.0), 0.0])
+    np.testing.assert_allclose(LAWS["bilinear"].psi(u, q)[0], [3, 3, 1, 1], rtol=2e-3)
+    # after the bend the deflection is behind by what the soft part has given: (r - 1) b
+    np.testing.assert_allclose(LAWS["bilinear"].phi(u, q)[0][2:] - u[2:], 2.0, rtol=1e-4)
+    assert LAWS["bilinear"].psi(np.array([1.0]), q)[0] == pytest.approx(2.0)
+
+
+def test_every_prior_lies_inside_its_bounds_and_is_proper():
+    for law in LAWS.values():
+        low, high = law.bounds
+        spread = 1 / np.sqrt(np.diag(law.prior_precision)) if len(low) else np.zeros(0)
+        assert len(law.parameters) == len(low) == len(high) == len(law.prior_mean)
+        assert ((low <= law.prior_mean) & (law.prior_mean <= high)).all()
+        # a prior wider than its bounds would say nothing; one much narrower would decide for the data
+        assert (spread < high - low).all()
+        assert (spread > 0.05 * (high - low)).all() or law.name == "spline"

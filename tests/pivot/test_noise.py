@@ -1,79 +1,387 @@
-"""The noise model: its covariance, and what it learns from records."""
+"""Noise and mains pick-up where the sums are known: single kinds of noise, exact invariants, pure tones."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
+from tpjb_ident.pivot.blocks import Blocks
+from tpjb_ident.pivot.dry_record import PickupSignature, measure_pickup, noise_about_curve, noise_within_holds
+from tpjb_ident.pivot.refusals import _mismatch, mistakes
+from tpjb_ident.slow_records.noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 BLOCK = 0.1
+
+
+def test_white_noise_alone_is_its_level_over_the_time():
+    duration = np.array([0.1, 0.4, 2.0])
+    covariance = NoiseModel(4e-18, 0.0, 0.0).covariance(np.array([1.0, 2.0, 7.0]), duration)
+    np.testing.assert_allclose(covariance, np.diag(4e-18 / duration), rtol=1e-12)
+    assert NoiseModel(4e-18, 0.0, 1e-8).mean_variance(2.0) == pytest.approx(2e-18, rel=1e-9)
+
+
+def test_a_drift_is_a_straight_line_and_a_bend_of_its_own():
+    """Two equal random parts: t, and t^2 / (span) about its mean; whenever the clock started."""
+    rng = np.random.default_rng(3)
+    time = np.sort(rng.uniform(0.0, 12.0, 30))
+    duration = np.full(30, BLOCK)
+    span = np.ptp(time)
+    t = time - time.mean()
+    parts = np.column_stack([t, (t**2 - np.mean(t**2)) / span])
+    covariance = NoiseModel(1e-30, 0.0, 1.0).covariance(time, duration)
+    np.testing.assert_allclose(covariance, parts @ parts.T, atol=1e-12)
+    later = NoiseModel(1e-30, 0.0, 1.0).covariance(time + 1e4, duration)
+    np.testing.assert_allclose(later, covariance, atol=1e-9)
+    slower = NoiseModel(1e-30, 0.0, 1.0).covariance(3.0 * time, duration)
+    np.testing.assert_allclose(slower, 9.0 * covariance, atol=1e-9)
+
+
+def test_averages_of_flicker_are_those_of_its_instants():
+    """Short averages are instants; a long one has the variance of the mean of its parts."""
+    time = np.array([0.0, 0.3, 5.0])
+    instants = flicker_kernel(time)
+    short = flicker_kernel(time, np.full(3, 1e-5))
+    np.testing.assert_allclose(short, instants, rtol=1e-3)
+    assert (instants[0, 1:] < instants[0, 0]).all()
+    for length in (0.2, 2.0, 20.0):
+        fine = (np.arange(500) + 0.5) * length / 500
+        mean_of_instants = float(np.mean(flicker_kernel(fine)))
+        assert flicker_kernel(np.zeros(1), np.array([length]))[0, 0] == pytest.approx(mean_of_instants, rel=5e-3)
+        whole = NoiseModel(0.0, 2e-16, 1.0).mean_variance(length)
+        assert whole == pytest.approx(2e-16 * mean_of_instants, rel=1e-2)
+    # between 0.05 s and 200 s a decade of time holds the same share of a 1/f spectrum
+    levels = [flicker_kernel(np.zeros(1), np.array([length]))[0, 0] for length in (0.5, 5.0, 50.0)]
+    assert levels[0] - levels[1] == pytest.approx(math.log(10.0), rel=0.1)
+    assert levels[0] - levels[1] == pytest.approx(levels[1] - levels[2], rel=0.15)
+
+
+def white_series(count, seed, n=150, sigma=2e-8, duration=BLOCK):
+    rng = np.random.default_rng(seed)
+    time = (np.arange(n) + 0.5) * duration
+    mean = np.column_stack([np.ones(n), time])
+    return [NoiseSeries(time, np.full(n, duration), sigma * rng.standard_normal(n), mean) for _ in range(count)]
+
+
+@pytest.mark.parametrize("duration", [0.05, 0.4])
+def test_white_noise_is_found_as_variance_times_time(duration):
+    found = estimate_noise(white_series(8, 5, n=100, duration=duration), 1e-12)
+    assert found.white == pytest.approx(4e-16 * duration, rel=0.15)
+    assert found.flicker < 0.15 * 4e-16
+
+
+def test_what_the_signal_spans_is_no_noise():
+    """Any level and slope, in columns of any unit."""
+    series = white_series(4, 6)
+    rng = np.random.default_rng(1)
+    lifted = [
+        NoiseSeries(s.time, s.duration, s.values + s.mean @ (1e-5 * rng.standard_normal(2)), s.mean * [1e6, -1e-9])
+        for s in series
+    ]
+    a, b = estimate_noise(series, 1e-8), estimate_noise(lifted, 1e-8)
+    np.testing.assert_allclose([b.white, b.flicker, b.drift], [a.white, a.flicker, a.drift], rtol=1e-5)
+
+
+def test_clocks_and_the_order_of_series_do_not_matter():
+    series = white_series(3, 7)
+    later = [NoiseSeries(s.time + 900.0, s.duration, s.values, s.mean) for s in series[::-1]]
+    a, b = estimate_noise(series, 1e-8), estimate_noise(later, 1e-8)
+    np.testing.assert_allclose([b.white, b.flicker, b.drift], [a.white, a.flicker, a.drift], rtol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [1e-9, 3e-8, 1e-6])
+def test_a_drift_that_cannot_be_learnt_is_the_one_to_be_expected(rate):
+    """On a ramp: the stated rate and what flickers, as squares."""
+    found = estimate_noise(white_series(6, 8), rate, learn_drift=False)
+    expected = math.sqrt(rate**2 + DRIFT_OVER_FLICKER**2 * found.flicker)
+    assert found.drift == pytest.approx(expected, rel=0.05)
+
+
+def drifting(rates, seed=2, n=50, sigma=1e-9):
+    rng = np.random.default_rng(seed)
+    time = (np.arange(n) + 0.5) * BLOCK
+    return [
+        NoiseSeries(time, np.full(n, BLOCK), sigma * rng.standard_normal(n) + rate * time, np.ones((n, 1)))
+        for rate in rates
+    ]
+
+
+def test_the_drift_is_the_spread_of_the_rates_that_are_seen():
+    """Many runs: their root mean square; one run: between what it shows and the prior, a factor e wide."""
+    rates = np.array([1.0, -2.0, 1.5, -0.5, 2.0, -1.0, 1.0, 0.3] * 2) * 1e-8
+    rms = math.sqrt(np.mean(rates**2))
+    assert estimate_noise(drifting(rates), rms).drift == pytest.approx(rms, rel=0.08)
+    many = [estimate_noise(drifting(rates), prior).drift for prior in (0.2 * rms, 5 * rms)]
+    assert many == pytest.approx([rms, rms], rel=0.12)
+    few = [estimate_noise(drifting(rates[4:5]), prior).drift for prior in (2e-9, 2e-7)]
+    assert 2e-9 < few[0] < 2e-8 < few[1] < 2e-7
+
+
+def test_a_computed_record_has_next_to_no_noise():
+    time = (np.arange(60) + 0.5) * BLOCK
+    late = time > 3.0
+    exact = NoiseSeries(time, np.full(60, BLOCK), 3e-6 + 1e-6 * late, np.column_stack([late, ~late]).astype(float))
+    found = estimate_noise([exact], 1e-8)
+    assert 0.0 < found.white < 1e-22
+    still = NoiseSeries(time, np.full(60, BLOCK), np.full(60, 5e-6), np.ones((60, 1)))
+    assert 0.0 < estimate_noise([still], 1e-8).white < 1e-22
+
+
+def test_a_series_needs_more_blocks_than_columns():
+    """Three more than the signal has; shorter ones are left out."""
+    good = white_series(3, 9)
+    short = [NoiseSeries(s.time[:4], s.duration[:4], 1e3 * s.values[:4], s.mean[:4]) for s in good]
+    a, b = estimate_noise(good, 1e-8), estimate_noise([*good, *short], 1e-8)
+    assert (a.white, a.drift) == (b.white, b.drift)
+    with pytest.raises(ValueError, match=r"no series is long enough.*longer holds"):
+        estimate_noise(short, 1e-8)
+    five = [NoiseSeries(s.time[:5], s.duration[:5], s.values[:5], s.mean[:5]) for s in good]
+    assert estimate_noise(five, 1e-8).white > 0.0
+
+
 TRUE = NoiseModel(white=4e-18, flicker=1e-16, drift=1.5e-8)
 
 
-def simulate(model, count, seed, n=120):
+def drawn_series(count, seed, n=120):
+    """Series of the noise `TRUE` about a parabola."""
     rng = np.random.default_rng(seed)
     time = (np.arange(n) + 0.5) * BLOCK
     duration = np.full(n, BLOCK)
-    root = np.linalg.cholesky(model.covariance(time, duration))
+    root = np.linalg.cholesky(TRUE.covariance(time, duration))
     mean = np.column_stack([np.ones(n), np.floor(time), np.floor(time) ** 2])
     return [NoiseSeries(time, duration, root @ rng.standard_normal(n), mean) for _ in range(count)]
 
 
-def test_covariance_is_positive_definite_and_symmetric():
-    time = np.sort(np.random.default_rng(0).uniform(0, 30, 90))
-    duration = np.full(90, 0.05)
-    covariance = TRUE.covariance(time, duration)
-    assert covariance == pytest.approx(covariance.T)
-    assert np.linalg.eigvalsh(covariance).min() > 0
-
-
-def test_flicker_has_the_stated_density():
-    # averaging a periodogram over many draws: S(f) = 1/f within the ripple of the sum of exponentials
-    n, step = 800, 0.04
-    time = np.arange(n) * step
-    root = np.linalg.cholesky(flicker_kernel(time) + 1e-12 * np.eye(n))
-    rng = np.random.default_rng(5)
-    window = np.hanning(n)
-    power = np.zeros(n // 2 + 1)
-    for _ in range(120):
-        power += np.abs(np.fft.rfft(window * (root @ rng.standard_normal(n)))) ** 2
-    density = 2.0 * power / 120 * step / np.sum(window**2)
-    frequency = np.fft.rfftfreq(n, step)
-    band = (frequency > 0.2) & (frequency < 2.0)
-    assert density[band] * frequency[band] == pytest.approx(1.0, rel=0.45)
-    assert np.mean(density[band] * frequency[band]) == pytest.approx(1.0, rel=0.12)
-
-
 def test_levels_are_recovered():
-    found = [estimate_noise(simulate(TRUE, 10, seed), 1e-8) for seed in range(4)]
+    found = [estimate_noise(drawn_series(10, seed), 1e-8) for seed in range(4)]
     for name in ("white", "flicker", "drift"):
         ratio = np.median([getattr(f, name) for f in found]) / getattr(TRUE, name)
         assert 0.6 < ratio < 1.6, name
 
 
-def test_drift_is_seen_where_there_is_more_than_usual():
-    calm = estimate_noise(simulate(NoiseModel(4e-18, 1e-16, 1e-9), 8, 1), 1e-8)
-    restless = estimate_noise(simulate(NoiseModel(4e-18, 1e-16, 2e-7), 8, 1), 1e-8)
-    assert restless.drift > 8.0 * calm.drift
-    assert restless.drift == pytest.approx(2e-7, rel=0.6)
-
-
 def test_units_do_not_matter():
-    series = simulate(TRUE, 6, 2)
+    series = drawn_series(6, 2)
     scaled = [NoiseSeries(s.time, s.duration, 1e3 * s.values, s.mean) for s in series]
     one, other = estimate_noise(series, 1e-8), estimate_noise(scaled, 1e-5)
     assert other.drift == pytest.approx(1e3 * one.drift, rel=1e-6)
     assert other.white == pytest.approx(1e6 * one.white, rel=1e-6)
 
 
-def test_variance_of_a_mean():
-    white = NoiseModel(4e-18, 0.0, 1e-8)
-    assert white.mean_variance(2.0) == pytest.approx(2e-18, rel=1e-9)
-    assert TRUE.mean_variance(1.0) > TRUE.mean_variance(4.0) > 0.0
+@dataclass
+class Record:
+    """What noise is learnt from, of a dry record."""
+
+    blocks: Blocks
+    good: np.ndarray
+    holds: tuple
 
 
-def test_nothing_to_learn_from_is_an_error():
-    time = np.arange(3.0)
-    with pytest.raises(ValueError, match="longer holds"):
-        estimate_noise([NoiseSeries(time, np.ones(3), time, np.eye(3))], 1e-8)
+def record(seed, held=True, sigma=1e-8, levels=6, per_level=8):
+    """A staircase of blocks with white noise about a curve, or a ramp where nothing is held."""
+    rng = np.random.default_rng(seed)
+    n = levels * per_level
+    hold = np.repeat(np.arange(levels), per_level) if held else np.full(n, -1)
+    load = 500.0 * (hold + 1.0) if held else np.linspace(200.0, 4000.0, n)
+    time = (np.arange(n) + 0.5) * BLOCK
+    zeros = np.zeros(n)
+    deflection = 4e-9 * load + sigma * rng.standard_normal(n)
+    across, branch = sigma * rng.standard_normal(n), np.ones(n, dtype=int)
+    blocks = Blocks(time, np.full(n, BLOCK), load, zeros, deflection, across, zeros, zeros, hold, branch)
+    return Record(blocks, np.ones(n, dtype=bool), tuple(range(levels)) if held else ())
+
+
+def moved(one, shift):
+    deflection, across = one.blocks.deflection + shift, one.blocks.across - 2 * shift
+    return replace(one, blocks=replace(one.blocks, deflection=deflection, across=across))
+
+
+def without(records, keep):
+    return [replace(one, good=keep) for one in records]
+
+
+def numbers(noise):
+    return [noise.white, noise.flicker, noise.drift]
+
+
+def alike(a, b):
+    """The same, as far as a search that ends within five per cent can tell; little flicker is found less well."""
+    assert (np.abs(np.divide(numbers(a), numbers(b)) - 1.0) < [0.03, 0.2, 0.06]).all()
+
+
+def test_within_holds_any_level_of_any_hold_is_free():
+    records = [record(k) for k in range(3)]
+    base = noise_within_holds(records, 1e-8)
+    assert base.white == pytest.approx(1e-16 * BLOCK, rel=0.2)
+    rng = np.random.default_rng(5)
+    jumped = [moved(r, (1e-6 * rng.standard_normal(6))[r.blocks.hold]) for r in records]
+    alike(noise_within_holds(jumped, 1e-8), base)
+    # about a curve a jump of one hold is noise
+    about = noise_about_curve(jumped, 1e-8)
+    assert about.white + about.flicker > 100 * base.white
+
+
+def test_about_a_curve_any_smooth_law_is_free_and_blocks_left_out_say_nothing():
+    records = [record(k) for k in range(3)]
+    base = noise_about_curve(records, 1e-8)
+    assert base.white == pytest.approx(1e-16 * BLOCK, rel=0.25)
+    u = records[0].blocks.load / 4000.0
+    law = 2e-6 + 3e-6 * u * (1.0 - 0.1 * np.log(u)) - 2e-6 * np.exp(-u / 0.15) + 1e-6 * np.exp(-u / 0.06)
+    bent = [moved(r, law) for r in records]
+    alike(noise_about_curve(bent, 1e-8), base)
+    keep = records[0].blocks.hold != 3
+    knocked = [moved(r, 1e-6 * ~keep) for r in records]
+    left_out = noise_about_curve(without(knocked, keep), 1e-8)
+    np.testing.assert_allclose(numbers(left_out), numbers(noise_about_curve(without(records, keep), 1e-8)), rtol=1e-9)
+    assert noise_about_curve(knocked, 1e-8).flicker > 10 * left_out.flicker
+
+
+def test_a_loop_between_the_branches_is_no_noise():
+    records = [record(k) for k in range(3)]
+    branch = np.where(np.arange(48) < 24, 1, -1)
+    both = [replace(r, blocks=replace(r.blocks, branch=branch)) for r in records]
+    base = noise_about_curve(both, 1e-8)
+    loop = [moved(r, (branch < 0) * (1e-6 + 3e-10 * r.blocks.load)) for r in both]
+    alike(noise_about_curve(loop, 1e-8), base)
+
+
+def test_where_some_records_have_holds_ramps_are_not_asked():
+    ramps = [record(9, held=False, sigma=3e-7)]
+    staircases = [record(k) for k in range(2)]
+    assert numbers(noise_within_holds([*ramps, *staircases], 1e-8)) == numbers(noise_within_holds(staircases, 1e-8))
+    both = noise_about_curve([*ramps, *staircases], 1e-8)
+    assert numbers(both) == numbers(noise_about_curve(staircases, 1e-8))
+    # ramps alone: white noise is learnt, drift is not
+    alone = noise_within_holds([record(k, held=False) for k in range(3)], 2e-7)
+    assert alone.white == pytest.approx(1e-16 * BLOCK, rel=0.3)
+    assert alone.drift == pytest.approx(math.hypot(2e-7, DRIFT_OVER_FLICKER * math.sqrt(alone.flicker)), rel=0.05)
+    curved = [record(k, held=False) for k in range(3)]
+    sphere = [moved(r, 3e-6 * np.cbrt(r.blocks.load / 4000.0) ** 2) for r in curved]
+    base = noise_about_curve(curved, 2e-7)
+    alike(noise_about_curve(sphere, 2e-7), base)
+
+
+RATE, N = 500.0, 3000
+
+
+def tone(frequency, size=1.0, phase=0.0, n=N, rate=RATE):
+    return size * np.cos(2 * math.pi * frequency * np.arange(n) / rate + phase)
+
+
+def noisy(seed, n=N, sigma=0.1):
+    return sigma * np.random.default_rng(seed).standard_normal(n)
+
+
+EVERY = np.ones(N, dtype=bool)
+
+
+@pytest.mark.parametrize("frequency", [49.8, 50.0, 60.3])
+def test_a_pure_tone_has_its_amplitude_and_phase(frequency):
+    found = measure_pickup({"A": tone(frequency) + noisy(1), "B": tone(frequency, 0.5, 1.2) + noisy(2)}, EVERY, RATE)
+    np.testing.assert_allclose(np.abs(found.size), [1.0, 0.5], rtol=0.02)
+    assert np.angle(found.size[1] / found.size[0]) == pytest.approx(1.2, abs=0.03)
+    assert found.channels == ("A", "B")
+    # a Hann window makes of white noise sigma sqrt(6 / n) per line
+    np.testing.assert_allclose(found.noise, 0.1 * math.sqrt(6.0 / N), rtol=0.35)
+
+
+def test_slow_signals_and_tones_elsewhere_are_not_the_mains():
+    drift = 50.0 * np.linspace(0, 1, N) ** 2
+    found = measure_pickup({"A": tone(50.0) + drift + tone(50.0 + 0.45 * 12, 3.0) + noisy(3)}, EVERY, RATE)
+    assert np.abs(found.size[0]) == pytest.approx(1.0, rel=0.05)
+
+
+def test_samples_that_are_lost_count_for_nothing():
+    good = EVERY.copy()
+    good[700:1000] = False
+    spoilt = tone(50.0) + noisy(4)
+    spoilt[~good] = np.nan
+    found = measure_pickup({"A": spoilt}, good, RATE)
+    assert np.abs(found.size[0]) == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("n", "rate", "lost", "told"),
+    [(1500, 500.0, 0, True), (1499, 500.0, 0, False), (3000, 132.0, 0, True), (3000, 131.0, 0, False),
+     (3000, 500.0, 1500, True), (3000, 500.0, 1501, False)],
+)  # fmt: skip
+def test_three_seconds_fast_enough_and_half_of_them_sound(n, rate, lost, told):
+    good = np.ones(n, dtype=bool)
+    good[10 : 10 + lost] = False
+    assert (measure_pickup({"A": noisy(5, n)}, good, rate) is not None) is told
+
+
+NAMES = ("A", "B", "H", "V")
+SIZE = np.array([1.0 + 0.2j, -0.3 + 1.1j, 0.8 - 0.9j, 0.1 + 0.6j])
+
+
+def signature(seed, factor=1.0, size=SIZE, noise=0.02):
+    rng = np.random.default_rng(seed)
+    drawn = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
+    return PickupSignature(NAMES, factor * size + drawn, np.full(4, noise))
+
+
+def exchanged(one):
+    return PickupSignature(one.channels, one.size[[1, 0, 2, 3]], one.noise)
+
+
+PAIRS = [("A", "B"), ("H", "V")]
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0 * np.exp(0.7j), 0.2 * np.exp(-2.0j)])
+def test_a_signature_is_free_of_one_complex_factor(factor):
+    runs = [signature(k, factor if k == 2 else 1.0) for k in range(5)]
+    assert mistakes(runs, PAIRS) == [None] * 5
+    runs[2] = exchanged(runs[2])
+    found = mistakes(runs, PAIRS)
+    assert [m is None for m in found] == [True, True, False, True, True]
+    assert found[2] == ("A and B are exchanged", 4)
+
+
+def test_a_mistake_needs_two_others_and_most_of_them():
+    odd = exchanged(signature(9))
+    assert mistakes([odd, signature(1)], PAIRS) == [None, None]
+    assert mistakes([odd, signature(1), signature(2)], PAIRS)[0][1] == 2
+    strange = PickupSignature(NAMES, SIZE[[2, 0, 3, 1]], np.full(4, 0.02))
+    # two of five others agree: not enough; three of five are
+    assert mistakes([odd, signature(1), signature(2), strange, strange, strange], PAIRS)[0] is None
+    assert mistakes([odd, signature(1), signature(2), signature(3), strange, strange], PAIRS)[0][1] == 3
+    other_names = PickupSignature(("A", "B", "H", "W"), SIZE, np.full(4, 0.02))
+    assert mistakes([odd, signature(1), other_names, other_names], PAIRS) == [None] * 4
+
+
+def test_phases_of_chance_are_no_signature_and_runs_without_pickup_say_nothing():
+    rng = np.random.default_rng(0)
+    for seed in range(40):
+        chance = [SIZE * np.exp(2j * np.pi * rng.uniform(size=4)) for _ in range(5)]
+        assert mistakes([signature(5 * seed + k, size=size) for k, size in enumerate(chance)], PAIRS) == [None] * 5
+    quiet = [signature(k, factor=0.0) for k in range(5)]
+    quiet[2] = exchanged(quiet[2])
+    assert mistakes(quiet, PAIRS) == [None] * 5
+    assert mistakes([signature(0), None, None], PAIRS) == [None] * 3
+
+
+@pytest.mark.parametrize("channel", range(4))
+def test_a_reversed_channel_is_named(channel):
+    turned = np.ones(4)
+    turned[channel] = -1.0
+    odd = signature(9)
+    runs = [signature(1), PickupSignature(NAMES, odd.size * turned, odd.noise), signature(2), signature(3)]
+    assert mistakes(runs, PAIRS)[1][0] == f"{NAMES[channel]} is reversed"
+
+
+def test_by_chance_alone_signatures_differ_by_chi_square():
+    """Three complex parameters are left of four channels: six degrees of freedom, whatever the factor between runs."""
+    noise = np.array([0.01, 0.03, 0.02, 0.05])
+    drawn = []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        both = []
+        for factor in (1.0, 2.5 * np.exp(1.0j)):
+            error = noise / math.sqrt(2.0) * (rng.standard_normal(4) + 1j * rng.standard_normal(4))
+            both.append(PickupSignature(NAMES, factor * SIZE + error, noise))
+        drawn.append(_mismatch(*both))
+        assert _mismatch(*both[::-1]) == pytest.approx(drawn[-1], rel=0.05)
+    assert np.mean(drawn) == pytest.approx(6.0, abs=5 * math.sqrt(12.0 / 300))
+    assert np.mean(np.array(drawn) > 16.81) < 0.03

@@ -33,14 +33,6 @@ def vectors(angle, size):
     return np.outer(size, [math.cos(angle), math.sin(angle)])
 
 
-def test_axes_are_along_and_counter_clockwise_across():
-    np.testing.assert_allclose(pad_axes(0.0), np.eye(2), atol=1e-15)
-    np.testing.assert_allclose(pad_axes(math.pi / 2), [[0.0, 1.0], [-1.0, 0.0]], atol=1e-15)
-    axes = pad_axes(0.7)
-    np.testing.assert_allclose(axes @ axes.T, np.eye(2), atol=1e-15)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("off", [-0.5, -0.03, 0.0, 0.02, 0.4])
 def test_exact_lines_give_their_direction_with_no_error(off):
     some = blocks(vectors(1.0 + off, LOADS) + np.array([7.0, -3.0]), vectors(1.0 - off, 1e-9 * LOADS) + 2e-5, angle=1.0)
@@ -90,7 +82,3 @@ def test_blocks_of_one_hold_count_as_one():
     errors = [load_direction(b).se for b in (alone, shared, between)]
     assert errors[1] / errors[0] == pytest.approx(math.sqrt(3.0))
     assert errors[2] / errors[0] == pytest.approx(math.sqrt(len(LOADS) / 3.0))
-
-
-def test_words():
-    assert str(PadDirection(0.01, 0.002)) == "+0.57 deg (se 0.11 deg) from the pad"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
-from tpjb_ident.pivot.steps import MAINS_PERIOD, Hold, _bin, find_holds
+from tpjb_ident.pivot.steps import Hold, find_holds
 from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0
@@ -221,6 +221,31 @@ def staircase(rng=None, hold=1.0, ramp=0.5, levels=(1000.0, 2000.0, 3000.0), rat
     return time, load if rng is None else load + 5.0 * rng.standard_normal(len(load))
 
 
+def test_holds_without_noise_have_their_exact_level_branch_and_length():
+    levels = (1000.0, 2000.0, 3000.0, 2000.0, 1000.0)
+    holds = find_holds(*staircase(levels=levels))
+    assert [hold.level for hold in holds] == pytest.approx(levels)
+    assert [hold.branch for hold in holds] == [1, 1, 1, -1, -1]
+    for k, hold in enumerate(holds):
+        begin = 0.5 + 1.5 * k
+        assert begin - 1e-9 <= hold.start < begin + 0.1
+        assert begin + 0.9 < hold.stop <= begin + 1.0 + 0.021
+        assert hold.duration == hold.stop - hold.start
+        assert 0.8 < hold.duration < 1.02
+
+
+def test_time_and_load_may_be_counted_from_anywhere_and_in_any_unit():
+    time, load = staircase(levels=(1000.0, 2500.0, 4000.0))
+    load = load + 2.0 * np.random.default_rng(1).standard_normal(len(load))
+    base = find_holds(time, load)
+    later = find_holds(time + 32.0, load * 1024.0)
+    assert len(base) == 3
+    for a, b in zip(base, later, strict=True):
+        assert (b.start - 32.0, b.stop - 32.0) == pytest.approx((a.start, a.stop), abs=1e-9)
+        assert b.level == pytest.approx(1024.0 * a.level)
+        assert b.branch == a.branch
+
+
 @pytest.mark.parametrize("start", [0.0, 1e3])
 @pytest.mark.parametrize("hold", [1.0, 20.0])
 def test_holds_end_and_begin_within_a_bin_of_the_truth(start, hold):
@@ -267,38 +292,6 @@ def test_one_bad_bin_does_not_split_a_hold_but_a_move_does():
 @pytest.mark.parametrize(("hold", "found"), [(0.26, 3), (0.16, 0)])
 def test_the_shortest_hold(hold, found):
     assert len(find_holds(*staircase(hold=hold, ramp=0.4))) == found
-
-
-@pytest.mark.parametrize(("rest", "bins"), [(0, 10), (9, 10), (10, 11), (11, 11)])
-def test_bins_are_medians_over_two_mains_periods(rest, bins):
-    """Twenty samples each at 500 Hz; the last counts with half of them; whenever the clock started."""
-    for start in (0.0, 1e3 + 0.0137):
-        time = start + np.arange(200 + rest) / RATE
-        load = 7.0 * (time - start)
-        load[::20] += 1e3  # one wild sample of a bin is no matter
-        found = _bin(time, load)
-        assert len(found.time) == bins
-        np.testing.assert_allclose(found.time[:10] - start, (20 * np.arange(10) + 9.5) / RATE, atol=1e-9)
-        np.testing.assert_allclose(found.load[:10], 7.0 * (20 * np.arange(10) + 10.5 - 0.5) / RATE, atol=0.008)
-        assert found.width == pytest.approx(2 * MAINS_PERIOD)
-        assert found.noise == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize(("seconds", "periods"), [(30.0, 2), (79.0, 2), (101.0, 3), (399.0, 10)])
-def test_long_records_have_two_thousand_bins_of_whole_mains_periods(seconds, periods):
-    time = np.arange(int(seconds * 100) + 1) / 100.0
-    found = _bin(time, np.random.default_rng(1).standard_normal(len(time)))
-    assert found.width == pytest.approx(periods * MAINS_PERIOD)
-    assert abs(len(found.time) - seconds / found.width) <= 1
-
-
-def test_the_noise_of_a_bin_does_not_feel_ramps_nor_corners():
-    rng = np.random.default_rng(3)
-    time, load = staircase(hold=2.0)
-    noise = 5.0 * rng.standard_normal(len(load))
-    expected = 5.0 * np.sqrt(np.pi / 2 / 20)  # of a median of twenty
-    assert _bin(time, noise).noise == pytest.approx(expected, rel=0.25)
-    assert _bin(time, load + noise).noise == pytest.approx(_bin(time, noise).noise, rel=0.2)
 
 
 @pytest.mark.parametrize("samples", [1, 19, 40, 41, 60, 150])
@@ -429,27 +422,7 @@ def test_jitter_and_a_gap_in_time_do_no_harm():
     assert len(find_holds(np.sort(time), load)) in (10, 11)  # the gap may split the hold it falls into
 
 
-@pytest.mark.parametrize("length", [3, 20, 50])
-@pytest.mark.parametrize("place", [700, 3000, 6300])
-def test_glitches_are_found_whole(length, place):
-    time, load, _ = programme(**CASES["up"])
-    rng = np.random.default_rng(length)
-    values = np.column_stack([load + 2.6 * rng.standard_normal(len(load)), 1e-9 * load])
-    values[place : place + length, 0] += 900.0
-    good = good_samples(values)
-    assert not good[place : place + length].any()
-    assert good.sum() >= len(time) - length - 8
-
-
 def test_clean_ramps_and_corners_are_no_glitches():
     _, load, _ = programme(**CASES["up"])
     values = load[:, None] + 2.6 * np.random.default_rng(0).standard_normal((len(load), 1))
     assert good_samples(values).mean() > 0.9995
-
-
-def test_missing_values_are_left_out():
-    values = np.ones((400, 2)) + 1e-3 * np.random.default_rng(0).standard_normal((400, 2))
-    values[100:110, 1] = np.nan
-    good = good_samples(values)
-    assert not good[100:110].any()
-    assert good[130:].all()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from tpjb_ident.conditions import Condition
 from tpjb_ident.pivot.curve import EXTRAPOLATION_SPREAD, Hysteresis, PivotCurve, PivotSteps, measure_loop
@@ -20,9 +21,9 @@ from tpjb_ident.pivot.tables import load_grid, pads_table, pivot_table, pivots_t
 REFERENCE, SCALE = 2000.0, 4e-9
 
 
-def law(name="linear", contact=False, errors=(0.0, 0.0, 0.0), scale=SCALE, friction=0.0):
+def law(name="linear", contact=False, errors=(0.0, 0.0, 0.0), scale=SCALE, friction=0.0, shape=()):
     """A fit with stated standard errors of zero reading, friction and ln scale."""
-    theta = [2e-5, friction, math.log(scale), *((3e-6, math.log(500.0)) if contact else ())]
+    theta = [2e-5, friction, math.log(scale), *shape, *((3e-6, math.log(500.0)) if contact else ())]
     covariance = np.zeros((len(theta), len(theta)))
     covariance[:3, :3] = np.diag(np.square(errors))
     return LawFit(LAWS[name], REFERENCE, contact, np.array(theta), covariance, 0.0, 5.0, 10)
@@ -40,6 +41,24 @@ def curve(fits=None, weights=(1.0,), **changes):
 
 
 INSIDE = np.array([400.0, 1000.0, 5000.0])
+ROCKER = law("hertz-line", shape=(0.1,))
+
+
+def test_stiffness_is_the_slope_of_the_deflection_and_secant_is_load_over_it():
+    one, step = curve((ROCKER,)), 0.1
+    loads = np.array([50.0, 250.0, 1000.0, 2000.0, 4000.0, 8000.0])
+    slope = 2 * step / (one.deflection(loads + step) - one.deflection(loads - step))
+    assert one.stiffness(loads) == pytest.approx(slope, rel=1e-5)
+    assert one.secant(loads) == pytest.approx(loads / one.deflection(loads), rel=1e-12)
+    assert np.all(one.stiffness(loads) > one.secant(loads))
+
+
+@pytest.mark.parametrize("bad", [-1.0, -1e-9, np.nan, [100.0, -5.0]])
+def test_impossible_loads_and_deflections_are_refused(bad):
+    with pytest.raises(ValueError, match="load"):
+        curve().stiffness(bad)
+    with pytest.raises(ValueError, match="deflection must be zero or positive"):
+        curve().load(bad)
 
 
 def test_a_law_without_error_has_no_band_among_the_points_and_a_logarithmic_one_beyond():
@@ -91,6 +110,12 @@ def test_the_band_of_readings_is_that_of_the_points():
     # a load that reaches the pivot is what friction left of the applied one
     held = curve((law(friction=0.04),))
     np.testing.assert_allclose(held.reading_band(INSIDE)[0], SCALE * INSIDE, rtol=1e-9)
+    # the way into contact belongs to the readings; their band grows on beyond the points
+    lost = curve((law(contact=True, errors=(0.0, 0.0, 1e-4)),), onset_load=2000.0, valid_from=2000.0)
+    loads = np.array([500.0, 2500.0, 5000.0, 7500.0])
+    value, lo, hi = lost.reading_band(loads)
+    np.testing.assert_allclose(value, SCALE * loads - 3e-6 * np.exp(-loads / 500.0), rtol=1e-9)
+    np.testing.assert_allclose(0.5 * (hi - lo), 1.959963984540054e-4 * SCALE * loads, rtol=1e-6)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -0.5, 1.5, math.nan])
@@ -105,8 +130,6 @@ def test_loads_are_found_far_beyond_the_points_and_none_is_negative():
     assert one.deflection(INSIDE.reshape(3, 1)).shape == (3, 1)
     np.testing.assert_allclose(one.load([0.0, 1e-6, 2e-5, 1e-3]), [0.0, 250.0, 5000.0, 250_000.0], rtol=1e-6)
     assert one.load(SCALE * INSIDE.reshape(1, 3)).shape == (1, 3)
-    with pytest.raises(ValueError, match="deflection must be zero or positive"):
-        one.load(-1e-9)
     assert one.is_extrapolated([399.9, 400.0, 5000.0, 5000.1]).tolist() == [True, False, False, True]
 
 
@@ -138,9 +161,10 @@ def test_tables_stand_at_round_loads(largest, step):
 
 
 def test_the_printed_formula_stands_beside_what_was_measured():
-    one = curve((law(errors=(0.0, 0.0, 0.02)),), onset_load=1000.0, valid_from=1000.0)
+    one = curve((law(errors=(0.0, 0.0, 0.02)),), onset_load=1000.0, valid_from=1000.0, pad=2)
     loads = np.array([500.0, 1000.0, 6000.0])
-    frame = pivot_table([one], loads, lambda pad, load: (1e5 * load, 3e5 * load), 0.5)
+    frame = pivot_table([one], loads, lambda pad, load: (5e4 * pad * load, 3e5 * load), 0.5)
+    np.testing.assert_array_equal(frame["pad"], 2)
     np.testing.assert_array_equal(frame.force_N, loads)
     np.testing.assert_array_equal(frame.contact_complete, [False, True, True])
     np.testing.assert_array_equal(frame.extrapolated, [True, False, True])
@@ -186,6 +210,25 @@ def test_one_row_tells_all_of_a_pad():
     assert math.isnan(plain.loop_energy_J)
     assert plain.load_off_pad_deg == pytest.approx(math.degrees(0.02))
     assert (row.runs, row.status, row.relative_calibration) == ("p-1, p-2", "misfit: a; samples-lost", 0.004)
+
+
+def test_toml_carries_the_tangent(tmp_path):
+    one = curve((ROCKER,))
+    path = write_pivots(tmp_path / "pivots.toml", [curve((ROCKER,), pad=2), one], 'campaign "A"\n')
+    found = tomllib.loads(path.read_text())
+    assert found["schema"] == "tpjb-pivots/1"
+    assert found["source"] == 'campaign "A"\n'
+    assert found["includes_housing"] is True
+    assert [p["pad"] for p in found["pads"]] == [1, 2]
+    pad = found["pads"][0]
+    assert (pad["valid_from_N"], pad["valid_to_N"]) == (400.0, 5000.0)
+    assert pad["force_N"][0] == pad["deflection_m"][0] == 0.0
+    assert pad["force_N"][-1] >= 10_000.0
+    law = PchipInterpolator(pad["force_N"], pad["deflection_m"])
+    loads = np.linspace(200.0, 10_000.0, 997)
+    assert law(loads) == pytest.approx(one.deflection(loads), rel=1e-5)
+    assert 1.0 / law.derivative()(loads) == pytest.approx(one.stiffness(loads), rel=1e-3)
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_toml_reaches_from_next_to_nothing_to_far_beyond():
@@ -245,6 +288,15 @@ def test_the_area_between_four_points_has_their_error():
     assert loop.energy == pytest.approx(0.5 * 800.0 * (3e-7 + 1e-7), rel=1e-9)
     assert loop.energy_se == pytest.approx(1e-8 * 800.0, rel=1e-6)
     assert loop.loss_factor_se / loop.energy_se == pytest.approx(loop.loss_factor / loop.energy)
+
+
+def test_a_drift_from_up_to_down_is_an_error_of_the_whole_loop():
+    load = np.linspace(500.0, 5000.0, 10)
+    both, branch = np.r_[load, load[::-1]], np.r_[np.ones(10, dtype=int), -np.ones(10, dtype=int)]
+    shift = np.outer(branch < 0, branch < 0) * 1e-7**2
+    loop = measure_loop(both, 1e-9 * both, shift, branch)
+    assert loop.energy_se == pytest.approx(1e-7 * 4500.0, rel=1e-6)
+    assert "loop from 500 to 5000 N" in str(loop)
 
 
 @pytest.mark.parametrize(
