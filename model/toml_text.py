@@ -20,13 +20,28 @@ def parse_toml(text: str) -> dict[str, Any]:
         if line.count(".") > MAX_DEPTH and not line.lstrip().startswith("#") and _longest_key(line) > MAX_DEPTH:
             raise ModelError(f"line {number} nests far too deeply")
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except RecursionError as error:
         raise ModelError("nested far too deeply") from error
     except tomllib.TOMLDecodeError:
         raise
     except ValueError as error:  # Python refuses to read whole numbers of more than 4300 digits
         raise ModelError("a whole number has thousands of digits") from error
+    _check_integers(data)
+    return data
+
+
+def _check_integers(data: dict[str, Any]) -> None:
+    """Reject whole numbers beyond TOML's 64 bits: hexadecimal ones may have more digits than Python prints."""
+    values: list[Any] = [data]
+    while values:
+        value = values.pop()
+        if isinstance(value, dict):
+            values.extend(value.values())
+        elif isinstance(value, list):
+            values.extend(value)
+        elif isinstance(value, int) and abs(value) > 2**63:
+            raise ModelError("a whole number has more than 64 bits")
 
 
 def _longest_key(line: str) -> int:

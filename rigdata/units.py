@@ -59,7 +59,9 @@ _EXAMPLES = {
     "pressure": "bar",
     "ratio": "%",
 }
-_SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "\u2126": "Ω", "\u00a0": " "})
+_SPELLINGS = str.maketrans(
+    {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", ".": "*", "\u2126": "Ω", "\u00a0": " "}
+)
 #: Unit names that mean something else here than in pint (where g is a gram and C a coulomb).
 _ALIASES = {"%": "percent", "degC": "kelvin", "celsius": "kelvin", "degF": "degR", "kp": "kgf"}
 _ALIASES_BY_DIMENSION = {
@@ -221,7 +223,12 @@ def unit_factor(unit: str, dimension: str) -> float:
     """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step)."""
     parsed = parse_unit(unit, dimension)
     # The radian of a speed is asked for: "22 1/s" is caught above as revolutions.
-    if not parsed.same_dimension(parse_unit(SI_UNITS[dimension])):
+    is_usable = parsed.same_dimension(parse_unit(SI_UNITS[dimension]))
+    if dimension == "rotational stiffness":  # a moment per tilt, the radian left out
+        is_usable = is_usable or parsed.same_dimension(parse_unit("N*m"))
+    elif dimension == "angle":  # a slope: 0.2 mm/m
+        is_usable = is_usable or ("/" in unit and not parsed.powers)
+    if not is_usable:
         raise UnitError(f"unit {unit!r} is not one of {dimension}; expected something like {_example(dimension)!r}")
     return parsed.factor
 

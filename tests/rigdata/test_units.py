@@ -64,10 +64,50 @@ TWO_PI = 2 * math.pi
         ("3 mPa s", "viscosity", 3e-3),
         ("50 W/m/K", "conductivity", 50.0),
         ("210 GPa", "pressure", 2.1e11),
+        ("1000 N*m", "rotational stiffness", 1000.0),
+        ("1 kN*m", "rotational stiffness", 1000.0),
+        ("1 N*mm", "rotational stiffness", 1e-3),
+        ("1 N*m/deg", "rotational stiffness", 180 / math.pi),
+        ("0.2 mm/m", "angle", 2e-4),
+        ("2 N.s/m", "damping", 2.0),
     ],
 )
 def test_values(text, dimension, value):
     assert parse_quantity(text, dimension) == pytest.approx(value, rel=1e-12)
+
+
+#: Unit names that bearing files and effects files have always been able to use, with their factors.
+BEARING_UNITS = {
+    "length": {"m": 1.0, "mm": 0.001, "um": 1e-06, "µm": 1e-06},
+    "angle": {"rad": 1.0, "deg": 0.017453292519943295},
+    "mass": {"kg": 1.0, "g": 0.001},
+    "force": {"N": 1.0, "kN": 1000.0},
+    "stiffness": {"N/m": 1.0, "N/um": 1000000.0, "MN/m": 1000000.0},
+    "compliance": {"m/N": 1.0, "um/N": 1e-06},
+    "damping": {"N*s/m": 1.0, "kN*s/m": 1000.0},
+    "rotational stiffness": {"N*m/rad": 1.0, "N*m": 1.0, "N m": 1.0, "N m/rad": 1.0},
+    "moment of inertia": {"kg*m^2": 1.0, "kg m^2": 1.0},
+    "pressure": {"Pa": 1.0, "MPa": 1000000.0, "GPa": 1000000000.0},
+    "viscosity": {"Pa*s": 1.0, "Pa s": 1.0, "mPa*s": 0.001},
+    "density": {"kg/m^3": 1.0},
+    "temperature": {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0, "celsius": 1.0},
+    "temperature difference": {"K": 1.0},
+    "per kelvin": {"1/K": 1.0},
+    "specific heat": {"J/kg/K": 1.0},
+    "conductivity": {"W/m/K": 1.0},
+    "heat transfer": {"W/m^2/K": 1.0},
+    "speed": {"rad/s": 1.0, "Hz": TWO_PI, "1/s": TWO_PI, "rpm": TWO_PI / 60, "1/min": TWO_PI / 60},
+    "time": {"s": 1.0, "ms": 0.001, "us": 1e-06},
+    "ratio": {"percent": 0.01, "%": 0.01},
+}
+
+
+@pytest.mark.parametrize(
+    ("dimension", "unit"), [(dimension, unit) for dimension, units in BEARING_UNITS.items() for unit in units]
+)
+def test_units_of_bearing_files(dimension, unit):
+    factor = BEARING_UNITS[dimension][unit]
+    assert unit_factor(unit, dimension) == pytest.approx(factor, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -85,6 +125,9 @@ def test_values(text, dimension, value):
         ("5 Hz", "angle", "not one of angle"),
         ("54 %", "angle", "not one of angle"),
         ("54 deg", "ratio", "not one of ratio"),
+        ("5 N*m", "force", "not one of force"),
+        ("5 N/m", "rotational stiffness", "not one of rotational stiffness"),
+        ("5 mm/s", "angle", "not one of angle"),
         ("5 flurb", "force", "not known"),
         ("1e400 N", "force", "finite"),
         ("nan N", "force", "not a number"),
