@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
 from tpjb_ident.dynamic.records.run_data import RunPhasors
@@ -30,18 +33,27 @@ def run(name: str, direction: float, force: float = 500.0, h=FILM_H, load: float
     noise = rng.standard_normal((WINDOWS, 4)) + 1j * rng.standard_normal((WINDOWS, 4))
     F = force * np.array([np.cos(direction), np.sin(direction)]) + 0.1 * noise[:, :2]
     D = np.linalg.solve(h, F.T).T + 1e-9 * noise[:, 2:]
-    mean = np.tile([0.0, -load], (WINDOWS, 1))
-    point = OperatingPoint(load, -np.pi / 2, 2 * np.pi * 22, OMEGA)
+    return run_phasors(name, direction, load, D, F, (0.0, -load))
+
+
+def run_phasors(name: str, direction: float, load: float, D, F, mean_force) -> RunPhasors:
+    """A run of six windows at 25 Hz, from its phasors (6, 2) and its mean force [N]."""
+    mean, noise = np.tile(mean_force, (WINDOWS, 1)), np.full((WINDOWS, 2), 1e-9)
+    blocks = (PhasorBlock(z[:, None, :], mean, noise, np.zeros(WINDOWS)) for z in (D, F))
+    start, speeds = 0.25 * np.arange(WINDOWS), np.full(WINDOWS, 22.0)
     lines = known_lines((25.0,), 22.0, 1000.0)
+    return RunPhasors(name, place(load), direction, lines, start, 0.25, *blocks, None, 30.0, speeds)
 
-    def block(z, mean=mean):
-        lost = np.zeros(WINDOWS)
-        return PhasorBlock(z[:, None, :], mean, np.full((WINDOWS, 2), 1e-9), lost)
 
-    start = 0.25 * np.arange(WINDOWS)
-    return RunPhasors(
-        name, point, direction, lines, start, 0.25, block(D), block(F), None, 30.0, np.full(WINDOWS, 22.0)
-    )
+def place(load: float = 5000.0, direction: float = -90.0, speed: float = 22.0, excitation: float = 25.0):
+    """An operating point: N, degrees, Hz, Hz."""
+    return OperatingPoint(load, math.radians(direction), 2 * math.pi * speed, 2 * math.pi * excitation)
+
+
+def stiff(h=H, omega: float = 160.0, covariance=None, dof: float = np.inf, **more) -> DynamicStiffness:
+    """An estimate with this answer; by default each of its eight parts has variance one, known for certain."""
+    spread = np.eye(8) if covariance is None else covariance
+    return DynamicStiffness(np.asarray(h, dtype=complex), omega, spread, np.full(8, dof), "mm", np.ones((3, 2)), **more)
 
 
 def point_of(runs) -> PointData:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
+from tests.dynamic import phasor_cases
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.identify import directions_differ
 from tpjb_ident.dynamic.identify_point import Completion, disagreement, point_figures, point_result
 from tpjb_ident.dynamic.results.quality import (
@@ -44,10 +44,7 @@ def data_of(D, runs=None, per_run=4, h=H):
 
 
 def stiff(h=H, error=1e-3, **more):
-    spread = error**2 * np.eye(8)
-    return DynamicStiffness(
-        np.asarray(h, dtype=complex), 160.0, spread, np.full(8, np.inf), "mm", np.ones((4, 2)), **more
-    )
+    return phasor_cases.stiff(h, covariance=error**2 * np.eye(8), **more)
 
 
 def test_coherence_is_the_explained_share_of_the_worse_axis():

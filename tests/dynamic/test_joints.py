@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
+from tests.dynamic import phasor_cases
 from tests.dynamic.phasor_cases import H, complex_normal
+from tests.dynamic.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
 from tpjb_ident.dynamic.runs.point_data import finite_mean, group, point_data
 
 NORMAL = 1.959963984540054  # of 95 %
 
 
-def stiff(h=H, dof=np.inf, status=(), systematic=None):
-    spread = np.diag(np.arange(1.0, 9.0) ** 2)
-    return DynamicStiffness(h, 50.0, spread, np.full(8, dof), "mm", np.ones((3, 2)), status, systematic=systematic)
+def stiff(h=H, **more):
+    return phasor_cases.stiff(h, 50.0, np.diag(np.arange(1.0, 9.0) ** 2), **more)
 
 
 def test_a_stiffness_says_its_parts_and_their_errors():
@@ -86,10 +86,6 @@ def test_windows_have_their_own_mean_speed():
     np.testing.assert_allclose(window_speeds(speed[:4], 1, 20.0), [19.6])
     assert np.isnan(window_speeds(None, 3, 20.0)).tolist() == [True] * 3
     np.testing.assert_allclose(window_speeds(2 * math.pi * np.array([0.04, 0.06]), 2, 0.0), [0.04, np.nan])
-
-
-def at(load=5e3, excitation=25.0, speed=22.0):
-    return OperatingPoint(load, -math.pi / 2, 2 * math.pi * speed, 2 * math.pi * excitation)
 
 
 def test_runs_are_grouped_by_their_set_points_in_order():

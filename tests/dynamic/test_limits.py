@@ -11,8 +11,8 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student_t
 
+from tests.dynamic import phasor_cases
 from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.records.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.dynamic.records.windows import WindowSettings, line_design, plan_windows, variance_inflation
@@ -26,8 +26,7 @@ OMEGAS = 2 * np.pi * np.array([15.0, 25.0, 40.0, 60.0])
 
 def estimate(omega, mass=0.0, off=0.0, error=1e6, covariance=None):
     h = K - mass * omega**2 * M + 1j * omega * C + off
-    spread = error**2 * np.eye(8) if covariance is None else covariance
-    return DynamicStiffness(h, float(omega), spread, np.full(8, np.inf), "mm-eiv", np.ones((4, 2)))
+    return phasor_cases.stiff(h, float(omega), error**2 * np.eye(8) if covariance is None else covariance)
 
 
 def test_stiffness_and_damping_that_are_there_are_found_exactly():
@@ -174,7 +173,7 @@ def test_lines_closer_than_either_wanders_are_one():
     assert [n for n, _ in lines_of(known_lines((30.0,), 49.8, 1000.0, settings))] == ["1X", "2X", "mains"]
 
 
-@pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (25.0, 460.0)])
+@pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (600.0,), (25.0, 460.0)])
 def test_excitations_outside_the_band_are_refused(frequencies):
     with pytest.raises(ValueError, match="between 0 and 450 Hz"):
         known_lines(frequencies, 22.0, 1000.0)
@@ -358,7 +357,7 @@ def measured(inertia=0.0, with_accelerometers=True):
 
 
 def stiff():
-    return DynamicStiffness(H, float(OMEGAS[1]), np.eye(8), np.full(8, np.inf), "ols", np.ones((12, 2)))
+    return replace(phasor_cases.stiff(H, OMEGAS[1]), weights=np.ones((12, 2)))
 
 
 @pytest.mark.parametrize("quantity", ["displacement", "force", "acceleration"])

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
+from tests.dynamic.phasor_cases import OMEGA, WINDOWS, run_phasors
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.diagnosis.observations.observe import moved_by_miss
 from tpjb_ident.dynamic.corrections.load_direction import direction_slopes, run_ratios, turned_back
 from tpjb_ident.dynamic.corrections.static_load import load_misses
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
-from tpjb_ident.dynamic.records.lines import known_lines
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.point_data import gather
 
-OMEGA = 2 * np.pi * 25.0
-WINDOWS = 6
 #: Change of the cross-coupled coefficients per radian, relative to the direct ones.
 SK, SC = -0.9, -0.3
 
@@ -38,15 +33,7 @@ def run(name, direction, load, turn, rng, noise):
     phase = np.exp(2j * np.pi * rng.random())
     F = 500.0 * phase * np.array([np.cos(direction), np.sin(direction)]) + noise * spread[:, :2]
     D = np.linalg.solve(law(load, turn), F.T).T + 1e-9 * noise * spread[:, 2:]
-    mean = np.tile(load * np.array([np.sin(turn), -np.cos(turn)]), (WINDOWS, 1))
-    point = OperatingPoint(load, -np.pi / 2, 2 * np.pi * 22, OMEGA)
-
-    def block(z):
-        return PhasorBlock(z[:, None, :], mean, np.full((WINDOWS, 2), 1e-9), np.zeros(WINDOWS))
-
-    start, lines = 0.25 * np.arange(WINDOWS), known_lines((25.0,), 22.0, 1000.0)
-    speeds = np.full(WINDOWS, 22.0)
-    return RunPhasors(name, point, direction, lines, start, 0.25, block(D), block(F), None, 30.0, speeds)
+    return run_phasors(name, direction, load, D, F, load * np.array([np.sin(turn), -np.cos(turn)]))
 
 
 def campaign(seed, turn=0.0035, loads=(2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0), noise=0.1):
@@ -58,31 +45,12 @@ def campaign(seed, turn=0.0035, loads=(2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8
     ]
     points = gather(runs)
     misses, _ = load_misses(points)
-    return points, misses, [estimate(p) for p in points]
+    return points, misses, [estimate_dynamic_stiffness(p.D, p.F, OMEGA, p.run_index) for p in points]
 
 
-def estimate(data):
-    return estimate_dynamic_stiffness(data.D, data.F, OMEGA, data.run_index)
-
-
-def turns_of(points, misses, first, trusted=None):
-    trusted = trusted or [True] * len(points)
-    ratios = [run_ratios(*one) for one in zip(points, misses, first, trusted, strict=True)]
+def turns_of(points, misses, first):
+    ratios = [run_ratios(*one) for one in zip(points, misses, first, strict=True)]
     return direction_slopes([(-90.0, 22.0)] * len(points), ratios)
-
-
-def test_the_slope_is_found_and_takes_the_scatter_off():
-    points, misses, first = campaign(1)
-    turns = turns_of(points, misses, first)
-    for p, miss, turn, before in zip(points, misses, turns, first, strict=True):
-        k, c = 2.0e8 * (p.point.static_load / 5e3) ** 0.7, 8.0e7
-        true = SK * k + 1j * SC * c
-        assert abs(turn.slope[0, 1] - true) < 0.25 * abs(true)
-        assert abs(turn.slope[1, 0] - true) < 0.25 * abs(true)
-        after = estimate(replace(p, F=p.F - turned_back(p, miss, turn)))
-        assert np.abs(after.h - law(p.point.static_load, 0.0)).max() < 0.0015 * k
-        # a fifth of the width at the most, where noise is small beside the misses
-        assert after.half_width(systematic=False)[1] < 0.5 * before.half_width(systematic=False)[1]
 
 
 @pytest.mark.slow
@@ -106,33 +74,6 @@ def test_loads_that_point_where_they_should_change_nothing():
     for p, miss, turn in zip(points, misses, turns_of(points, misses, first), strict=True):
         assert np.abs(turned_back(p, miss, turn)).max() < 1e-6
         assert np.abs(turn.left).max() < 1.0
-
-
-def test_forces_that_mains_struck_teach_nothing_but_are_put_right():
-    points, misses, first = campaign(4)
-    spoiled = replace(points[0], F=points[0].F * (1 + 0.3 * np.exp(1j * np.arange(len(points[0].F)))[:, None]))
-    with_it = turns_of([spoiled, *points[1:]], misses, first, [False, *[True] * 5])
-    without = turns_of(points[1:], misses[1:], first[1:])
-    k = 2.0e8 * (2500.0 / 5e3) ** 0.7
-    assert with_it[0] is not None
-    assert abs(with_it[0].slope[0, 1] - (SK * k + 1j * SC * 8e7)) < 0.4 * abs(SK * k)
-    np.testing.assert_allclose(with_it[3].slope[0, 1], without[2].slope[0, 1], rtol=0.1)
-    assert turns_of([spoiled], misses[:1], first[:1], [False]) == [None]
-
-
-def test_two_runs_cannot_tell_a_slope_and_a_load_far_aside_is_no_miss():
-    points, misses, first = campaign(5, loads=(5000.0,))
-    assert run_ratios(points[0], replace(misses[0], sideways=np.full(6, 0.2)), first[0]) is None
-    keep = points[0].run_index < 2
-    few = replace(
-        points[0],
-        runs=points[0].runs[:2],
-        D=points[0].D[keep],
-        F=points[0].F[keep],
-        run_index=points[0].run_index[keep],
-    )
-    assert run_ratios(few, misses[0], first[0]) is None
-    assert direction_slopes([(0.0, 1.0)], [None]) == [None]
 
 
 class _Known:

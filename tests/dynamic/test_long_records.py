@@ -12,7 +12,6 @@ from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
 from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
-from tpjb_ident.dynamic.records.line_tuning import retuned
 from tpjb_ident.dynamic.records.lines import known_lines
 from tpjb_ident.dynamic.records.phasors import BLOCK, LineFitter, WaveBlocks
 from tpjb_ident.dynamic.records.reading_cache import SHORT, ShortRecord
@@ -40,36 +39,6 @@ def test_blocks_are_the_plain_columns(length):
     expected = rows - coefficients @ design.T
     blocks.subtract(rows, coefficients)
     np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)
-
-
-def test_stretches_are_what_the_run_says(run):
-    with run.opened():
-        stretches = run.row_reader(("displacement", "force"))
-        for start, stop in ((0, 1000), (7777, 9000), (run.length - 5, run.length)):
-            stretch = stretches.read(start, stop)
-            for quantity, rows in stretch.rows.items():
-                expected = run.vector(quantity, start, stop).values.T
-                np.testing.assert_allclose(rows, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
-            np.testing.assert_array_equal(stretch.speed, run.speed(start, stop).values)
-            assert stretch.time is None  # this file has no clock of its own
-
-
-def test_missing_values_and_overflows_are_those_of_the_run(run, tmp_path):
-    import shutil
-
-    import h5py
-
-    path = tmp_path / "gaps.h5"
-    shutil.copy(run.reader.path, path)
-    with h5py.File(path, "r+") as file:
-        file[f"runs/{run.id}/X1A"][100:110] = np.nan
-        file[f"runs/{run.id}/L1H"][150] = 3e38
-    broken = load_campaign(path).of_kind("dynamic")[0]
-    with broken.opened():
-        stretches = broken.row_reader(("displacement", "force"))
-        rows = stretches.read(0, 300).rows
-    assert np.flatnonzero(np.isnan(rows["displacement"]).any(axis=0)).tolist() == list(range(100, 110))
-    assert np.flatnonzero(np.isnan(rows["force"]).any(axis=0)).tolist() == [150]
 
 
 def test_a_kept_file_serves_many_requests_and_lets_go(run):
@@ -113,20 +82,6 @@ def test_a_long_run_is_read_once_and_says_the_same():
     assert once.lines.frequencies[1] == pytest.approx(22.0, abs=1e-4)
 
 
-def test_frequencies_are_put_right_without_reading_again(run):
-    exact = known_lines((25.0,), 22.0, run.sample_rate)
-    settings = PhasorSettings(windows=WindowSettings(length=1.0))
-    right = extract(ShortRecord(run), 30.0, settings, exact)
-    off = extract(ShortRecord(run), 30.0, settings, known_lines((25.002,), 22.0, run.sample_rate))
-    size = np.abs(right.displacement.phasors[:, 0]).max()
-    assert np.abs(off.displacement.phasors[:, 0] - right.displacement.phasors[:, 0]).max() > 0.05 * size
-    corrected = retuned(off, exact)
-    np.testing.assert_allclose(
-        corrected.displacement.phasors[:, 0], right.displacement.phasors[:, 0], rtol=0, atol=1e-3 * size
-    )
-    assert retuned(off, known_lines((24.9,), 22.0, run.sample_rate)) is None
-
-
 def test_a_few_outliers_of_a_long_window_are_left_out_as_by_the_robust_fit():
     length = 8192
     fitter = LineFitter(length, 5000.0, FREQUENCIES)
@@ -142,20 +97,3 @@ def test_a_few_outliers_of_a_long_window_are_left_out_as_by_the_robust_fit():
     exact = np.linalg.lstsq(fitter.design[keep], rows[0, keep], rcond=None)[0]
     assert block.lost[0] == pytest.approx(10 / length)
     assert abs(block.phasors[0, 0, 0] - (exact[0] + 1j * exact[1])) < 1e-9
-
-
-def test_a_glitch_that_fills_a_window_is_seen_against_the_other_chunks():
-    """A chunk of one long window has nothing to compare its noise with; the run has."""
-
-    class Glitched(HeldRun):
-        def __post_init__(self):
-            super().__post_init__()
-            part = slice(80_000, 100_000)
-            self.data["displacement"][part, 0] += 3e-6 * np.sin(2 * np.pi * 25.0 * self.time[part])
-
-    settings = PhasorSettings(windows=WindowSettings(length=4.0), find_lines=False)
-    lines = known_lines((25.0,), 22.0, 10_000.0)
-    glitched, sound = (extract(kind("a", 2, seconds=20.0), 30.0, settings, lines) for kind in (Glitched, HeldRun))
-    hit, clean = (r.displacement.phasors[:, 0, 0] for r in (glitched, sound))
-    assert glitched.displacement.lost[2] > 0.3
-    assert np.abs(hit - clean)[2] < 0.02 * np.abs(clean[2]) or np.isnan(hit[2])

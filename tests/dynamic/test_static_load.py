@@ -10,8 +10,7 @@ import pytest
 from scipy import integrate
 from scipy.stats import norm
 
-from rigdata.operating_point import OperatingPoint
-from tests.dynamic.phasor_cases import H, complex_normal
+from tests.dynamic.phasor_cases import H, complex_normal, place, stiff
 from tpjb_ident.dynamic.corrections import load_direction
 from tpjb_ident.dynamic.corrections.load_direction import (
     CLIPPED_SQUARE,
@@ -34,23 +33,13 @@ from tpjb_ident.dynamic.corrections.static_load import (
     to_set_point,
     widened,
 )
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
-
-
-def place(load=5000.0, direction=-90.0, speed=22.0, excitation=25.0):
-    return OperatingPoint(load, math.radians(direction), 2 * math.pi * speed, 2 * math.pi * excitation)
 
 
 def loaded(ratios, load=5000.0, direction=-90.0):
     """A point whose cells read these multiples of the set point, as complex numbers (size, direction)."""
     force = load * np.exp(1j * math.radians(direction)) * np.asarray(ratios, dtype=complex)
     return SimpleNamespace(point=place(load, direction), mean_loads=np.stack([force.real, force.imag], axis=1))
-
-
-def stiff(h, omega=157.0, covariance=None):
-    spread = np.eye(8) if covariance is None else covariance
-    return DynamicStiffness(np.asarray(h, dtype=complex), omega, spread, np.full(8, 9.0), "mm", np.ones((3, 2)))
 
 
 def test_a_ratio_is_size_and_angle_whatever_the_direction():
