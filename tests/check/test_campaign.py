@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +17,8 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
+from rigdata.virtual_rig import Fault, Noise, Timing
+from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge
 from tpjb_ident.check.lines import fit_lines, strongest_line
@@ -147,55 +150,31 @@ def test_what_many_runs_share_is_told_once():
     assert len(merge(findings[:2], "c.h5", runs)) == 2
 
 
-def tiny(tmp_path, *faults, **truth):
-    """A campaign of nine short runs from the virtual rig, with faults."""
-    from rigdata.virtual_rig import (
-        ClearanceSweep,
-        DryTest,
-        Fault,
-        RigPlan,
-        RigTruth,
-        Timing,
-        VirtualRig,
-        operating_points,
-        write_campaign,
-    )
-
-    plan = RigPlan(
-        dynamic=operating_points([(5000.0, 25.0)]),
-        directions=tuple(math.radians(36.0 * i) for i in range(5)),
-        dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in (1, 2, 3)),
-        clearance=(ClearanceSweep(seconds=6.0),),
-        timing=Timing(dynamic_seconds=1.0),
-    )
-    k, c = np.array([[3.0e8, 2e7], [-3e7, 4.5e8]]), np.array([[5e5, 2e4], [1e4, 7e5]])
-    rig = VirtualRig(RigTruth.constant(k, c), plan, faults=tuple(Fault(**f) for f in faults), seed=7, **truth)
-    write_campaign(tmp_path / "c.h5", rig)
-    return check_campaign(tmp_path / "c.h5")
+#: Nine short runs.
+TINY = replace(PLAN, directions=directions(5), locus=(), dry=PLAN.dry[:3], timing=Timing(dynamic_seconds=1.0))
 
 
 @pytest.mark.slow
-def test_a_good_campaign_has_no_problem_and_progress_is_told(tmp_path):
-    assert tiny(tmp_path) == []
+def test_a_good_campaign_has_no_problem_and_progress_is_told(campaign_of):
     told = []
-    check_campaign(tmp_path / "c.h5", progress=lambda done, total: told.append((done, total)))
+    path = campaign_of(stiff_rig(7, plan=TINY))
+    assert check_campaign(path, progress=lambda done, total: told.append((done, total))) == []
     assert told == [(i + 1, 9) for i in range(9)]
 
 
-def test_noise_free_data_are_not_dead(tmp_path):
-    from rigdata.virtual_rig import Noise
+def test_noise_free_data_are_not_dead(campaign_of):
+    found = check_campaign(campaign_of(stiff_rig(7, plan=TINY, noise=Noise.none())))
+    assert {p.severity for p in found} == {"note"}
 
-    assert {p.severity for p in tiny(tmp_path, noise=Noise.none())} == {"note"}
 
-
-def test_every_problem_is_reported_not_just_the_first(tmp_path):
-    found = tiny(
-        tmp_path,
-        {"kind": "dead", "run": "d-05000-25-02", "channel": "X1A"},
-        {"kind": "wrong_load", "run": "d-05000-25-03", "value": 1.6},
-        {"kind": "missing_channel", "run": "p-2-up", "channel": "L1H"},
-        {"kind": "missing_file", "run": "c-1"},
+def test_every_problem_is_reported_not_just_the_first(campaign_of):
+    faults = (
+        Fault("dead", "d-05000-25-02", "X1A"),
+        Fault("wrong_load", "d-05000-25-03", value=1.6),
+        Fault("missing_channel", "p-2-up", "L1H"),
+        Fault("missing_file", "c-1"),
     )
+    found = check_campaign(campaign_of(stiff_rig(7, *faults, plan=TINY)))
     assert {p.run for p in found if p.severity == "error"} == {"d-05000-25-02", "d-05000-25-03", "p-2-up", "c-1"}
     assert [p.severity for p in found] == sorted((p.severity for p in found), key=["error", "warning", "note"].index)
     assert all(p.what and p.cure and p.file for p in found)
@@ -203,22 +182,19 @@ def test_every_problem_is_reported_not_just_the_first(tmp_path):
 
 @pytest.mark.slow
 def test_shared_records_and_leftovers(tmp_path):
-    import h5py
-
-    tiny(tmp_path)
-    with h5py.File(tmp_path / "c.h5", "r+") as file:
+    path = written(tmp_path / "c.h5", stiff_rig(7, plan=TINY))
+    with h5py.File(path, "r+") as file:
         file["runs"].copy("d-05000-25-02", "forgotten")
         file["runs/c-1/extra"] = np.zeros(5)
-    found = {p.what.split(" ")[-1]: p for p in check_campaign(tmp_path / "c.h5")}
-    assert [p.severity for p in found.values()].count("error") == 0
-    assert "no run names the group forgotten" in [p.what for p in found.values()]
-    assert "datasets without a description: extra" in [p.what for p in found.values()]
+    found = {p.what: p.severity for p in check_campaign(path)}
+    assert "error" not in found.values()
+    assert {"no run names the group forgotten", "datasets without a description: extra"} <= set(found)
 
 
 def test_a_problem_prints_itself_with_place_and_cure():
     problem = Problem("error", "runs/a.csv", "line 3, column 2 (X1A)", "'x' is not a number", "Mend it")
     assert str(problem) == "runs/a.csv, line 3, column 2 (X1A): 'x' is not a number. Mend it"
-    assert str(dataclasses.replace(problem, place="")).startswith("runs/a.csv: ")
+    assert str(replace(problem, place="")).startswith("runs/a.csv: ")
 
 
 @pytest.mark.slow

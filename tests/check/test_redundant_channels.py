@@ -60,23 +60,32 @@ def every_run_is_excited(monkeypatch):
     monkeypatch.setattr(redundant_channels, "excited", lambda seen: True)
 
 
-def test_probes_that_agree_are_not_apart():
-    assert inconsistent_channels(runs()) == ()
+@pytest.mark.parametrize(
+    ("gains", "how"),
+    [
+        ((1.0, 1.0, 1.0, 1.0), {}),
+        ((1.008, 1.0, 0.995, 1.0), {}),
+        ((1.03, 1.0, 1.0, 1.0), {"noise": 1e-6, "n": 4}),
+        ((1.5, 1.0), {"axes": {"X": 0.0, "Y": 90.0}}),
+    ],
+    ids=["alike", "within what is stated", "scatter is no gain", "two probes have nothing to be held against"],
+)
+def test_probes_that_agree_are_not_apart(gains, how):
+    assert inconsistent_channels(runs(gains, **how)) == ()
 
 
-def test_stated_uncertainties_may_differ_by_what_they_state():
-    assert inconsistent_channels(runs((1.008, 1.0, 0.995, 1.0))) == ()
-
-
-def test_a_difference_is_halved_between_the_two_planes():
-    (apart,) = inconsistent_channels(runs((1.05, 1.0, 1.0, 1.0), noise=0.0))
-    assert -apart.gains == pytest.approx([0.025, 0.0, -0.025, 0.0], abs=1e-3)
-    assert apart.sentence().startswith("PXA reads 4.9% more at the excitation than PXB")
-
-
-def test_two_pairs_are_told_apart():
-    (apart,) = inconsistent_channels(runs((1.05, 1.0, 1.0, 0.92), noise=0.0))
-    assert -apart.gains == pytest.approx([0.025, 0.04, -0.025, -0.04], abs=3e-3)
+@pytest.mark.parametrize(
+    ("gains", "parts", "tolerance", "says"),
+    [
+        ((1.05, 1.0, 1.0, 1.0), (0.025, 0.0), 1e-3, "PXA reads 4.9% more at the excitation than PXB"),
+        ((1.05, 1.0, 1.0, 0.92), (0.025, 0.04), 3e-3, "PYA reads 8.3% more at the excitation than PYB"),
+    ],
+    ids=["one pair", "two pairs"],
+)
+def test_a_difference_is_halved_between_the_two_planes(gains, parts, tolerance, says):
+    (apart,) = inconsistent_channels(runs(gains, noise=0.0))
+    assert -apart.gains == pytest.approx([*parts, -parts[0], -parts[1]], abs=tolerance)
+    assert apart.sentence().startswith(says)
 
 
 def test_the_widened_interval_of_the_mean_holds_either_end():
@@ -88,14 +97,6 @@ def test_the_widened_interval_of_the_mean_holds_either_end():
     assert 1.96 * of_the_mean > 0.025
     assert 1.96 * of_the_mean < 0.035
     assert wide["PYA"].uncertainty == pytest.approx(0.005, abs=1e-3)
-
-
-def test_scatter_is_no_gain():
-    assert inconsistent_channels(runs((1.03, 1.0, 1.0, 1.0), noise=1e-6, n=4)) == ()
-
-
-def test_two_probes_have_nothing_to_be_held_against():
-    assert inconsistent_channels(runs((1.5, 1.0), axes={"X": 0.0, "Y": 90.0})) == ()
 
 
 def test_three_probes_are_held_against_each_other():
