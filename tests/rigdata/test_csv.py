@@ -13,32 +13,20 @@ import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.text.cells import MISSING
+from tests.rigdata.manifests import PROBE, manifest
 from tpjb_ident.check.campaign import check_campaign
 
-HEAD = """\
-schema = "tpjb-rig/1"
-id = "t"
-bearing = "b.toml"
-[acquisition]
-sample_rate = "10 Hz"
-[channels.X1A]
-quantity = "displacement"
-axis = "0 deg"
-unit = "um"
-[channels.X1B]
-quantity = "displacement"
-axis = "90 deg"
-unit = "um"
-"""
-TIME = '[channels.Zeit]\nquantity = "time"\nunit = "s"\n'
-RUN = '[[runs]]\nid = "c-1"\nfile = "runs/c-1.csv"\nkind = "clearance"\n'
+PROBES = {"X1A": PROBE, "X1B": PROBE | {"axis": "90 deg"}}
+CLOCK = {"quantity": "time", "unit": "s"}
 ROWS = [(0.5 * i, 1.5 + i, -2.25 * i) for i in range(30)]
 
 
-def make(folder: Path, data: bytes | str, csv: str = "", time: bool = True) -> rigdata.Run:
+def make(folder: Path, data: bytes | str, csv: str = "", time: bool = True, clock: dict = CLOCK) -> rigdata.Run:
     (folder / "runs").mkdir(exist_ok=True)
     (folder / "b.toml").write_text('name = "b"\n')
-    (folder / "campaign.toml").write_text(HEAD + (TIME if time else "") + csv + RUN)
+    run = {"id": "c-1", "file": "runs/c-1.csv", "kind": "clearance"}
+    text = manifest(PROBES | ({"Zeit": clock} if time else {}), run, sample_rate="10 Hz")
+    (folder / "campaign.toml").write_text(text + csv)
     (folder / "runs" / "c-1.csv").write_bytes(data if isinstance(data, bytes) else data.encode())
     return rigdata.load_campaign(folder).run("c-1")
 
@@ -339,8 +327,7 @@ def test_decimal_mark_that_shows_late(tmp_path):
 
 def test_file_with_none_of_the_used_channels(tmp_path):
     text = table(names=("Zeit", "a", "b"))
-    csv = TIME.replace('quantity = "time"\nunit = "s"', 'quantity = "ignore"')
-    refused(make(tmp_path, text, csv, time=False), "none of the channels")
+    refused(make(tmp_path, text, clock={"quantity": "ignore"}), "none of the channels")
 
 
 def test_large_files_are_parsed_by_column(tmp_path, monkeypatch):

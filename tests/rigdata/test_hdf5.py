@@ -14,27 +14,14 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers.hdf5.guards import too_long_text
+from tests.rigdata.manifests import PROBE, manifest
 from tpjb_ident.check.campaign import check_campaign
 
-MANIFEST = """\
-schema = "tpjb-rig/1"
-id = "t"
-bearing = "b.toml"
-[acquisition]
-sample_rate = "10 Hz"
-[channels.X1A]
-quantity = "displacement"
-axis = "0 deg"
-unit = "um"
-[channels.X1B]
-quantity = "displacement"
-axis = "90 deg"
-unit = "um"
-[[runs]]
-id = "c-1"
-file = "runs/c-1.csv"
-kind = "clearance"
-"""
+MANIFEST = manifest(
+    {"X1A": PROBE, "X1B": PROBE | {"axis": "90 deg"}},
+    {"id": "c-1", "file": "runs/c-1.csv", "kind": "clearance"},
+    sample_rate="10 Hz",
+)
 N = 1000
 
 

@@ -11,31 +11,18 @@ from rigdata import RigDataError, load_campaign
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
+from tests.rigdata.manifests import PROBE, SET_POINT, manifest
 
 RATE, COUNT = 1000.0, 400
 TIME = np.arange(COUNT) / RATE
 X = np.sin(2 * np.pi * 25 * TIME) - 0.3
-MANIFEST = """
-schema = "tpjb-rig/1"
-id = "stamped"
-bearing = "b.toml"
-[housing]
-mass = "30 kg"
-[channels.CLOCK]
-quantity = "time"
-unit = "s"
-[channels.X1A]
-quantity = "displacement"
-axis = "45 deg"
-unit = "um"
-[[runs]]
-id = "one"
-file = "one.csv"
-kind = "locus"
-shaft_speed = "22 Hz"
-static_load = "5 kN"
-static_load_direction = "-90 deg"
-"""
+RUN = {"id": "one", "file": "one.csv", "kind": "locus", **SET_POINT}
+
+
+def write_manifest(folder, clock):
+    """A campaign of one file: a clock and a probe."""
+    text = manifest({clock: {"quantity": "time", "unit": "s"}, "X1A": PROBE | {"axis": "45 deg"}}, RUN)
+    (folder / "campaign.toml").write_text(text, "utf-8")
 
 
 @pytest.mark.parametrize(
@@ -51,7 +38,7 @@ static_load_direction = "-90 deg"
 def test_stamps_of_several_countries_are_seconds_from_the_first(tmp_path, stamp, delimiter, decimal, name):
     rows = [delimiter.join([stamp(t), f"{x:.9f}".replace(".", decimal)]) for t, x in zip(TIME, X)]
     (tmp_path / "one.csv").write_text("\n".join([f"{name}{delimiter}X1A", *rows]) + "\n", "utf-8")
-    (tmp_path / "campaign.toml").write_text(MANIFEST.replace("CLOCK", f'"{name}"'), "utf-8")
+    write_manifest(tmp_path, name)
     record = load_campaign(tmp_path).run("one").record("X1A")
     assert record.rate == pytest.approx(RATE, rel=1e-6)
     np.testing.assert_allclose(record.time, TIME, atol=1e-7)
@@ -86,7 +73,7 @@ def test_a_cell_that_is_no_stamp_is_named_by_its_line(tmp_path):
     rows = [f"2019-07-22T11:31:{22 + t:09.6f},{x:.9f}" for t, x in zip(TIME, X)]
     rows[300] = "yesterday,0.1"
     (tmp_path / "one.csv").write_text("\n".join(["timestamp,X1A", *rows]) + "\n")
-    (tmp_path / "campaign.toml").write_text(MANIFEST.replace("CLOCK", "timestamp"))
+    write_manifest(tmp_path, "timestamp")
     with pytest.raises(RigDataError, match=r"line 302, column 1 \(timestamp\): 'yesterday' is not a time stamp"):
         load_campaign(tmp_path).run("one").record("X1A")
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigdata.calibration import Channel, reading_gain, reading_zero
 from rigdata.units import (
     SI_UNITS,
     UnitError,
@@ -239,3 +241,59 @@ def test_pint_quantities():
     with pytest.raises(UnitError, match="load"):
         to_si(5 * u.mm, "force", "load")
     assert to_si("5 kN", "force", "load") == pytest.approx(5000.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "gain"),
+    [
+        (("displacement", "V", "7.78 mV/um"), 1e-3 / 7.78),  # eddy-current probe
+        (("force", "mV", "2.0 mV/V", "20 kN", "5 V"), 2000.0),  # reading / (sensitivity * excitation) * full scale
+        (("force", "mV/V", "2.0 mV/V", "20 kN"), 10_000.0),  # a bridge amplifier that needs no supply
+        (("acceleration", "V", "10 mV/g"), 980.665),  # g is standard gravity
+        (("displacement", "um", "7.78 mV/um"), 1e-6),  # an engineering unit is already converted
+        (("speed", "rpm", None), 2 * np.pi / 60),
+    ],
+)
+def test_gain_of_a_chain(arguments, gain):
+    assert reading_gain(*arguments) == pytest.approx(gain)
+
+
+def test_polarity_and_zero():
+    channel = Channel("L", "force", "V", gain=100.0, zero=reading_zero("force", "V", "50 N"), polarity=-1)
+    assert channel.to_si(np.array([0.0, 1.0])) == pytest.approx([50.0, -50.0])
+
+
+@pytest.mark.parametrize(
+    ("unit", "zero", "kelvin"),
+    [
+        ("degC", None, 293.15),
+        ("K", None, 20.0),
+        ("degF", None, 266.483333),
+        ("V", None, 293.15),
+        ("V", "0 degC", 293.15),
+    ],
+)
+def test_temperature_of_reading_twenty(unit, zero, kelvin):
+    gain = reading_gain("temperature", unit, "1 K/V")
+    channel = Channel("T1", "temperature", unit, gain=gain, zero=reading_zero("temperature", unit, zero))
+    assert channel.to_si(np.array([20.0])) == pytest.approx([kelvin])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("force", "mV", None), "needs a sensitivity"),
+        (("force", "mV", "2 mV/V", "20 um", "5 V"), "not one of force"),
+        (("force", "mV", "2 mV/V", "20 kN", "0 V"), "above zero"),
+        (("displacement", "N", None), "not one of length"),
+    ],
+)
+def test_incomplete_chains_are_refused(arguments, says):
+    with pytest.raises(UnitError, match=says):
+        reading_gain(*arguments)
+
+
+def test_readings_are_not_changed():
+    readings = np.array([1.0, 2.0], dtype=np.float32)
+    Channel("X", "displacement", "V", gain=2.0).to_si(readings)
+    assert readings.tolist() == [1.0, 2.0]
