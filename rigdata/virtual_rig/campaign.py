@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.faults import CSV_ONLY, HDF5_ONLY, NEEDS_TIME, Fault
-from rigdata.virtual_rig.instruments import Sensor
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.ledger import CampaignTruth, campaign_truth, run_facts
-from rigdata.virtual_rig.plan import PlannedRun
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
 from rigdata.virtual_rig.sensing import converter_step
 from rigdata.virtual_rig.truth import VirtualRigError
 
 Progress = Callable[[int, int, str], None]
+_Records = Iterable[tuple[SimulatedRun, tuple[Fault, ...]]]
 UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
 
 
@@ -41,34 +41,32 @@ def write_campaign(
     _check_faults(rig, chosen)
     rig = replace(rig, truth=rig.truth.remembered())
     runs = rig.runs()
-    header = {
-        "id": rig.campaign,
-        "bearing": rig.truth.bearing_name,
-        "description": rig.description,
-    }
+    header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
     manifest = manifest_text(header, rig.instruments, runs, chosen, rig.faults)
     facts: dict[str, dict[str, object]] = {}
-    records = _watched(rig, facts, progress)
+    records = _written_records(rig, facts, progress)
     # the temporary sibling is on the same file system, so that the last step is one rename
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as spare:
+        draft = Path(spare) / "campaign"
         if isinstance(chosen, Hdf5Layout):
-            draft = Path(spare) / "campaign.h5"
             _write_hdf5(draft, rig, manifest, records, chosen)
         else:
-            draft = Path(spare) / "campaign"
-            draft.mkdir()
             _write_csv(draft, rig, manifest, records, chosen)
         truth = campaign_truth(rig, facts)
         _put_in_place(draft, target, Path(spare))
     return truth
 
 
-def _watched(rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None) -> Iterator[SimulatedRun]:
-    """Simulate every record, noting its facts and telling the watcher."""
+def _written_records(
+    rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None
+) -> Iterator[tuple[SimulatedRun, tuple[Fault, ...]]]:
+    """Simulate every record and note its facts; those whose file is there, with the faults of it."""
     total = len(rig.records())
     for done, record in enumerate(rig.simulate_all(), 1):
         facts[record.run.id] = run_facts(record)
-        yield record
+        faults = rig.faults_of(record.run.id)
+        if not _has("missing_file", faults):
+            yield record, faults
         if progress is not None:
             progress(done, total, record.run.id)
 
@@ -89,6 +87,11 @@ def _check_target(target: Path, layout: Layout, overwrite: bool) -> None:
         raise VirtualRigError(f"{target} is not an HDF5 file; it is not replaced")
 
 
+def _is_hdf5(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(8) == b"\x89HDF\r\n\x1a\n"
+
+
 def _check_faults(rig: VirtualRig, layout: Layout) -> None:
     """Refuse faults that this layout cannot show: a campaign must hold what was asked for."""
     impossible = HDF5_ONLY if isinstance(layout, CsvLayout) else CSV_ONLY
@@ -97,11 +100,6 @@ def _check_faults(rig: VirtualRig, layout: Layout) -> None:
             raise VirtualRigError(f"fault {fault.kind!r} does not exist in {type(layout).__name__}")
         if fault.kind in NEEDS_TIME and layout.time_name is None:
             raise VirtualRigError(f"fault {fault.kind!r} needs a time column; give the layout a time_name")
-
-
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(8) == b"\x89HDF\r\n\x1a\n"
 
 
 def _put_in_place(draft: Path, target: Path, spare: Path) -> None:
@@ -121,9 +119,7 @@ def _put_in_place(draft: Path, target: Path, spare: Path) -> None:
     shutil.rmtree(former, ignore_errors=True)
 
 
-def _write_hdf5(
-    path: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: Hdf5Layout
-) -> None:
+def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, layout: Hdf5Layout) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
@@ -135,85 +131,68 @@ def _write_hdf5(
         file.attrs["manifest"] = manifest
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
-        for record in records:
-            faults = rig.faults_of(record.run.id)
-            if any(f.kind == "missing_file" for f in faults):
-                continue
+        for record, faults in records:
             _write_record(groups.create_group(record.run.id), record, layout, precision, faults)
         for run in rig.runs():
             if run.record != run.id and run.record in groups:
-                _share(groups, run)
+                groups[run.id] = groups[run.record]  # a hard link
 
 
 def _write_record(
     group: Any, record: SimulatedRun, layout: Hdf5Layout, precision: str, faults: tuple[Fault, ...]
 ) -> None:
     group.attrs["sample_rate_hz"] = float(record.readings.rate)
-    empty = any(f.kind == "empty_file" for f in faults)
+    length = 0 if _has("empty_file", faults) else len(record.readings.time)
     if layout.time_name is not None:
-        stored = record.readings.time[: 0 if empty else None]
-        group.create_dataset(layout.time_name, data=stored, **_options(len(stored), layout))
+        _write_dataset(group, layout.time_name, record.readings.time[:length], layout)
     for name, values in record.readings.columns.items():
-        if any(f.kind == "missing_channel" and f.affects(record.run.id, name) for f in faults):
+        if _has("missing_channel", faults, name):
             continue
-        count = 0 if empty else len(values)
-        if any(f.kind == "short_channel" and f.affects(record.run.id, name) for f in faults):
-            count = count * 3 // 4
-        data = values[:count].astype(np.dtype(precision))
-        group.create_dataset(name, data=data, **_options(count, layout))
+        count = length * 3 // 4 if _has("short_channel", faults, name) else length
+        _write_dataset(group, name, values[:count].astype(np.dtype(precision)), layout)
 
 
-def _options(count: int, layout: Hdf5Layout) -> dict[str, Any]:
-    if not layout.compression or not count:
-        return {"track_times": False}
-    return {
-        "track_times": False,
-        "compression": "gzip",
-        "compression_opts": layout.compression,
-        "shuffle": True,
-        "chunks": (min(count, 16384),),
-    }
+def _write_dataset(group: Any, name: str, values: FloatArray, layout: Hdf5Layout) -> None:
+    packing: dict[str, Any] = {}
+    if layout.compression and len(values):
+        chunks = (min(len(values), 16384),)
+        packing = {"compression": "gzip", "compression_opts": layout.compression, "shuffle": True, "chunks": chunks}
+    group.create_dataset(name, data=values, track_times=False, **packing)
 
 
-def _share(groups: Any, run: PlannedRun) -> None:
-    # a hard link: the same group under a second name, inside the file
-    groups[run.id] = groups[run.record]
-
-
-def _write_csv(
-    folder: Path, rig: VirtualRig, manifest: str, records: Iterable[SimulatedRun], layout: CsvLayout
-) -> None:
-    """Write manifest, bearing and all records into an existing, empty folder."""
+def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: _Records, layout: CsvLayout) -> None:
+    """Write manifest, bearing and all records into a new folder."""
+    (folder / "runs").mkdir(parents=True)
     (folder / "campaign.toml").write_bytes(manifest.encode())
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
-    (folder / "runs").mkdir()
-    for record in records:
-        faults = rig.faults_of(record.run.id)
-        if any(f.kind == "missing_file" for f in faults):
-            continue
+    for record, faults in records:
         text = _record_text(record, rig, layout, faults)
         (folder / "runs" / f"{record.run.id}.csv").write_bytes(text.encode(layout.encoding))
 
 
 def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout, faults: tuple[Fault, ...]) -> str:
-    sensors = [s for s in rig.instruments.sensors if not _affected("missing_channel", faults, s.name)]
-    twice = [s for s in sensors if _affected("duplicate_column", faults, s.name)]
-    names = [s.name for s in (*sensors, *twice)]
-    units = [s.unit for s in (*sensors, *twice)]
-    columns = [record.readings.columns[name] for name in names]
-    forms = [f"%.{_decimals(s, rig.noise.bits)}f" for s in (*sensors, *twice)]
+    readings = record.readings
+    sensors = [s for s in rig.instruments.sensors if not _has("missing_channel", faults, s.name)]
+    sensors += [s for s in sensors if _has("duplicate_column", faults, s.name)]
+    names, units, columns, forms = [], [], [], []
     if layout.time_name is not None:
-        names, units = [layout.time_name, *names], ["s", *units]
-        columns = [record.readings.time, *columns]
-        forms = [_time_form(record.readings.rate), *forms]
-    count = 0 if any(f.kind == "empty_file" for f in faults) else len(record.readings.time)
+        names, units, columns = [layout.time_name], ["s"], [readings.time]
+        forms = ["%.6f" if (1e6 / readings.rate).is_integer() else "%.9f"]
+    for sensor in sensors:
+        names.append(sensor.name)
+        units.append(sensor.unit)
+        columns.append(readings.columns[sensor.name])
+        # decimals that keep a hundredth of a converter step
+        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or UNQUANTISED_BITS))) + 2
+        forms.append(f"%.{max(0, decimals)}f")
+    count = 0 if _has("empty_file", faults) else len(readings.time)
     tail = layout.delimiter if layout.trailing_delimiter else ""
-    head = [line.format(rate=f"{record.readings.rate:g}", count=count) for line in layout.preamble]
+    head = [line.format(rate=f"{readings.rate:g}", count=count) for line in layout.preamble]
     head.append(layout.delimiter.join(names) + tail)
     if layout.units_line:
         head.append(layout.delimiter.join(units) + tail)
     body = _rows(np.stack(columns, axis=1)[:count], forms, layout, tail)
-    if any(f.kind == "truncated_line" for f in faults) and body:
+    if _has("truncated_line", faults) and body:
         body[-1] = body[-1][: len(body[-1]) * 3 // 5]
         return layout.newline.join([*head, *body])
     return layout.newline.join([*head, *body, *[""] * (1 + layout.blank_last_lines)])
@@ -231,14 +210,6 @@ def _rows(table: np.ndarray, forms: list[str], layout: CsvLayout, tail: str) -> 
     return [line + tail for line in text.split("\n")] if text else []
 
 
-def _decimals(sensor: Sensor, bits: int | None) -> int:
-    """Decimals that keep a hundredth of a converter step."""
-    return max(0, ceil(-log10(converter_step(sensor, bits or UNQUANTISED_BITS))) + 2)
-
-
-def _time_form(rate: float) -> str:
-    return "%.6f" if (1e6 / rate).is_integer() else "%.9f"
-
-
-def _affected(kind: str, faults: tuple[Fault, ...], channel: str) -> bool:
+def _has(kind: str, faults: tuple[Fault, ...], channel: str | None = None) -> bool:
+    """Whether one of a record's faults is of a kind, and in a channel."""
     return any(f.kind == kind and f.affects("*", channel) for f in faults)

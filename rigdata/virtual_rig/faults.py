@@ -6,7 +6,7 @@ after the converter), a run (the test was done or noted wrongly) and a file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Literal
@@ -123,15 +123,10 @@ def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: s
 
 
 def _faulty_sensor(sensor: Sensor, kind: str, value: float) -> Sensor:
-    error = sensor.error
-    changes = {
-        "scaled": {"gain": error.gain * value},
-        "delayed": {"delay": error.delay + value},
-        "rotated": {"angle": error.angle + value},
-        "offset": {"offset": error.offset + value},
-        "crosstalk": {"cross": error.cross + value},
-    }
-    return sensor.with_error(**changes[kind])
+    if kind == "scaled":
+        return sensor.with_error(gain=sensor.error.gain * value)
+    name = {"delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}[kind]
+    return sensor.with_error(**{name: getattr(sensor.error, name) + value})
 
 
 def spoil_record(
@@ -158,8 +153,7 @@ def spoil_record(
         else:
             for name in columns:
                 if fault.affects(run, name):
-                    sensor = instruments.named(name)
-                    columns[name] = SPOIL[fault.kind](columns[name], fault, sensor, time)
+                    columns[name] = _spoilt(columns[name], fault, instruments.named(name), time)
     return Readings(time, columns, readings.rate)
 
 
@@ -167,40 +161,21 @@ def _window(fault: Fault, time: FloatArray) -> np.ndarray:
     return (time >= fault.start) & (time < fault.start + fault.length)
 
 
-def _dead(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    return np.full_like(v, fault.value or 0.0)
-
-
-def _stuck(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
+def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
+    """Readings (n,) of one channel with a fault of its record."""
     inside = _window(fault, time)
-    return np.where(inside, v[np.argmax(inside)], v)
-
-
-def _clipped(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    low, high = float(v.min()), float(v.max())
-    reach = 0.5 * (high - low) * (0.6 if fault.value is None else fault.value)
-    return np.clip(v, 0.5 * (low + high) - reach, 0.5 * (low + high) + reach)
-
-
-def _inverted(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
-    return 2 * sensor.zero - v
-
-
-def _nan_gap(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    return np.where(_window(fault, time), np.nan, v)
-
-
-def _glitch(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    size = sensor.polarity * sensor.scale * (fault.value or 0.0)
-    return v + size * _window(fault, time)
-
-
-SPOIL: dict[str, Callable[[FloatArray, Fault, Sensor, FloatArray], FloatArray]] = {
-    "dead": _dead,
-    "stuck": _stuck,
-    "clipped": _clipped,
-    "inverted": _inverted,
-    "nan_gap": _nan_gap,
-    "glitch": _glitch,
-}
+    if fault.kind == "dead":
+        return np.full_like(v, fault.value or 0.0)
+    if fault.kind == "stuck":
+        return np.where(inside, v[np.argmax(inside)], v)
+    if fault.kind == "clipped":
+        low, high = float(v.min()), float(v.max())
+        middle = 0.5 * (low + high)
+        reach = 0.5 * (high - low) * (0.6 if fault.value is None else fault.value)
+        return np.clip(v, middle - reach, middle + reach)
+    if fault.kind == "inverted":
+        # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
+        return 2 * sensor.zero - v
+    if fault.kind == "nan_gap":
+        return np.where(inside, np.nan, v)
+    return v + sensor.polarity * sensor.scale * (fault.value or 0.0) * inside  # a glitch

@@ -46,24 +46,14 @@ class Sensor:
     @classmethod
     def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
         """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer."""
-        calibration = (("sensitivity", "7.78 mV/um"),)
-        return cls(
-            name,
-            "displacement",
-            "V",
-            7.78e3,
-            axis,
-            polarity=-1,
-            zero=gap_voltage,
-            calibration=calibration,
-            uncertainty=0.005,
-        )
+        sensitivity = (("sensitivity", "7.78 mV/um"),)
+        return cls(name, "displacement", "V", 7.78e3, axis, -1, gap_voltage, calibration=sensitivity, uncertainty=0.005)
 
     @classmethod
     def load_cell(cls, name: str, axis: float) -> Sensor:
         """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V."""
         calibration = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
-        return cls(name, "force", "mV", 10.0 / 20e3, axis, span=10.0, calibration=calibration, uncertainty=0.002)
+        return cls(name, "force", "mV", 10.0 / 20e3, axis, calibration=calibration, uncertainty=0.002)
 
     @classmethod
     def accelerometer(cls, name: str, axis: float) -> Sensor:
@@ -87,15 +77,12 @@ class Sensor:
         """Return the sensor with these fields of its error replaced."""
         return replace(self, error=replace(self.error, **changes))
 
-    @property
-    def direction(self) -> np.ndarray:
-        """Unit vector (2,) along which it really reads."""
-        return _unit(self, self.error.angle)
-
-    @property
-    def stated_direction(self) -> np.ndarray:
-        """Unit vector (2,) along which it is stated to read."""
-        return _unit(self, 0.0)
+    def direction(self, stated: bool = False) -> np.ndarray:
+        """Unit vector (2,) along which it really reads, or is stated to read."""
+        if self.axis is None:
+            raise VirtualRigError(f"channel {self.name} has no axis")
+        angle = self.axis + (0.0 if stated else self.error.angle)
+        return np.array([np.cos(angle), np.sin(angle)])
 
 
 @dataclass(frozen=True)
@@ -158,11 +145,6 @@ class Instruments:
                 return sensor
         raise VirtualRigError(f"no channel {name!r}; there are {[s.name for s in self.sensors]}")
 
-    def partner(self, sensor: Sensor) -> Sensor:
-        """Find the other sensor of its pair."""
-        family = [s.name for s in self.of(sensor.quantity)]
-        return self.named(family[family.index(sensor.name) ^ 1])
-
     def gap_voltages(self) -> dict[str, float]:
         """Reading of every probe with the shaft in the bearing centre."""
         return {s.name: s.zero + s.polarity * s.scale * s.error.offset for s in self.of("displacement")}
@@ -195,9 +177,3 @@ class Instruments:
             sensors=tuple(changed(s) for s in self.sensors),
             housing_mass_error=self.housing_mass_error + mass_error,
         )
-
-
-def _unit(sensor: Sensor, turn: float) -> np.ndarray:
-    if sensor.axis is None:
-        raise VirtualRigError(f"channel {sensor.name} has no axis")
-    return np.array([np.cos(sensor.axis + turn), np.sin(sensor.axis + turn)])

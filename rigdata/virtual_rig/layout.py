@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 
-from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
@@ -34,51 +33,6 @@ class CsvLayout:
         if len(self.delimiter) != 1 or self.decimal not in ".," or self.delimiter == self.decimal:
             raise VirtualRigError("delimiter must be one character, decimal '.' or ',', and the two must differ")
 
-    @classmethod
-    def plain(cls) -> CsvLayout:
-        """Comma, point, UTF-8, one line of names."""
-        return cls()
-
-    @classmethod
-    def german(cls) -> CsvLayout:
-        """Semicolon, decimal comma, cp1252, CRLF, five preamble lines, units line, time column `Zeit`."""
-        return cls(
-            delimiter=";",
-            decimal=",",
-            encoding="cp1252",
-            newline="\r\n",
-            preamble=(
-                "HBM catman Easy; Prüfstand Kippsegmentlager",
-                "Datum: 14.03.2019 09:41:27",
-                "Prüfer: Labor 2; Öl ISO VG 46, 40 °C",
-                "Abtastrate: {rate} Hz",
-                "Messwerte: {count}",
-            ),
-            units_line=True,
-            time_name="Zeit",
-        )
-
-    @classmethod
-    def tabbed(cls) -> CsvLayout:
-        """Tab, decimal comma, UTF-8 with BOM, trailing delimiter, blank last lines, not declared."""
-        return cls(
-            delimiter="\t",
-            decimal=",",
-            encoding="utf-8-sig",
-            newline="\r\n",
-            preamble=("Messung\tPrüfstand 3", "{count} Werte\t{rate} Hz"),
-            units_line=True,
-            missing="NaN",
-            trailing_delimiter=True,
-            blank_last_lines=2,
-            declared=False,
-        )
-
-    @classmethod
-    def bare(cls) -> CsvLayout:
-        """Comma, point, no time column, not declared: the rate is in the manifest only."""
-        return cls(time_name=None, declared=False)
-
 
 @dataclass(frozen=True)
 class Hdf5Layout:
@@ -97,10 +51,35 @@ Layout = CsvLayout | Hdf5Layout
 
 LAYOUTS: dict[str, Layout] = {
     "hdf5": Hdf5Layout(),
-    "csv": CsvLayout.plain(),
-    "csv-german": CsvLayout.german(),
-    "csv-tabbed": CsvLayout.tabbed(),
-    "csv-bare": CsvLayout.bare(),
+    "csv": CsvLayout(),
+    "csv-german": CsvLayout(
+        delimiter=";",
+        decimal=",",
+        encoding="cp1252",
+        newline="\r\n",
+        preamble=(
+            "HBM catman Easy; Prüfstand Kippsegmentlager",
+            "Datum: 14.03.2019 09:41:27",
+            "Prüfer: Labor 2; Öl ISO VG 46, 40 °C",
+            "Abtastrate: {rate} Hz",
+            "Messwerte: {count}",
+        ),
+        units_line=True,
+        time_name="Zeit",
+    ),
+    "csv-tabbed": CsvLayout(  # with a byte-order mark
+        delimiter="\t",
+        decimal=",",
+        encoding="utf-8-sig",
+        newline="\r\n",
+        preamble=("Messung\tPrüfstand 3", "{count} Werte\t{rate} Hz"),
+        units_line=True,
+        missing="NaN",
+        trailing_delimiter=True,
+        blank_last_lines=2,
+        declared=False,
+    ),
+    "csv-bare": CsvLayout(time_name=None, declared=False),
 }
 
 
@@ -110,7 +89,7 @@ def layout_named(layout: str | Layout) -> Layout:
         return layout
     if layout not in LAYOUTS:
         raise VirtualRigError(f"no layout {layout!r}; there are {', '.join(LAYOUTS)}")
-    return replace(LAYOUTS[layout])
+    return LAYOUTS[layout]
 
 
 def manifest_text(
@@ -118,7 +97,7 @@ def manifest_text(
     instruments: Instruments,
     runs: Sequence[PlannedRun],
     layout: Layout,
-    faults: Iterable[Fault] = (),
+    faults: tuple[Fault, ...] = (),
 ) -> str:
     """Write the manifest (`tpjb-rig/1`)."""
     common = max({run.rate for run in runs}, key=[run.rate for run in runs].count)
@@ -132,7 +111,6 @@ def manifest_text(
     if layout.time_name is not None:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
     blocks += [_channel(sensor) for sensor in instruments.sensors]
-    faults = tuple(faults)
     blocks += [_run(run, layout, common, faults) for run in runs]
     return "\n".join(blocks)
 
@@ -144,14 +122,11 @@ def _table(title: str | None, entries: dict[str, object]) -> str:
 
 
 def _dialect(layout: CsvLayout) -> dict[str, object]:
-    entries: dict[str, object] = {
-        "delimiter": layout.delimiter,
-        "decimal": layout.decimal,
-        "encoding": layout.encoding,
-        "header_line": len(layout.preamble) + 1,
-    }
+    header_line = len(layout.preamble) + 1
+    entries: dict[str, object] = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
+    entries["header_line"] = header_line
     if layout.units_line:
-        entries["units_line"] = len(layout.preamble) + 2
+        entries["units_line"] = header_line + 1
     return entries
 
 
@@ -161,11 +136,10 @@ def _channel(sensor: Sensor) -> str:
         entries["axis"] = _degrees(sensor.axis)
     if sensor.pad is not None:
         entries["pad"] = sensor.pad
-    for key, value in sensor.calibration:
-        if key == "position":
-            entries[key] = float(value)
-    entries["unit"] = sensor.unit
-    entries.update({key: value for key, value in sensor.calibration if key != "position"})
+    calibration = dict(sensor.calibration)
+    if "position" in calibration:
+        entries["position"] = float(calibration.pop("position"))
+    entries |= {"unit": sensor.unit, **calibration}
     if sensor.polarity != 1:
         entries["polarity"] = sensor.polarity
     if sensor.uncertainty:
@@ -185,21 +159,15 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
         if noted.test.branch != "up":
             entries["branch"] = noted.test.branch
     if noted.point is not None:
-        entries.update(_set_point(noted.point))
+        entries["shaft_speed"] = f"{noted.point.shaft_speed_hz:.10g} Hz"
+        entries["static_load"] = f"{noted.point.static_load / 1e3:.10g} kN"
+        entries["static_load_direction"] = _degrees(noted.point.static_load_direction)
         if noted.kind == "dynamic":
             entries["excitation_frequency"] = f"{noted.point.excitation_hz:.10g} Hz"
             entries["excitation_direction"] = _degrees(noted.direction or 0.0)
     if run.rate != common_rate:
         entries["sample_rate"] = _rate(run.rate)
     return _table("[[runs]]", entries)
-
-
-def _set_point(point: OperatingPoint) -> dict[str, object]:
-    return {
-        "shaft_speed": f"{point.shaft_speed_hz:.10g} Hz",
-        "static_load": f"{point.static_load / 1e3:.10g} kN",
-        "static_load_direction": _degrees(point.static_load_direction),
-    }
 
 
 def _as_noted(run: PlannedRun, faults: tuple[Fault, ...]) -> PlannedRun:

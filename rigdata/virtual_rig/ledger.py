@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
@@ -68,14 +69,14 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
         campaign=rig.campaign,
         seed=rig.seed,
         points=tuple(_point(rig, point) for point in rig.plan.dynamic),
-        locus=tuple(_locus(rig, point) for point in rig.plan.locus),
+        locus=tuple(_set_point(point) | _position(rig, point) for point in rig.plan.locus),
         pivot_curves=tuple(_pivot_curve(rig, k + 1) for k in range(len(rig.truth.pivot_angles))),
         clearance_cold_m=tuple(rig.truth.clearance),
         gap_voltage_V=rig.instruments.gap_voltages(),
         housing_mass_kg=rig.instruments.true_mass,
         cell_stiffness_N_per_m=tuple(cells),
         sensor_errors={s.name: asdict(s.error) for s in rig.instruments.sensors},
-        faults=tuple(_fault(f) for f in map(asdict, rig.faults)),
+        faults=tuple(_fault(fault) for fault in rig.faults),
         runs=dict(runs),
     )
 
@@ -93,7 +94,7 @@ def run_facts(record: SimulatedRun) -> dict[str, object]:
 def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
     h = rig.truth.h(point)
     readings = apparent_stiffness(h, point.excitation, rig.instruments)
-    position = rig.truth.centre(replace(point, excitation=0.0))
+    steady = replace(point, excitation=0.0)
     return {
         **_set_point(point),
         "excitation_Hz": point.excitation_hz,
@@ -101,15 +102,14 @@ def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
         "C": (h.imag / point.excitation).tolist(),
         "K_apparent": readings.real.tolist(),
         "C_apparent": (readings.imag / point.excitation).tolist(),
-        "x_m": float(position[0]),
-        "y_m": float(position[1]),
-        "pad_temperature_C": rig.truth.temperatures(replace(point, excitation=0.0)).tolist(),
+        **_position(rig, steady),
+        "pad_temperature_C": rig.truth.temperatures(steady).tolist(),
     }
 
 
-def _locus(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
-    position = rig.truth.centre(point)
-    return {**_set_point(point), "x_m": float(position[0]), "y_m": float(position[1])}
+def _position(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
+    x, y = rig.truth.centre(point).tolist()
+    return {"x_m": x, "y_m": y}
 
 
 def _set_point(point: OperatingPoint) -> dict[str, object]:
@@ -121,25 +121,22 @@ def _set_point(point: OperatingPoint) -> dict[str, object]:
 
 
 def _pivot_curve(rig: VirtualRig, pad: int) -> dict[str, object]:
+    # tangents by central differences over 0.1 % of the load: error about 1e-7 for smooth laws
+    low, high = PIVOT_LOADS * (1 - 1e-3), PIVOT_LOADS * (1 + 1e-3)
+    rise = rig.truth.deflection(pad, high) - rig.truth.deflection(pad, low)
+    with np.errstate(divide="ignore"):  # a rigid pivot is infinitely stiff
+        stiffness = (high - low) / rise
     return {
         "pad": pad,
         "force_N": PIVOT_LOADS.tolist(),
         "deflection_m": rig.truth.deflection(pad, PIVOT_LOADS).tolist(),
-        "stiffness_N_per_m": _tangent(rig, pad, PIVOT_LOADS).tolist(),
+        "stiffness_N_per_m": stiffness.tolist(),
     }
 
 
-def _tangent(rig: VirtualRig, pad: int, load: FloatArray) -> FloatArray:
-    """Tangent stiffness [N/m] by central differences over 0.1 % of the load: error about 1e-7 for smooth laws."""
-    low, high = load * (1 - 1e-3), load * (1 + 1e-3)
-    rise = rig.truth.deflection(pad, high) - rig.truth.deflection(pad, low)
-    with np.errstate(divide="ignore"):  # a rigid pivot is infinitely stiff
-        return (high - low) / rise
-
-
-def _fault(entries: dict[str, object]) -> dict[str, object]:
+def _fault(fault: Fault) -> dict[str, object]:
     """Fault without what was not given; an open end is not a JSON number."""
-    return {k: v for k, v in entries.items() if v is not None and v != float("inf")}
+    return {k: v for k, v in asdict(fault).items() if v is not None and v != float("inf")}
 
 
 def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instruments) -> ComplexArray:
@@ -159,9 +156,9 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
 
 def _reading_map(instruments: Instruments, quantity: str, frequency: float) -> ComplexArray:
     """Map (2, 2) from true to stated X and Y of a quantity, phasors at `frequency` [rad/s]; first pair of sensors."""
-    pair = instruments.of(quantity)[:2]
-    stated_axes = np.array([s.stated_direction for s in pair])
-    sensed = np.array(
-        [s.error.gain * np.exp(-1j * frequency * s.error.delay) * felt_direction(s, instruments) for s in pair]
-    )
-    return np.linalg.solve(stated_axes.astype(complex), sensed)
+    stated, sensed = [], []
+    for sensor in instruments.of(quantity)[:2]:
+        gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
+        stated.append(sensor.direction(stated=True))
+        sensed.append(gain * felt_direction(sensor, instruments))
+    return np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed))

@@ -162,17 +162,22 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     if unbalance:
         turning = unbalance * np.array([1.0, -1j]) * np.exp(1j * shaft_angle)
         forces.append((actual.shaft_speed, turning))
+    # the surface is the same in the whole campaign
+    runout = np.array(noise.shaft.runout, dtype=float)
+    phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
+    orders = np.arange(1, len(runout) + 1)
+    steady = replace(position_point, excitation=0.0)
     lines = tuple(
         answer(frequency, force, truth.h(replace(stiffness_point, excitation=frequency)), instruments)
         for frequency, force in forces
     )
     motion = SteadyMotion(
-        position=truth.centre(replace(position_point, excitation=0.0)),
+        position=truth.centre(steady),
         load=load_vector(actual),
         lines=lines,
-        temperature=truth.temperatures(replace(position_point, excitation=0.0)),
+        temperature=truth.temperatures(steady),
         speed=actual.shaft_speed,
-        surface=_surface_runout(noise, seed, shaft_angle),
+        surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
     )
     time = np.arange(round(run.seconds * run.rate)) / run.rate
     return RunPhysics(time, motion, _facts(actual, motion))
@@ -227,14 +232,6 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     )
 
 
-def _surface_runout(noise: Noise, seed: int, shaft_angle: float) -> ComplexArray:
-    """Runout phasors of 1X, 2X, ... [m] at a shaft angle [rad]; the surface is the same in the whole campaign."""
-    sizes = np.array(noise.shaft.runout, dtype=float)
-    orders = np.arange(1, len(sizes) + 1)
-    phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(sizes))
-    return sizes * np.exp(1j * (phases + orders * shaft_angle))
-
-
 def _facts(actual: OperatingPoint, motion: SteadyMotion) -> dict[str, object]:
     return {
         "static_load_N": actual.static_load,
@@ -279,7 +276,7 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
     radial = truth.clearance[pad] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
     direction = run.direction + off
-    motion = SlowMotion(time, position, np.outer(load, _unit(direction)), _cold(truth))
+    motion = SlowMotion(time, position, np.outer(load, _unit(direction)), truth.cold_temperatures)
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
@@ -297,7 +294,6 @@ def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
     order = {"up": rising, "down": rising[::-1], "cycle": rising + rising[-2::-1]}[test.branch]
     if test.branch == "down":
         level = [test.levels[-1]]
-        knots = [0.0]
     for target, hold in order:
         arrival = knots[-1] + (test.ramp if target != level[-1] else 0.0)
         held.append((arrival, arrival + hold, target - level[-1], target))
@@ -338,10 +334,6 @@ def _either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float
     return float(rng.uniform(*limits) * rng.choice([-1.0, 1.0]))
 
 
-def _cold(truth: RigTruth) -> FloatArray:
-    return np.full(len(truth.pivot_angles), truth.cold_temperature)
-
-
 def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
     """Physics of a clearance sweep."""
     sweep = run.test
@@ -353,7 +345,7 @@ def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int)
     direction = sweep.start + 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
     load = push * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-    return RunPhysics(time, SlowMotion(time, position, load, _cold(truth)), {"push_N": push})
+    return RunPhysics(time, SlowMotion(time, position, load, truth.cold_temperatures), {"push_N": push})
 
 
 def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:
@@ -365,7 +357,7 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     of the angle between them: there the side is at clearance + deflection(that).
     """
     pads = _sides(truth)
-    normals = np.array([_normal(truth, k) for k in pads])
+    normals = _normals(truth, pads)
     shares, places = [], []
     for i, pad in enumerate(pads):
         after = pads[(i + 1) % len(pads)]
@@ -377,9 +369,8 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         turned = np.clip((direction - angle + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
-        corner = np.linalg.solve(np.stack([normals[i], normals[(i + 1) % len(pads)]]), reach).T
         shares.append(share)
-        places.append(corner)
+        places.append(np.linalg.solve(_normals(truth, [pad, after]), reach).T)
     weight = np.array(shares) / np.sum(shares, axis=0)
     position = np.einsum("kn,knj->nj", weight, np.array(places))
     for i, pad in enumerate(pads):
@@ -407,7 +398,7 @@ def _sides(truth: RigTruth) -> list[int]:
             before, after = pads[i - 1], pads[(i + 1) % len(pads)]
             if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
                 continue
-            reach = _corner(truth, before, after) @ _normal(truth, k)
+            reach = _corner(truth, before, after) @ _unit(truth.pivot_angles[k])
             if reach <= truth.clearance[k]:
                 pads.remove(k)
                 removed = True
@@ -422,13 +413,13 @@ def _sides(truth: RigTruth) -> list[int]:
 
 
 def _corner(truth: RigTruth, first: int, second: int) -> FloatArray:
-    normals = np.stack([_normal(truth, first), _normal(truth, second)])
     reach = np.array([truth.clearance[first], truth.clearance[second]])
-    return np.asarray(np.linalg.solve(normals, reach), dtype=float)
+    return np.asarray(np.linalg.solve(_normals(truth, [first, second]), reach), dtype=float)
 
 
-def _normal(truth: RigTruth, pad: int) -> FloatArray:
-    return _unit(truth.pivot_angles[pad])
+def _normals(truth: RigTruth, pads: list[int]) -> FloatArray:
+    """Unit vectors toward the pads, (len(pads), 2)."""
+    return np.stack([_unit(truth.pivot_angles[pad]) for pad in pads])
 
 
 def _unit(angle: float) -> FloatArray:

@@ -125,12 +125,7 @@ class RigPlan:
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
-        runs = (
-            *self._dynamic_runs(),
-            *self._locus_runs(),
-            *self._dry_runs(pivot_angles),
-            *self._clearance_runs(),
-        )
+        runs = (*self._dynamic_runs(), *self._locus_runs(), *self._static_runs(pivot_angles))
         ids: set[str] = set()
         for run in runs:
             if run.id in ids:
@@ -182,17 +177,14 @@ class RigPlan:
                 seconds=self.timing.locus_seconds,
             )
 
-    def _dry_runs(self, pivot_angles: Sequence[float]) -> Iterable[PlannedRun]:
+    def _static_runs(self, pivot_angles: Sequence[float]) -> Iterable[PlannedRun]:
         for test in self.dry:
             if not 1 <= test.pad <= len(pivot_angles):
                 raise VirtualRigError(f"dry test on pad {test.pad}: the bearing has pads 1 to {len(pivot_angles)}")
             name = f"p-{test.pad}-{test.branch}"
             angle = pivot_angles[test.pad - 1]
-            yield PlannedRun(
-                id=name, kind="dry_pivot", rate=self.timing.dry_rate, direction=angle, record=name, test=test
-            )
-
-    def _clearance_runs(self) -> Iterable[PlannedRun]:
+            rate = self.timing.dry_rate
+            yield PlannedRun(id=name, kind="dry_pivot", rate=rate, direction=angle, record=name, test=test)
         for number, sweep in enumerate(self.clearance, 1):
             name = f"c-{number}"
             yield PlannedRun(id=name, kind="clearance", rate=self.timing.dry_rate, record=name, test=sweep)

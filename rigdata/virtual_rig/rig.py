@@ -11,14 +11,7 @@ from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.motion import RunPhysics, clearance_physics, dry_physics, running_physics
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun, RigPlan
-from rigdata.virtual_rig.sensing import (
-    Glitch,
-    Readings,
-    add_glitches,
-    analogue_readings,
-    converted,
-    draw_glitches,
-)
+from rigdata.virtual_rig.sensing import Glitch, Readings, add_glitches, analogue_readings, converted, draw_glitches
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 
@@ -102,7 +95,9 @@ class VirtualRig:
         instruments = faulty_instruments(self.instruments, faults, run.id)
         physics = self._physics(run, instruments)
         columns = analogue_readings(physics, instruments, self.noise, self.seed, run.id)
-        glitches = self._glitches(run, instruments, len(physics.time))
+        glitches: tuple[Glitch, ...] = ()
+        if run.kind in ("dynamic", "locus"):
+            glitches = draw_glitches(instruments, self.noise, len(physics.time), self.seed, run.id)
         add_glitches(columns, instruments, glitches)
         columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
         readings = Readings(physics.time, columns, run.rate)
@@ -117,8 +112,3 @@ class VirtualRig:
         if run.kind == "clearance":
             return clearance_physics(run, self.truth, self.noise, self.seed)
         return running_physics(run, self.truth, instruments, self.noise, self.seed)
-
-    def _glitches(self, run: PlannedRun, instruments: Instruments, samples: int) -> tuple[Glitch, ...]:
-        if run.kind not in ("dynamic", "locus"):
-            return ()
-        return draw_glitches(instruments, self.noise, samples, self.seed, run.id)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len
@@ -70,9 +70,11 @@ def _sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vecto
 
 def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
     """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk."""
-    direction = sensor.direction
+    direction = sensor.direction()
     if sensor.error.cross:
-        direction = direction + sensor.error.cross * instruments.partner(sensor).direction
+        pairs = instruments.of(sensor.quantity)
+        partner = pairs[[s.name for s in pairs].index(sensor.name) ^ 1]
+        direction = direction + sensor.error.cross * partner.direction()
     return direction
 
 
@@ -116,8 +118,7 @@ def converter_step(sensor: Sensor, bits: int) -> float:
 def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:
     """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity."""
     kinds: list[ChannelNoise] = [getattr(noise, sensor.quantity) for sensor in sensors]
-    amounts = np.array([[k.white, k.flicker, k.mains, k.drift] for k in kinds]).T[..., None]
-    white, pink, mains, drift = amounts
+    white, pink, mains, drift = np.array([astuple(kind) for kind in kinds]).T[..., None]
     n = len(time)
     rate = (n - 1) / (time[-1] - time[0]) if n > 1 else 1.0
     rng = stream(seed, run, "noise")

@@ -18,10 +18,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigError
 
-StiffnessLaw = Callable[[OperatingPoint], Any]
-PositionLaw = Callable[[OperatingPoint], Any]
-TemperatureLaw = Callable[[OperatingPoint], Any]
-DeflectionLaw = Callable[[int, FloatArray], Any]
+PointLaw = Callable[[OperatingPoint], Any]
 
 FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
 
@@ -34,10 +31,10 @@ class VirtualRigError(RigError):
 class RigTruth:
     """The physics of one virtual test bearing."""
 
-    stiffness: StiffnessLaw = field(repr=False)
-    position: PositionLaw = field(repr=False)
-    temperature: TemperatureLaw = field(repr=False)
-    pivot_deflection: DeflectionLaw = field(repr=False)
+    stiffness: PointLaw = field(repr=False)
+    position: PointLaw = field(repr=False)
+    temperature: PointLaw = field(repr=False)
+    pivot_deflection: Callable[[int, FloatArray], Any] = field(repr=False)
     pivot_angles: tuple[float, ...] = FIVE_PADS
     clearance: tuple[float, ...] = (80e-6,) * 5
     bearing_name: str = "bearing.toml"
@@ -77,12 +74,8 @@ class RigTruth:
 
     def remembered(self) -> RigTruth:
         """Return the same truth, which asks each callable only once per point: for the length of one campaign."""
-        return replace(
-            self,
-            stiffness=cache(self.stiffness),
-            position=cache(self.position),
-            temperature=cache(self.temperature),
-        )
+        stiffness, position, temperature = cache(self.stiffness), cache(self.position), cache(self.temperature)
+        return replace(self, stiffness=stiffness, position=position, temperature=temperature)
 
     def h(self, point: OperatingPoint) -> ComplexArray:
         """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
@@ -100,6 +93,11 @@ class RigTruth:
     def temperatures(self, point: OperatingPoint) -> FloatArray:
         """Film temperatures at a point, (n_pads,) [degC], checked."""
         return _checked(self.temperature(point), (len(self.pivot_angles),), f"temperature({point})")
+
+    @property
+    def cold_temperatures(self) -> FloatArray:
+        """Of all pads at rest, (n_pads,) [degC]."""
+        return np.full(len(self.pivot_angles), self.cold_temperature)
 
     def deflection(self, pad: int, load: FloatArray) -> FloatArray:
         """Pivot deflection of `pad` (1 is pad #1) under `load` (n,) [N] -> (n,) [m], checked; 0 where it lifts off."""
