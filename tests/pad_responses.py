@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from model.bearing import Bearing, Pad
-from model.errors import ModelError
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
 from model.pad.operators import conduct
@@ -21,14 +20,9 @@ from rigdata.arrays import FloatArray
 class PadResponse(PadSolid):
     """Fields on the film grid have shape (n_theta, n_z); temperatures are rises above the oil supply [K]."""
 
-    @property
-    def symmetric(self) -> bool:
-        """Whether the film grid is one half of a symmetric film."""
-        return len(self._parts) == 1
-
     def bend(self, pressure: ArrayLike) -> FloatArray:
         """Deformation by film pressure, bilinear between film nodes."""
-        given = self._on_grid(pressure, "pressure")
+        given = self._on_grid(pressure)
         out = np.zeros(given.shape)
         for solid, to in self._parts:
             force = self.geometry.inner_radius * (to.theta.gather @ given @ to.z.gather.T)
@@ -38,21 +32,11 @@ class PadResponse(PadSolid):
 
     def expand(self, rise: ArrayLike) -> FloatArray:
         """Thermal deformation for a film temperature rise, conduction through the pad included."""
-        return self._thermal(self._on_grid(rise, "rise"), "expansion")
+        return self._thermal(self._on_grid(rise), "expansion")
 
     def heat_flow(self, rise: ArrayLike) -> FloatArray:
         """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K]."""
-        return self._thermal(self._on_grid(rise, "rise"), "flux")
-
-    @cached_property
-    def thermal(self) -> FloatArray:
-        """Deformation per film temperature rise, ``thermal @ rise.ravel()`` as `expand` [m/K], (n_film, n_film)."""
-        return self._thermal_matrix("expansion")
-
-    @cached_property
-    def heat_flux(self) -> FloatArray:
-        """Heat flux density into the pad per film temperature rise, as `heat_flow` [W/m^2/K], (n_film, n_film)."""
-        return self._thermal_matrix("flux")
+        return self._thermal(self._on_grid(rise), "flux")
 
     @cached_property
     def film_mass(self) -> FloatArray:
@@ -76,18 +60,14 @@ class PadResponse(PadSolid):
     def _conducted(self, rise: ArrayLike) -> tuple[SectorMesh, FloatArray]:
         """Mesh of the pad, and the temperature rise at its nodes under one that is even in z."""
         (_, to), *_ = self._parts
-        coarse = to.coarse_theta @ self._on_grid(rise, "rise") @ to.coarse_z.T
+        coarse = to.coarse_theta @ self._on_grid(rise) @ to.coarse_z.T
         mesh = sector_mesh(self.geometry, self.density)
         along, across = (Line(line.breaks, 1).tabulate(line.nodes) for line in (mesh.theta, mesh.z))
         face = np.asarray(along @ coarse @ across.T).reshape(-1, 1)
         return mesh, conduct(mesh, self.geometry.back_convection, face).temperature[..., 0]
 
-    def _on_grid(self, values: ArrayLike, name: str) -> FloatArray:
-        array = np.asarray(values, dtype=float)
-        shape = (self.film_theta.size, self.film_z.size)
-        if array.shape not in (shape, (self._n_film,)):
-            raise ModelError(f"{name} must have the film grid's shape {shape}, got {array.shape}.")
-        return array.reshape(shape)
+    def _on_grid(self, values: ArrayLike) -> FloatArray:
+        return np.asarray(values, dtype=float).reshape(self.film_theta.size, self.film_z.size)
 
     def _thermal(self, rise: FloatArray, name: str) -> FloatArray:
         out = np.zeros(rise.shape)
@@ -95,13 +75,6 @@ class PadResponse(PadSolid):
             coarse = to.coarse_theta @ rise @ to.coarse_z.T
             answer = (getattr(solid, name) @ coarse.ravel()).reshape(solid.theta.n_nodes, solid.z.n_nodes)
             out += to.theta.project @ answer @ to.z.project.T
-        return out
-
-    def _thermal_matrix(self, name: str) -> FloatArray:
-        out = np.zeros((self._n_film, self._n_film))
-        for solid, to in self._parts:
-            _, project, coarse = to.dense
-            out += project @ (getattr(solid, name) @ coarse)
         return out
 
 

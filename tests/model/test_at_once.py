@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import model.statics.solve
-from model.bearing_file import load_bearing
 from model.measured_pivot import MeasuredPivot
 from model.options import Options
 from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, formula_pivot
@@ -20,16 +19,6 @@ from model.statics.compiled.anderson import DEPTH, mixed
 from model.statics.compiled.laws import compliance, deflection, encoded
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
-
-
-@pytest.fixture(scope="module")
-def rocker():
-    return load_bearing("model/bearings/rocker.toml")
-
-
-@pytest.fixture(scope="module")
-def spherical():
-    return load_bearing("model/bearings/spherical.toml")
 
 
 def laws(bearing):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.errors import OptionError
 from model.film.reynolds import conductances, solve_film
@@ -24,11 +23,6 @@ DOWN, SPEED, ANGLE = -math.pi / 2, 2 * math.pi * 22, 6e-4
 FOLLOWING = Options(axial_tilt=True)
 
 
-@pytest.fixture(scope="module")
-def sphere(rocker_file) -> Bearing:
-    return load_bearing(rocker_file.with_name("spherical.toml"))
-
-
 def run(bearing: Bearing, *effects: Effect, slope: float = ANGLE, toward: float = DOWN, **said) -> Prediction:
     """The bearing with a shaft that tilts, its pads free to follow unless it says otherwise."""
     given = {"load": 5000.0, "load_direction": DOWN, "speed": SPEED, "thermal": "isothermal", "options": FOLLOWING}
@@ -38,35 +32,35 @@ def run(bearing: Bearing, *effects: Effect, slope: float = ANGLE, toward: float 
     return p
 
 
-def test_an_aligned_shaft_leaves_everything_as_it_is(sphere):
-    assert (run(sphere, slope=0.0).h == run(sphere, slope=0.0, options=Options()).h).all()
-    nearly, fixed = run(sphere, slope=1e-9), run(sphere, slope=1e-9, options=Options())
+def test_an_aligned_shaft_leaves_everything_as_it_is(spherical):
+    assert (run(spherical, slope=0.0).h == run(spherical, slope=0.0, options=Options()).h).all()
+    nearly, fixed = run(spherical, slope=1e-9), run(spherical, slope=1e-9, options=Options())
     np.testing.assert_allclose(nearly.h, fixed.h, rtol=1e-9, atol=1e-9 * abs(fixed.h).max())
     assert abs(nearly.axial_tilt).max() < 1e-8
 
 
-def test_a_pad_towards_which_the_shaft_tilts_lies_along_it(sphere):
-    p, aligned = run(sphere), run(sphere, slope=0.0, mesh=Mesh(80, 6))
+def test_a_pad_towards_which_the_shaft_tilts_lies_along_it(spherical):
+    p, aligned = run(spherical), run(spherical, slope=0.0, mesh=Mesh(80, 6))
     assert p.axial_tilt[0] == pytest.approx(ANGLE, rel=1e-5)
     film = p.film[0]
     np.testing.assert_allclose(film, film[:, ::-1], rtol=1e-4)
     np.testing.assert_allclose(film[:, 6:], aligned.film[0], rtol=3e-3)
 
 
-def test_it_takes_most_of_what_the_lean_does_and_all_of_it_in_first_order(sphere):
-    aligned = np.diag(run(sphere, slope=0.0).k)
+def test_it_takes_most_of_what_the_lean_does_and_all_of_it_in_first_order(spherical):
+    aligned = np.diag(run(spherical, slope=0.0).k)
     for toward in (DOWN, 0.4):
-        fixed = np.diag(run(sphere, toward=toward, options=Options()).k) - aligned
-        large, small = (np.diag(run(sphere, toward=toward, slope=a).k) - aligned for a in (ANGLE, 0.5 * ANGLE))
+        fixed = np.diag(run(spherical, toward=toward, options=Options()).k) - aligned
+        large, small = (np.diag(run(spherical, toward=toward, slope=a).k) - aligned for a in (ANGLE, 0.5 * ANGLE))
         assert abs(large).max() < 0.2 * abs(fixed).max()
         np.testing.assert_allclose(small, 0.25 * large, atol=0.05 * abs(large).max())
 
 
 @pytest.mark.parametrize("stiffness", [0.0, 2e4])
-def test_at_rest_it_is_the_slope_of_the_static_locus(sphere, stiffness):
+def test_at_rest_it_is_the_slope_of_the_static_locus(spherical, stiffness):
     held = [Effect("pivot_rotation", rotational_stiffness=stiffness)] if stiffness else []
     step, toward = 5.0, 0.4
-    middle = run(sphere, *held, toward=toward, excitation=1e-3)
+    middle = run(spherical, *held, toward=toward, excitation=1e-3)
     inverse = np.empty((2, 2))
     for axis in range(2):
         ends = []
@@ -75,30 +69,30 @@ def test_at_rest_it_is_the_slope_of_the_static_locus(sphere, stiffness):
             push[axis] += sign * step
             size, angle = math.hypot(*push), math.atan2(push[1], push[0])
             ends.append(
-                run(sphere, *held, toward=toward, load=size, load_direction=angle, mesh=Mesh()).bearing_position
+                run(spherical, *held, toward=toward, load=size, load_direction=angle, mesh=Mesh()).bearing_position
             )
         inverse[:, axis] = (ends[0] - ends[1]) / (2.0 * step)
     slope = np.linalg.inv(inverse)
     np.testing.assert_allclose(middle.k, slope, atol=1e-3 * abs(slope).max())
-    fixed = run(sphere, *held, toward=toward, excitation=1e-3, options=Options()).k
+    fixed = run(spherical, *held, toward=toward, excitation=1e-3, options=Options()).k
     assert abs(fixed - slope).max() > 5e-3 * abs(slope).max()
 
 
-def test_pivots_that_hold_leave_todays_answer(sphere):
-    held = run(sphere, toward=0.4).setup.change(rotational_stiffness=1e12)
+def test_pivots_that_hold_leave_todays_answer(spherical):
+    held = run(spherical, toward=0.4).setup.change(rotational_stiffness=1e12)
     stiff, fixed = (predict_setup(s, 5000.0, DOWN, SPEED, SPEED) for s in (held, held.change(options=Options())))
     assert stiff.converged
     assert fixed.converged
     np.testing.assert_allclose(stiff.h, fixed.h, rtol=1e-5, atol=1e-6 * abs(fixed.h).max())
     holds = {"pivot_rolling": {"factor": 1.0}, "pivot_friction": {"coefficient": 0.1}}
     holds["pivot_rotation"] = {"rotational_stiffness": 1e6}
-    tilts = [abs(run(sphere, Effect(name, **said)).axial_tilt[0]) for name, said in holds.items()]
+    tilts = [abs(run(spherical, Effect(name, **said)).axial_tilt[0]) for name, said in holds.items()]
     assert all(0.0 < a < 0.999 * ANGLE for a in tilts)
     assert tilts[2] < 0.5 * ANGLE
 
 
-def test_the_film_by_tilt_is_the_slope_of_its_forces_and_its_damping_is_symmetric(sphere):
-    p = run(sphere, toward=0.4)
+def test_the_film_by_tilt_is_the_slope_of_its_forces_and_its_damping_is_symmetric(spherical):
+    p = run(spherical, toward=0.4)
     film = p.equilibrium.films[0]
     grid, work, speed = film.grid, film.work, p.equilibrium.surface_speed
     wedge, shape = (film.pad.pad_clearance, *film.approach(p.bearing_position)), axial_shape(film.grid)
@@ -118,25 +112,25 @@ def test_the_film_by_tilt_is_the_slope_of_its_forces_and_its_damping_is_symmetri
 
 
 @pytest.mark.slow
-def test_it_hardly_hangs_on_the_mesh_and_goes_with_all_heat(sphere):
+def test_it_hardly_hangs_on_the_mesh_and_goes_with_all_heat(spherical):
     for said in ({}, {"thermal": "adiabatic"}, {"thermal": "tehd"}, {"thermal": "thd"}):
-        p, fine = (run(sphere, toward=0.4, mesh=m, **said) for m in (Mesh(24, 4), Mesh(48, 8)))
+        p, fine = (run(spherical, toward=0.4, mesh=m, **said) for m in (Mesh(24, 4), Mesh(48, 8)))
         np.testing.assert_allclose(p.axial_tilt, fine.axial_tilt, atol=0.02 * ANGLE)
         np.testing.assert_allclose(np.diag(p.k), np.diag(fine.k), rtol=0.01)
 
 
 @pytest.mark.slow
-def test_pads_that_lean_and_bend_with_the_motion_have_the_slope_of_their_locus(sphere):
+def test_pads_that_lean_and_bend_with_the_motion_have_the_slope_of_their_locus(spherical):
     both, step = Options(axial_tilt=True, perturbed_bending=True), 10.0
     bending = Effect("pad_bending", compliance_factor=1.0)
-    p = run(sphere, bending, options=both, excitation=1e-3)
-    ends = [run(sphere, bending, options=both, load=5000.0 + s * step).bearing_position[1] for s in (1, -1)]
+    p = run(spherical, bending, options=both, excitation=1e-3)
+    ends = [run(spherical, bending, options=both, load=5000.0 + s * step).bearing_position[1] for s in (1, -1)]
     assert p.k[1, 1] == pytest.approx(2.0 * step / (ends[1] - ends[0]), rel=2e-3)
 
 
-def test_it_is_for_pads_on_spheres_and_plain_films(sphere, rocker_file):
+def test_it_is_for_pads_on_spheres_and_plain_films(rocker):
     with pytest.raises(OptionError, match="spheres"):
-        predict(load_bearing(rocker_file), 5000.0, DOWN, SPEED, options=FOLLOWING)
+        predict(rocker, 5000.0, DOWN, SPEED, options=FOLLOWING)
     for options in ({"turbulence": "ng-pan"}, {"cavitation": "jfo"}, {"perturbed_heat": True}):
         with pytest.raises(OptionError, match="axial_tilt"):
             Options(axial_tilt=True, **options)

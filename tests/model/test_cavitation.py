@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance
 from model.effects import Effect
 from model.film.models import film_solver
@@ -20,16 +19,6 @@ from tests.fillings import fluid_fraction
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 EXCITATION = 2 * math.pi * np.array([10.0, 25.0, 50.0])
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
-
-
-@pytest.fixture(scope="module")
-def spherical(rocker_file) -> Bearing:
-    return load_bearing(rocker_file.with_name("spherical.toml"))
 
 
 def run(bearing: Bearing, load: float = 5000.0, direction: float = DOWN, **more: object) -> Prediction:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.predict import predict
@@ -20,11 +19,6 @@ from model.statics.compiled.iteration import SINGULAR
 from model.statics.conditions import overloaded_pads, unsupported
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def run(bearing: Bearing, load: float = 5000.0, direction: float = DOWN, **more: object) -> Prediction:

@@ -7,16 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing_file import load_bearing
 from model.pad.mesh import MeshDensity, PadGeometry
 from model.pad.operators import LARGEST, operators_at, pad_operators, pad_operators_between
 
 COARSE = MeshDensity(2, 1, 3, 1)
-
-
-@pytest.fixture(scope="module")
-def rocker():
-    return load_bearing("model/bearings/rocker.toml")
 
 
 @pytest.mark.parametrize("even", [True, False])

@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import quad
 
 from model.bearing import Bearing, Oil
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.errors import OptionError
 from model.film.cross_energy import cross_operator
@@ -30,11 +29,6 @@ from model.statics.pad_film import oil_constants
 DOWN, SPEED = -math.pi / 2, 2 * math.pi * 22
 OIL = Oil(0.04, 0.034, 860.0, 0.0, 2000.0, 0.13, 40.0)
 SURFACE = 7.0
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def run(bearing: Bearing, thermal: str = "thd", mesh: Mesh | None = None, options: Options | None = None) -> Prediction:

@@ -8,9 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing
-from model.bearing_file import load_bearing
-from model.dynamics.reduction import bearing_impedance, mass_centre_offset, pad_matrices, reduce_pads
+from model.dynamics.reduction import mass_centre_offset, pad_matrices, reduce_pads
 from model.effects import Effect
 from model.options import Options
 from model.pivots import pivot_laws
@@ -20,11 +18,6 @@ from model.setup import Setup
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def dense(p: Prediction, omega: float) -> np.ndarray:
@@ -107,16 +100,6 @@ def test_frequency_zero_and_infinity(rocker):
     p = predict(heavy, 5000.0, DOWN, SPEED, 100.0)
     film = sum(m.stiffness[:2, :2] + 100j * m.damping[:2, :2] for m in p.pad_matrices)
     np.testing.assert_allclose(p.h, film, atol=1e-3 * np.abs(film).max())
-
-
-def test_added_mass_and_series_spring(rocker):
-    base = predict(rocker, 5000.0, DOWN, SPEED, 300.0)
-    setup: Setup = base.setup
-    omega = np.array([300.0])
-    heavy = bearing_impedance(setup.change(added_mass=20.0), base.equilibrium, omega)[0]
-    np.testing.assert_allclose(heavy, base.h - 300.0**2 * 20.0 * np.eye(2), atol=1e-6)
-    soft = bearing_impedance(setup.change(series_compliance=(1e-9, 0.0, 1e-9)), base.equilibrium, omega)[0]
-    np.testing.assert_allclose(np.linalg.inv(soft), np.linalg.inv(base.h) + 1e-9 * np.eye(2), rtol=1e-9, atol=1e-18)
 
 
 def test_one_static_solution_serves_all_frequencies(rocker):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import (
     Effect,
     EffectError,
@@ -22,6 +21,7 @@ from model.effects import (
     load_effects,
     register,
 )
+from model.effects.user_library import load_library
 from model.measured_pivot import MeasuredPivot
 from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
@@ -38,11 +38,6 @@ NAMES = {
     "viscosity_law", "heat_loss", "pad_conduction", "pivot_rolling", "pivot_friction",
 }  # fmt: skip
 HOUSING_MASS, CELLS = 30.0, np.array([4.0e8, 6.0e8])
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 @pytest.fixture(scope="module")
@@ -172,6 +167,22 @@ def test_housing_flexibility_is_a_spring_in_series(rocker, base):
     np.testing.assert_allclose(np.linalg.inv(p.h), np.linalg.inv(base.h) + np.eye(2) / 2e9, rtol=1e-9, atol=1e-18)
     np.testing.assert_allclose(p.position - base.position, [0.0, -LOAD / 2e9], atol=1e-14)
     np.testing.assert_allclose(p.bearing_position, base.position, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_parallel_terms_add_to_what_the_records_show(rocker, base):
+    stiff = Effect("parallel_stiffness", xx=1e6, xy=2e6, yx=-2e6, yy=0.0)
+    damping = Effect("parallel_damping", xx=0.0, xy=0.0, yx=0.0, yy=1e3)
+    added = run(rocker, stiff, damping).h - base.h
+    assert np.allclose(added, [[1e6, 2e6], [-2e6, 1j * OMEGA * 1e3]], atol=1.0)
+
+
+@pytest.mark.slow
+def test_a_series_compliance_alike_in_all_directions_is_the_flexible_housing(rocker):
+    series = run(rocker, Effect("series_compliance", xx=1e-9, xy=0.0, yy=1e-9))
+    housing = run(rocker, Effect("housing_flexibility", stiffness=1e9))
+    assert np.allclose(series.h, housing.h)
+    assert np.allclose(series.position, housing.position)
 
 
 def test_fluid_inertia(rocker, base):
@@ -350,12 +361,14 @@ def test_file(tmp_path):
     path = tmp_path / "updated.effects.toml"
     path.write_text(
         '[[effects]]\nname = "soft_pivot"\npad = 5\nstiffness_factor = 0.3\n[effects.interval]\nlo = 0.2\n'
-        '[[effects]]\nname = "pad_offset"\npad = 1\nradial_offset = "5 um"\n',
+        '[[effects]]\nname = "pad_offset"\npad = 1\nradial_offset = "5 um"\n'
+        '[[effects]]\nname = "series_compliance"\nxx = 1e-9\nxy = "2e-10 m/N"\nyy = 0.0\n',
         encoding="utf-8",
     )
-    first, second = load_effects(path)
+    first, second, third = load_effects(path)
     assert first == Effect("soft_pivot", pad=5, stiffness_factor=0.3)
     assert second.parameters["radial_offset"] == pytest.approx(5e-6)
+    assert third.parameters["xy"] == pytest.approx(2e-10)
 
 
 @pytest.mark.parametrize(
@@ -375,3 +388,29 @@ def test_broken_file(tmp_path, text, message):
         load_effects(path)
     with pytest.raises(EffectError, match="no such file"):
         load_effects(tmp_path / "none.toml")
+
+
+OWN = """
+from model.effects import EffectKind, Parameter
+KIND = EffectKind("{name}", "bearing", (Parameter("share", "1", "ratio", 0.0, 0.0, 1.0, 0.1),),
+                  lambda setup, share: setup, "made up")
+"""
+
+
+def test_effects_of_ones_own_are_registered_from_a_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("model.effects.registry._registered", {})  # other tests know the bundled ones only
+    path = tmp_path / "own.py"
+    path.write_text(OWN.format(name="of_ones_own"))
+    assert [k.name for k in load_library(path)] == ["of_ones_own"]
+    assert Effect("of_ones_own", share=0.5).parameters["share"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("x = 1", "defines no effect"), ("1 / 0", "ZeroDivisionError"), (OWN.format(name="starvation"), "bundled")],
+)
+def test_files_that_bring_no_effect_are_refused(tmp_path, text, message):
+    path = tmp_path / "own.py"
+    path.write_text(text)
+    with pytest.raises(EffectError, match=message):
+        load_library(path)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.pivots import ConstantPivot
 from model.predict import predict
 from model.prediction import Prediction
@@ -18,11 +17,6 @@ from tests.rigs import random_bearings
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def assert_equilibrium(p: Prediction) -> None:

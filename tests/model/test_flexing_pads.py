@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.dynamics.reduction import flexing_impedance
 from model.effects import Effect
 from model.errors import OptionError
@@ -22,11 +21,6 @@ DOWN, SPEED = -math.pi / 2, 2 * math.pi * 22
 FLEXING = Options(perturbed_bending=True)
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def run(

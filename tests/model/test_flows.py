@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.film.mesh import film_grid
 from model.film.resting import resting_film
@@ -19,11 +17,6 @@ from model.setup import Mesh
 from model.statics.pad_flow import side_flow, striation, through_flow
 
 SPEED, LOAD, DOWN = 2 * math.pi * 22.0, 5000.0, -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def test_what_enters_a_full_film_leaves_it(rocker):

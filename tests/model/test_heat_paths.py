@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.film.energy import dissipation, solve_energy
 from model.film.oil_state import Running
@@ -18,14 +17,8 @@ from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
 from model.statics.heat_paths import minimal_residual
-from model.statics.pad_flow import outlet_temperature, through_flow
 
 SPEED = 2 * math.pi * 22
-
-
-@pytest.fixture(scope="module")
-def rocker() -> Bearing:
-    return load_bearing("model/bearings/rocker.toml")
 
 
 def run(bearing: Bearing, options: Options | None = None, **more: object) -> Prediction:
@@ -87,16 +80,6 @@ def test_conduction_cools_and_a_pad_that_conducts_more_cools_more(rocker):
         pads = tuple(replace(p, back_convection=convection) for p in rocker.pads)
         hot.append(run(rocker.with_pads(pads), Options(conduction=True), thermal="tehd").max_temperature)
     assert hot[0] > hot[1] > hot[2]
-
-
-def test_carried_over_oil_goes_round(rocker):
-    share = 0.6
-    p = run(rocker, effects=[Effect("hot_oil_carryover", fraction=share)])
-    order = sorted(p.equilibrium.films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
-    for before, film in zip([order[-1], *order[:-1]], order, strict=True):
-        mixed = min(1.0, share * through_flow(before)[1] / through_flow(film)[0])
-        assert film.inlet == pytest.approx(40.0 + mixed * (outlet_temperature(before) - 40.0), abs=1e-3)
-    assert p.equilibrium.iterations < 20
 
 
 @pytest.mark.slow

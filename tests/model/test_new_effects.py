@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance, describing, friction_impedance
 from model.effects import Effect, EffectError, apply_effects, known_effects
 from model.measured_pivot import MeasuredPivot
@@ -24,16 +23,6 @@ from tests.rigs.random_bearings import draw
 from tests.studies.random_bearings import fault, rolling
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
-
-
-@pytest.fixture(scope="module")
-def spherical(rocker_file) -> Bearing:
-    return load_bearing(rocker_file.with_name("spherical.toml"))
 
 
 def run(bearing: Bearing, *effects: Effect, thermal: str = "adiabatic", load: float = LOAD) -> Prediction:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from model.bearing import Bearing, BearingError, Pivot
-from model.bearing_file import load_bearing
+from model.bearing import BearingError, Pivot
 from model.measured_pivot import MeasuredPivot
 from model.pivots import (
     ConstantPivot,
@@ -25,11 +24,6 @@ E, NU = 206e9, 0.3
 ROCKER = Pivot("rocker", E, NU, contact_length=39.6e-3, housing_diameter=132.0e-3, pivot_diameter=119.6e-3)
 SPHERE = Pivot("spherical", E, NU, sphere_diameter=0.4)
 LOADS = [50.0, 500.0, 2000.0, 4375.0, 8750.0]
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def printed_rocker(w: float) -> float:

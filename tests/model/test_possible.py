@@ -14,11 +14,6 @@ from model.possible import BOUNDS, check_possible
 from model.predict import predict
 
 
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
-
-
 def with_number(bearing: Bearing, part: type, name: str, value: float) -> Bearing:
     if part is Bearing:
         return replace(bearing, **{name: value})

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
@@ -16,11 +15,6 @@ from model.setup import Mesh, Setup
 from model.static_tests import sweep
 
 SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def run(bearing: Bearing, mesh: tuple[int, int] | None = None, thermal: str = "adiabatic") -> Prediction:
@@ -116,24 +110,8 @@ def test_power_loss_grows_with_speed(rocker):
     assert 50.0 < losses[1] < 2000.0
 
 
-def test_a_sweep_carries_on_and_ends_where_single_points_do(rocker_file):
-    setup = Setup(load_bearing(rocker_file), pivot_laws("kirk", load_bearing(rocker_file)), "adiabatic")
-    speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
-    loads = [2500.0, 3750.0, 5000.0, 6250.0, 7500.0]
-    down = -math.pi / 2
-    swept = sweep(setup, [(w, down, speed, line) for w in loads])
-    alone = [predict_setup(setup, w, down, speed, line) for w in loads]
-    for one, other in zip(swept, alone, strict=True):
-        np.testing.assert_allclose(one.h, other.h, rtol=2e-5)
-    # a cold start knows by itself what a neighbour some kN away could tell; a near one tells more
-    near = [(5000.0 + 50.0 * k, down, speed, line) for k in range(5)]
-    carried, cold = sweep(setup, near), [predict_setup(setup, *one) for one in near]
-    assert sum(p.equilibrium.iterations for p in carried) < sum(p.equilibrium.iterations for p in cold)
-
-
-def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker_file):
-    bearing = load_bearing(rocker_file)
-    setup = Setup(bearing, pivot_laws(5e8, bearing), "isothermal")
+def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker):
+    setup = Setup(rocker, pivot_laws(5e8, rocker), "isothermal")
     speed, line = 2 * math.pi * 22, np.array([2 * math.pi * 25])
     loads = [float(w) for w in np.arange(6000.0, 10001.0, 500.0)]
     swept = sweep(setup, [(w, -math.pi / 2, speed, line) for w in loads])
@@ -144,8 +122,8 @@ def test_a_sweep_over_a_change_of_regime_finds_what_single_points_find(rocker_fi
         np.testing.assert_allclose(p.h, single.h, rtol=1e-4)
 
 
-def test_a_prediction_prints_in_the_units_of_its_readers(rocker_file):
-    found = predict(load_bearing(rocker_file), load=5000.0, speed=138.0, excitation=np.array([100.0, 157.0]))
+def test_a_prediction_prints_in_the_units_of_its_readers(rocker):
+    found = predict(rocker, load=5000.0, speed=138.0, excitation=np.array([100.0, 157.0]))
     assert len(repr(found)) < 300
     assert repr(found).startswith("<Prediction 5000 N at -90 deg, 21.96 Hz: shaft at")
     assert f"kxx {found.kxx[0] / 1e6:.4g}, kyy {found.kyy[0] / 1e6:.4g} MN/m" in found.summary()

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.predict import predict_setup
@@ -22,11 +21,6 @@ from model.static_tests import (
 
 SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, np.array([2 * math.pi * 25.0]), -math.pi / 2
 LOADS = np.linspace(2500.0, 8750.0, 6)
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def setup(bearing: Bearing, *effects: Effect, pivots: object = "kirk") -> Setup:

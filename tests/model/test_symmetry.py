@@ -8,19 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.predict import predict
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 EXCITATION = 2 * math.pi * np.array([10.0, 25.0, 50.0])
 MIRRORED_PADS = [0, 4, 3, 2, 1]
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 @pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])

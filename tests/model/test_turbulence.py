@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from model.bearing import Bearing
-from model.bearing_file import load_bearing
 from model.dynamics.reduction import bearing_impedance
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
@@ -24,11 +23,6 @@ from model.setup import Mesh, Setup
 
 DOWN, FAST = -math.pi / 2, 2 * math.pi * 150.0
 TURBULENT = Options(turbulence="ng-pan")
-
-
-@pytest.fixture(scope="module")
-def rocker(rocker_file) -> Bearing:
-    return load_bearing(rocker_file)
 
 
 def thin(bearing: Bearing, share: float = 0.02) -> Bearing:
