@@ -123,8 +123,8 @@ def test_nan_and_infinities_are_missing_values_not_numbers(tmp_path):
     assert np.flatnonzero(np.isfinite(values)).tolist() == [0, 6]
 
 
-@pytest.mark.parametrize("gain", ["0 mV/um", "-7.78 mV/um", "nan mV/um", "inf mV/um", "1e999 mV/um", "1e-400 mV/um"])
-def test_zero_negative_and_endless_sensitivities_are_named(gain):
+@pytest.mark.parametrize("gain", ["nan mV/um", "inf mV/um", "1e999 mV/um", "1e-400 mV/um"])
+def test_endless_and_vanishing_sensitivities_are_named(gain):
     with pytest.raises(RigDataError, match="sensitivity"):
         parse_manifest(HEAD + channel(gain=gain) + RUN)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import html.parser
 import re
 from pathlib import Path
 
@@ -12,9 +11,11 @@ import matplotlib
 import pytest
 
 import tpjb_ident.report
+from tests.report.tags import Page
+from tpjb_ident.report import page as report_page
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.figure import panel, save_panels, svg_text
-from tpjb_ident.report.page import Page, Section, Table, render_page, render_section
+from tpjb_ident.report.page import Section, Table, render_page, render_section
 
 HOSTILE = "<script>alert(1)</script>\"'& <img src=x onerror=alert(2)> $\\frac{a}{b}$ \x1b[31m\u202e"
 
@@ -28,7 +29,7 @@ def page_and_svg(tmp_path_factory):
     other, axes = new_picture("x", "y")
     axes.plot([0, 1], [1, 0], marker="s")
     panels = [panel("one", f"first {HOSTILE}", figure, "g"), panel("two", "second", other, "g")]
-    page = Page(
+    page = report_page.Page(
         title=HOSTILE,
         subtitle=HOSTILE,
         answer=HOSTILE,
@@ -44,32 +45,8 @@ def page_and_svg(tmp_path_factory):
     return render_page(page, texts), texts, folder
 
 
-class Tags(html.parser.HTMLParser):
-    """Every start tag with its attributes, in order; open elements checked against end tags."""
-
-    VOID = frozenset({"meta", "br", "img", "link", "input", "hr"})
-
-    def __init__(self):
-        super().__init__()
-        self.seen, self.open = [], []
-
-    def handle_starttag(self, tag, attrs):
-        self.seen.append((tag, dict(attrs)))
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.seen.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-
 def parsed(text):
-    tags = Tags()
-    tags.feed(text)
-    assert tags.open == []
-    return tags.seen
+    return Page(text).tags
 
 
 def test_nothing_from_outside_becomes_markup(page_and_svg):

@@ -171,7 +171,8 @@ def test_a_plot_is_a_function_by_the_name_of_its_file():
     assert ti.plots is plots
     files = {path.stem for path in Path(plots.__file__).parent.glob("*.py")} - {"__init__"}
     assert files == set(plots.__all__)
-    assert all(getattr(plots, name).__module__ == f"{plots.__name__}.{name}" for name in files)
+    for name in files:
+        assert (getattr(plots, name).__module__, getattr(plots, name).__name__) == (f"{plots.__name__}.{name}", name)
 
 
 def test_extrapolation_is_drawn_apart():
@@ -259,8 +260,3 @@ def test_colours_are_told_apart_by_the_colour_blind():
     seen = np.clip(linear @ matrix.T, 0.0, 1.0) ** (1 / 2.4)
     apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(5, 1)]
     assert apart.min() > 0.1
-
-
-@pytest.mark.parametrize("name", plots.__all__)
-def test_a_picture_s_name_means_its_function(name):
-    assert getattr(plots, name).__name__ == name

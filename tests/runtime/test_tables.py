@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic, write_table
+from tpjb_ident.runtime.tables import printable, write_atomic, write_table
 
 
 def test_csv_and_parquet_hold_the_same_numbers_to_the_last_bit(tmp_path):
@@ -16,19 +16,6 @@ def test_csv_and_parquet_hold_the_same_numbers_to_the_last_bit(tmp_path):
     pd.testing.assert_frame_equal(pd.read_csv(csv), frame, check_exact=True, check_dtype=False)
     pd.testing.assert_frame_equal(pd.read_parquet(parquet), frame, check_exact=True, check_dtype=False)
     assert b"\r" not in csv.read_bytes()
-
-
-@pytest.mark.parametrize("text", ['=HYPERLINK("x")', "+1", "-cmd", "@SUM(A1)", "\t=1", "\r=1"])
-def test_formulas_are_disarmed(text):
-    safe = safe_for_spreadsheets(pd.DataFrame({text: [text, "plain", None]}))
-    assert safe.columns[0] == "'" + text.replace("\r", " ")
-    assert safe.iloc[0, 0] == "'" + text.replace("\r", " ")
-    assert safe.iloc[1, 0] == "plain"
-
-
-def test_negative_numbers_stay_numbers():
-    safe = safe_for_spreadsheets(pd.DataFrame({"kxy": [-1.5, 2.0]}))
-    assert safe["kxy"].tolist() == [-1.5, 2.0]
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
