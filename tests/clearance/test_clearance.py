@@ -14,13 +14,10 @@ from rigdata.virtual_rig import (
     ClearanceSweep,
     DryTest,
     Fault,
-    Instruments,
     Noise,
     RigPlan,
-    RigTruth,
-    VirtualRig,
-    write_campaign,
 )
+from tests.clearance.cases import ANGLES, CLEARANCE, OtherRun, bearing_centre, rig, sphere
 from tpjb_ident.clearance.measure import (
     clearance_change,
     coldest_run,
@@ -32,63 +29,38 @@ from tpjb_ident.clearance.measure import (
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots
 
-ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
-CLEARANCE = np.array([80.0, 80.0, 86.0, 80.0, 80.0]) * 1e-6
+WHOLE = rig(
+    RigPlan(dry=tuple(DryTest(p) for p in range(1, 6)), clearance=(ClearanceSweep(), ClearanceSweep(push=800.0)))
+)
 
 
-def sphere(pad, load):
-    return 6e-8 * np.asarray(load, dtype=float) ** (2 / 3)
-
-
-def made(path, **kwargs):
-    """Write the campaign first, open it then."""
-    truth = RigTruth.constant(
-        np.diag([2e8, 4e8]),
-        np.diag([4e5, 6e5]),
-        pivot_deflection=sphere,
-        clearance=kwargs.pop("clearance", tuple(CLEARANCE)),
-    )
-    rig = VirtualRig(
-        truth,
-        kwargs.pop("plan", RigPlan(clearance=(ClearanceSweep(),))),
-        instruments=Instruments.like_paper(seed=4),
-        noise=kwargs.pop("noise", Noise.like_samples()),
-        seed=4,
-        **kwargs,
-    )
-    truth_written = write_campaign(path, rig)
-    return load_campaign(path), truth_written
+@pytest.fixture(scope="session")
+def opened(campaign_of):
+    """Gives the campaign of a rig."""
+    return lambda rig: load_campaign(campaign_of(rig))
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """Campaign with dry tests and two sweeps, its truth, its curves."""
-    plan = RigPlan(dry=tuple(DryTest(p) for p in range(1, 6)), clearance=(ClearanceSweep(), ClearanceSweep(push=800.0)))
-    source, truth = made(tmp_path_factory.mktemp("clearance") / "c.h5", plan=plan)
-    return source, truth, fit_pivots(source, ANGLES)
+def whole(opened):
+    """Campaign with dry tests and two sweeps, and its curves."""
+    source = opened(WHOLE)
+    return source, fit_pivots(source, ANGLES)
 
 
 @pytest.fixture(scope="module")
 def measured(whole):
     """Both sweeps, the lighter push first."""
-    source, _, curves = whole
+    source, curves = whole
     return tuple(measure_run(run, ANGLES, curves) for run in source.of_kind("clearance"))
 
 
-def bearing_centre(truth):
-    """Reading of the bearing centre (2,) [m] from the gap voltages."""
-    gaps = np.array([truth.gap_voltage_V["X1A"], truth.gap_voltage_V["X1B"]])
-    axes = np.radians([45.0, 135.0])
-    return np.linalg.solve(np.column_stack([np.cos(axes), np.sin(axes)]), -gaps / 7780.0)
-
-
 def test_clearance_and_centre_with_one_pad_off(whole):
-    source, truth, curves = whole
+    source, curves = whole
     found = measure_clearance(source, ANGLES, curves)
     assert found.push_load == pytest.approx(200.0, rel=0.02)
     assert found.clearance == pytest.approx(CLEARANCE, abs=0.3e-6)
     assert found.clearance_pushed == pytest.approx(CLEARANCE + sphere(1, 200.0), abs=0.3e-6)
-    assert np.all(np.abs(found.centre - bearing_centre(truth)) < 4 * np.sqrt(np.diag(found.centre_covariance)))
+    assert np.all(np.abs(found.centre - bearing_centre(WHOLE)) < 4 * np.sqrt(np.diag(found.centre_covariance)))
     assert any(s.startswith("irregular: pad #3 +") for s in sentences(found.status))
     assert found.fitted_angle == pytest.approx(ANGLES, abs=2e-3)
     assert found.pivot_scale == pytest.approx(1.0, abs=0.08)
@@ -108,11 +80,10 @@ def test_two_push_loads_give_the_radial_stiffness(measured):
         radial_stiffness(light, light)
 
 
-def test_a_bearing_that_grew_shows_it_on_every_pad(whole, measured, tmp_path):
-    _, _, curves = whole
-    hot, _ = made(tmp_path / "hot.h5", clearance=tuple(CLEARANCE + 6e-6))
+def test_a_bearing_that_grew_shows_it_on_every_pad(whole, measured, opened):
+    _, curves = whole
     cold, _ = measured
-    hot = measure_clearance(hot, ANGLES, curves)
+    hot = measure_clearance(opened(rig(clearance=CLEARANCE + 6e-6)), ANGLES, curves)
     change, change_se = clearance_change(cold, hot)
     assert np.mean(change) == pytest.approx(6e-6, abs=0.15e-6)
     assert change == pytest.approx(6e-6, abs=0.3e-6)
@@ -123,7 +94,7 @@ def test_a_bearing_that_grew_shows_it_on_every_pad(whole, measured, tmp_path):
 
 
 def test_sweeps_side_by_side(whole, measured):
-    source, _, _ = whole
+    source, _ = whole
     light, heavy = measured
     assert coldest_run(source.of_kind("clearance")).id == light.run
     hot = replace(heavy, run="hot", temperature=light.temperature + 20.0, clearance=light.clearance + 5e-6)
@@ -139,18 +110,16 @@ def test_sweeps_side_by_side(whole, measured):
 
 
 def test_the_cold_sweep_counts_however_small_the_hot_ones_push(whole):
-    source, _, _ = whole
+    source, _ = whole
     light, heavy = source.of_kind("clearance")
 
-    class Warm:
-        id, point, channels = "warm", light.point, light.channels
+    def warmer(name):
+        record = light.record(name)
+        return replace(record, values=record.values + 20.0)
 
-        def record(self, name):
-            record = light.record(name)
-            return replace(record, values=record.values + 20.0)
-
-    assert coldest_run([Warm(), heavy]).id == heavy.id
-    assert coldest_run([Warm()]).id == "warm"
+    warm = OtherRun(light, id="warm", record=warmer)
+    assert coldest_run([warm, heavy]).id == heavy.id
+    assert coldest_run([warm]).id == "warm"
 
 
 def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(measured):
@@ -160,42 +129,34 @@ def test_the_push_below_the_dry_tests_is_marked_as_extrapolated(measured):
 
 def test_a_turning_shafts_runout_averages_out(whole):
     """The sweep of a turning shaft: 1.1 um of runout on top, found again as on the shaft at rest."""
-    source, _, curves = whole
+    source, curves = whole
     run = source.of_kind("clearance")[0]
     speed = 2 * np.pi * 22.0
 
-    class Turning:
-        id, file, kind, channels, sample_rate = "turning", run.file, "clearance", run.channels, run.sample_rate
-        point = OperatingPoint(run.point.static_load, run.point.static_load_direction, speed)
+    def runout(time):
+        turn = 1.0009 * speed * time  # the set point is missed by as much as on the samples
+        return 1.1e-6 * np.column_stack([np.cos(turn), np.sin(turn)])
 
-        def record(self, name):
-            return run.record(name)
-
-        def vector(self, quantity):
-            record = run.vector(quantity)
-            if quantity == "displacement":
-                turn = 1.0009 * speed * record.time  # the set point is missed by as much as on the samples
-                record.values[:] += 1.1e-6 * np.column_stack([np.cos(turn), np.sin(turn)])
-            return record
-
-    still, turning = (measure_run(r, ANGLES, curves) for r in (run, Turning()))
+    point = OperatingPoint(run.point.static_load, run.point.static_load_direction, speed)
+    spun = OtherRun(run, runout, id="turning", point=point)
+    still, turning = (measure_run(r, ANGLES, curves) for r in (run, spun))
     assert turning.clearance == pytest.approx(still.clearance, abs=0.1e-6)
     assert np.all(turning.clearance_se < 2 * still.clearance_se + 1e-8)
 
 
 def test_without_curves_zero_load_is_extrapolated(whole):
-    source, _, _ = whole
+    source, _ = whole
     found = measure_clearance(source, ANGLES)
     assert np.all(np.abs(found.clearance - CLEARANCE) < 4 * found.clearance_se)
     assert found.clearance == pytest.approx(CLEARANCE, abs=0.6e-6)
     assert "give-from-sweep" in found.status
 
 
-def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(tmp_path):
-    source, truth = made(tmp_path / "c.h5", noise=Noise.none(), clearance=(80e-6,) * 5)
-    found = measure_clearance(source, ANGLES)
+def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):
+    clean = rig(noise=Noise.none(), clearance=(80e-6,) * 5)
+    found = measure_clearance(opened(clean), ANGLES)
     assert found.clearance == pytest.approx(80e-6, abs=0.2e-6)
-    assert found.centre == pytest.approx(bearing_centre(truth), abs=0.05e-6)
+    assert found.centre == pytest.approx(bearing_centre(clean), abs=0.05e-6)
 
 
 FAULTS = {
@@ -208,13 +169,13 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_sweep_that_is_none_is_refused(tmp_path, name):
-    source, _ = made(tmp_path / "c.h5", faults=(FAULTS[name],))
+def test_a_sweep_that_is_none_is_refused(opened, name):
+    source = opened(rig(faults=(FAULTS[name],)))
     with pytest.raises(RigDataError, match=r"clearance run|stuck, clipped or dead"):
         measure_clearance(source, ANGLES)
 
 
-def test_no_sweep_is_an_error(tmp_path):
-    source, _ = made(tmp_path / "c.h5", plan=RigPlan(dry=(DryTest(1),)))
+def test_no_sweep_is_an_error(opened):
+    source = opened(rig(RigPlan(dry=(DryTest(1),))))
     with pytest.raises(RigDataError, match="no run of kind clearance"):
         measure_clearance(source, ANGLES)

@@ -6,39 +6,31 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
 from rigdata.virtual_rig import (
-    ClearanceSweep,
     Fault,
     Instruments,
-    Noise,
     RigPlan,
     RigTruth,
-    VirtualRig,
     locus_points,
-    write_campaign,
 )
+from tests.clearance.cases import ANGLES, SWEEP, OtherRun, rig
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 
-ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 K = np.diag([1.2e8, 1.0e8])
-SWEEP = (ClearanceSweep(),)
 
 
-def made(path, locus, faults=(), noise=None, k=K, clearance=SWEEP):
-    truth = RigTruth.constant(k, np.diag([4e5, 6e5]), pivot_stiffness=6e8)
-    rig = VirtualRig(
-        truth,
-        RigPlan(locus=locus, clearance=clearance),
-        instruments=Instruments.like_paper(seed=2),
-        noise=noise or Noise.like_samples(),
-        faults=faults,
-        seed=9,
-    )
-    write_campaign(path, rig)
-    return load_campaign(path)
+@pytest.fixture(scope="module")
+def opened(campaign_of):
+    """Gives the campaign with these points of a locus and, unless told otherwise, a clearance sweep."""
+
+    def make(locus, k=K, clearance=SWEEP.clearance, **changes):
+        truth = RigTruth.constant(k, np.diag([4e5, 6e5]), pivot_stiffness=6e8)
+        plan, instruments = RigPlan(locus=locus, clearance=clearance), Instruments.like_paper(seed=2)
+        return load_campaign(campaign_of(rig(plan, truth=truth, instruments=instruments, seed=9, **changes)))
+
+    return make
 
 
 def true_position(direction, load=5000.0, k=K):
@@ -46,8 +38,8 @@ def true_position(direction, load=5000.0, k=K):
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    return made(tmp_path_factory.mktemp("locus") / "c.h5", locus_points(6))
+def campaign(opened):
+    return opened(locus_points(6))
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +72,7 @@ def test_positions_from_the_bearing_centre(campaign, polygon):
 def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):
     assert raw.centre.tolist() == [0.0, 0.0]
     assert "no-centre" in raw.status
+    assert raw.points[0].point == campaign.of_kind("locus")[0].point
     both = measure_locus(campaign, polygon)
     shift = raw.points[2].position - both.points[2].position
     assert shift == pytest.approx(both.centre)
@@ -88,12 +81,13 @@ def test_without_a_polygon_positions_are_raw_and_say_so(campaign, polygon, raw):
 def test_a_repeated_direction_shows_the_drift(campaign):
     # the last run done again as the first one, with the shaft found 4 um further on: a campaign of seven runs
     runs = campaign.of_kind("locus")
+    again = OtherRun(runs[0], lambda time: [4e-6, -2e-6], id="again")
 
     class Repeated:
         channels = campaign.channels
 
         def of_kind(self, kind):
-            return (*runs, moved(runs[0])) if kind == "locus" else ()
+            return (*runs, again) if kind == "locus" else ()
 
     found = measure_locus(Repeated())
     assert found.drift * 6 == pytest.approx([4e-6, -2e-6], abs=0.3e-6)
@@ -104,45 +98,22 @@ def test_a_repeated_direction_shows_the_drift(campaign):
     assert se["again"] > 1.2 * se[runs[0].id]
 
 
-def moved(run):
-    class Moved:
-        id, file, kind, point, channels = "again", run.file, "locus", run.point, run.channels
-        sample_rate = run.sample_rate
-
-        def record(self, name):
-            return run.record(name)
-
-        def vector(self, quantity):
-            record = run.vector(quantity)
-            if quantity == "displacement":
-                record.values[:] += [4e-6, -2e-6]
-            return record
-
-    return Moved()
-
-
-def test_loads_off_their_set_point_are_named(tmp_path):
+def test_loads_off_their_set_point_are_named(opened):
     heavier = Fault("wrong_load", run="l-*-02", value=1.2)
-    source = made(tmp_path / "c.h5", locus_points(4), faults=(heavier,), clearance=())
+    source = opened(locus_points(4), faults=(heavier,), clearance=())
     found = measure_locus(source)
     status = next(s.detail for s in found.status if s == "load-off-set-point")
     assert "-02" in status
     assert "-01" not in status
 
 
-def test_a_position_behind_the_wall_is_named(tmp_path):
-    source = made(tmp_path / "c.h5", locus_points(4), k=0.2 * K)
+def test_a_position_behind_the_wall_is_named(opened):
+    source = opened(locus_points(4), k=0.2 * K)
     found = measure_locus(source, measure_clearance(source, ANGLES))
     assert "outside-polygon" in found.status
 
 
-def test_no_locus_is_an_error(tmp_path):
-    source = made(tmp_path / "c.h5", ())
+def test_no_locus_is_an_error(opened):
+    source = opened(())
     with pytest.raises(RigDataError, match="no runs of kind locus"):
         measure_locus(source)
-
-
-def test_operating_points_survive(raw):
-    point = raw.points[0].point
-    assert isinstance(point, OperatingPoint)
-    assert point.static_load == 5000.0

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigdata.vector import directions
+from tests.clearance.cases import ANGLES
 from tpjb_ident.clearance.polygon import corners, find_centre
 
-ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 SMALL = np.eye(5) * (1e-8) ** 2
 MICRO = st.floats(-50e-6, 50e-6)
 
