@@ -35,6 +35,20 @@ def table(points):
 
 
 SERIES = [(5000.0, 25.0), (5000.0, 10.0), (5000.0, 40.0), (2500.0, 25.0)]
+SIX = [(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)]
+
+
+@pytest.fixture
+def points():
+    return static_points(table(SERIES)).points
+
+
+@pytest.fixture(params=sorted(FORMATS))
+def to(request):
+    """Every format whose library is there."""
+    if request.param == "excel":
+        pytest.importorskip("openpyxl")
+    return request.param
 
 
 def test_points_are_grouped_and_sorted():
@@ -54,8 +68,7 @@ def test_points_without_an_answer_are_left_out_aloud():
     assert chosen.left_out == ("2500 N, 25 Hz",)
 
 
-def test_ross_reads_one_table_with_arrays_of_one_length():
-    points = static_points(table(SERIES)).points
+def test_ross_reads_one_table_with_arrays_of_one_length(points):
     data = tomllib.loads(ross_text(points[1], "campaign\nx"))
     assert len(data) == 1
     name, element = next(iter(data.items()))
@@ -67,8 +80,7 @@ def test_ross_reads_one_table_with_arrays_of_one_length():
     assert element["mxx"] == [0.0, 0.0, 0.0]
 
 
-def test_one_frequency_becomes_constant_coefficients():
-    points = static_points(table(SERIES)).points
+def test_one_frequency_becomes_constant_coefficients(points):
     element = next(iter(tomllib.loads(ross_text(points[0], "c")).values()))
     assert "frequency" not in element
     assert len(element["kxx"]) == 1
@@ -78,7 +90,7 @@ def test_ross_itself_would_interpolate_what_was_written(tmp_path):
     """The spline that ROSS uses (UnivariateSpline, default smoothing) must keep stiffness and damping."""
     from scipy.interpolate import UnivariateSpline
 
-    points = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)])).points
+    points = static_points(table(SIX)).points
     write_ross(tmp_path, points, "c")
     (path,) = tmp_path.glob("ross_*.toml")
     element = next(iter(tomllib.loads(path.read_text(encoding="utf-8")).values()))
@@ -87,18 +99,16 @@ def test_ross_itself_would_interpolate_what_was_written(tmp_path):
         assert np.allclose(spline(element["frequency"]), element[key], rtol=1e-7)
 
 
-def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path):
-    points = static_points(table(SERIES)).points
+def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path, points):
     write_csv(tmp_path, points, "c")
     frame = pd.read_csv(tmp_path / "bearing_coefficients.csv")
     assert set(frame["shaft_speed_rpm"]) == {1320.0}
     assert frame["frequency_rad_per_s"].iloc[0] == pytest.approx(2 * math.pi * 25)
 
 
-def test_matlab_gets_matrices(tmp_path):
+def test_matlab_gets_matrices(tmp_path, points):
     from scipy.io import loadmat
 
-    points = static_points(table(SERIES)).points
     write_mat(tmp_path, points, "c")
     bearing = loadmat(tmp_path / "bearing_coefficients.mat")["bearing"].ravel()
     assert bearing[1]["K"].shape == (2, 2, 3)
@@ -119,10 +129,6 @@ def test_what_cannot_be_exported_is_refused(change, says):
         static_points(change(table(SERIES)))
 
 
-def test_every_format_has_its_writer():
-    assert all(callable(form.writer) for form in FORMATS.values())
-
-
 def test_an_unknown_format_is_answered_with_the_nearest():
     with pytest.raises(ExportError, match="Did you mean 'dyrobes'"):
         export_format("dyrobe")
@@ -139,10 +145,7 @@ def doubtful_table():
     return frame
 
 
-@pytest.mark.parametrize("to", sorted(FORMATS))
 def test_what_is_not_to_be_trusted_stays_behind(to, tmp_path):
-    if to == "excel":
-        pytest.importorskip("openpyxl")
     written = export(doubtful_table(), to, tmp_path)
     assert [len(p.frequency) for p in written.chosen.points] == [2]
     assert len(written.chosen.doubtful) == 2
@@ -150,10 +153,7 @@ def test_what_is_not_to_be_trusted_stays_behind(to, tmp_path):
     assert "ill-conditioned" in written.chosen.doubtful[1]
 
 
-@pytest.mark.parametrize("to", sorted(FORMATS))
 def test_intervals_and_flags_leave_with_every_format(to, tmp_path):
-    if to == "excel":
-        pytest.importorskip("openpyxl")
     export(doubtful_table(), to, tmp_path, force=True)
     if to in {"ross", "xltrc", "dyrobes", "ansys"}:
         frame = pd.read_csv(tmp_path / "bearing_coefficients_intervals.csv")
@@ -199,10 +199,9 @@ def test_the_command_line_says_what_stayed_behind_and_exits_with_three(tmp_path)
     assert len(pd.read_csv(tmp_path / "f" / "bearing_coefficients.csv")) == 4
 
 
-def test_parquet_keeps_the_numbers_and_their_source(tmp_path):
+def test_parquet_keeps_the_numbers_and_their_source(tmp_path, points):
     import pyarrow.parquet as pq
 
-    points = static_points(table(SERIES)).points
     write_parquet(tmp_path, points, "campaign x")
     read = pq.read_table(tmp_path / "bearing_coefficients.parquet")
     assert read.num_rows == 4
@@ -211,9 +210,8 @@ def test_parquet_keeps_the_numbers_and_their_source(tmp_path):
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@"])
-def test_no_text_of_an_excel_file_is_a_formula(tmp_path, start):
+def test_no_text_of_an_excel_file_is_a_formula(tmp_path, points, start):
     openpyxl = pytest.importorskip("openpyxl")
-    points = static_points(table(SERIES)).points
     write_excel(tmp_path, points, f"{start}cmd|' /C calc'!A0")
     book = openpyxl.load_workbook(tmp_path / "bearing_coefficients.xlsx")
     cells = [cell for sheet in book for row in sheet.iter_rows() for cell in row]
@@ -225,12 +223,12 @@ def test_no_text_of_an_excel_file_is_a_formula(tmp_path, start):
     assert sheet.cell(3, names.index("kxx_N_per_m") + 1).value == points[1].coefficients["kxx"][0]
 
 
-def test_an_excel_file_without_its_library_names_the_extra(tmp_path, monkeypatch):
+def test_an_excel_file_without_its_library_names_the_extra(tmp_path, points, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(ExportError, match=r"tpjb-ident\[excel\]"):
-        write_excel(tmp_path, static_points(table(SERIES)).points, "x")
+        write_excel(tmp_path, points, "x")
 
 
 def speeds():
@@ -313,7 +311,7 @@ def test_ross_itself_reads_what_was_written(tmp_path):
     python = os.environ.get("TPJB_ROSS_PYTHON", sys.executable)
     if subprocess.run([python, "-c", "import ross"], capture_output=True, cwd=tmp_path).returncode:
         pytest.skip("ross-rotordynamics is not installed; TPJB_ROSS_PYTHON can name a Python that has it")
-    points = static_points(table([(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)] + [(2500.0, 25.0)])).points
+    points = static_points(table([*SIX, (2500.0, 25.0)])).points
     write_ross(tmp_path, points, "c")
     done = subprocess.run([python, "-c", ROSS, str(tmp_path)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]
