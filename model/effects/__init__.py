@@ -6,8 +6,7 @@ function that takes a `Setup` and returns a changed one.
 
 from __future__ import annotations
 
-from model.effects.effect import Effect, apply_effects
-from model.effects.effects_file import load_effects
+from model.effects.effect import Effect, apply_effects, load_effects
 from model.effects.kind import EffectError, EffectKind, EffectWords, Parameter
 from model.effects.registry import kind_of, known_effects, register
 

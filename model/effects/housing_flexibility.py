@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
-from model.effects.kind import EffectKind, EffectWords, Parameter
-from model.effects.series import add_compliance
+from model.effects.kind import EffectKind, EffectWords
+from model.effects.series import SPRING, add_compliance
 from model.setup import Setup
 
 
@@ -17,7 +15,7 @@ def apply(setup: Setup, stiffness: float) -> Setup:
 KIND = EffectKind(
     name="housing_flexibility",
     side="structure",
-    parameters=(Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2e9, "inverse"),),
+    parameters=(SPRING,),
     apply=apply,
     source="The paper names it as a likely cause (Sec. 6): 1e9 to 5e9 N/m in rig housings",
     words=EffectWords(

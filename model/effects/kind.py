@@ -98,6 +98,14 @@ class Parameter:
         return self.unit == "pad"
 
 
+#: The number of a pad, for an effect on one of them.
+PAD = Parameter("pad", "pad", "ratio", math.nan, 1, MAX_PADS)
+#: Which way, for an effect that has no neutral direction.
+DIRECTION = Parameter(
+    "direction", "rad", "angle", math.nan, -7.0, 7.0, options=(0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
+)
+
+
 @dataclass(frozen=True)
 class EffectWords:
     """What to say of an effect to an engineer; `finding` is one clause with parameters as fields.

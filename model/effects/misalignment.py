@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from model.effects.kind import EffectKind, EffectWords, Parameter
+from model.effects.kind import DIRECTION, EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
@@ -18,9 +16,7 @@ KIND = EffectKind(
     side="bearing",
     parameters=(
         Parameter("angle", "rad", "angle", 0.0, 0.0, 0.002, 0.0003, "square"),
-        Parameter(
-            "direction", "rad", "angle", math.nan, -7.0, 7.0, options=(0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
-        ),
+        DIRECTION,
     ),
     apply=apply,
     source="Half the clearance over half the length is 1e-3 rad",

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-from model.effects.kind import EffectKind, EffectWords, Parameter
+from model.effects.kind import PAD, EffectKind, EffectWords, Parameter
 from model.setup import Setup
 
 
 def apply(setup: Setup, pad: int, radial_offset: float) -> Setup:
     """The assembled clearance of one pad is Cb + radial_offset."""
-    return setup.change_pads(
-        lambda number, pad_drawing: (
-            replace(pad_drawing, assembled_clearance=pad_drawing.assembled_clearance + radial_offset)
-            if number == pad
-            else pad_drawing
-        )
-    )
+    pads = list(setup.bearing.pads)
+    nominal = pads[pad - 1]
+    pads[pad - 1] = replace(nominal, assembled_clearance=nominal.assembled_clearance + radial_offset)
+    return setup.change(bearing=setup.bearing.with_pads(tuple(pads)))
 
 
 KIND = EffectKind(
     name="pad_offset",
     side="bearing",
     parameters=(
-        Parameter("pad", "pad", "ratio", math.nan, 1, 40),
+        PAD,
         Parameter("radial_offset", "m", "length", 0.0, -6e-05, 6e-05, 1e-05),
     ),
     apply=apply,

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from model.effects.kind import Parameter
 from model.measured_pivot import MeasuredPivot
 from model.pivots import PivotLaw, ScaledPivot
 from model.setup import Setup
+
+#: Stiffness of such a part.
+SPRING = Parameter("stiffness", "N/m", "stiffness", math.inf, 5e7, math.inf, 2e9, "inverse")
 
 
 def add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:

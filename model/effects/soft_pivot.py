@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import math
-
-from model.effects.kind import EffectKind, EffectWords, Parameter
+from model.effects.kind import PAD, EffectKind, EffectWords, Parameter
 from model.pivots import ScaledPivot
 from model.setup import Setup
 
 
 def apply(setup: Setup, pad: int, stiffness_factor: float) -> Setup:
     """The pivot of one pad deflects delta(W) / stiffness_factor."""
-    return setup.change(
-        pivots=tuple(
-            ScaledPivot(law, stiffness_factor) if number == pad else law
-            for number, law in enumerate(setup.pivots, start=1)
-        )
-    )
+    pivots = list(setup.pivots)
+    pivots[pad - 1] = ScaledPivot(pivots[pad - 1], stiffness_factor)
+    return setup.change(pivots=tuple(pivots))
 
 
 KIND = EffectKind(
     name="soft_pivot",
     side="bearing",
     parameters=(
-        Parameter("pad", "pad", "ratio", math.nan, 1, 40),
+        PAD,
         Parameter("stiffness_factor", "1", "ratio", 1.0, 0.05, 5.0, 0.5, "inverse"),
     ),
     apply=apply,

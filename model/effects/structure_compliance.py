@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from model.effects.kind import EffectKind, EffectWords, Parameter
-from model.effects.series import add_compliance
+from model.effects.kind import DIRECTION, EffectKind, EffectWords
+from model.effects.series import SPRING, add_compliance
 from model.setup import Setup
 
 
@@ -18,12 +18,7 @@ def apply(setup: Setup, stiffness: float, direction: float) -> Setup:
 KIND = EffectKind(
     name="structure_compliance",
     side="structure",
-    parameters=(
-        Parameter("stiffness", "N/m", "stiffness", math.inf, 50000000.0, math.inf, 2e9, "inverse"),
-        Parameter(
-            "direction", "rad", "angle", math.nan, -7.0, 7.0, options=(0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
-        ),
-    ),
+    parameters=(SPRING, DIRECTION),
     apply=apply,
     source="A cap or a foot is as stiff as a rig housing, in one direction: 1e9 to 5e9 N/m",
     words=EffectWords(

@@ -21,7 +21,7 @@ from model.effects import (
     load_effects,
     register,
 )
-from model.effects.user_library import load_library
+from model.effects.registry import load_library
 from model.measured_pivot import MeasuredPivot
 from model.pivots import pivot_laws
 from model.predict import predict, predict_setup

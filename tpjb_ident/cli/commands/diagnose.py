@@ -70,7 +70,7 @@ def diagnose(
     """
     settings = _settings(model_tolerance, tolerance or (), workers)
     if library is not None:
-        from model.effects.user_library import load_library
+        from model.effects.registry import load_library
 
         load_library(c.file(library))
     start = pivots if pivots == "measured" else pivot_choice(c, pivots)
