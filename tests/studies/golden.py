@@ -81,11 +81,10 @@ def run(out: Path, only: list[str], campaigns: list[str]) -> None:
             print(ended.stderr[-2000:])
 
 
-def deviations(header: list[str], row: list[str]) -> dict[str, float]:
-    """Give the standard deviation of each column that has one beside it (`kxx` and `kxx_se`)."""
-    cells = dict(zip(header, row, strict=False))
+def deviations(cells: dict[str, str]) -> dict[str, float]:
+    """Give the standard deviation of each column that has one next to it (`kxx` and `kxx_se`)."""
     spread = {}
-    for column in header:
+    for column in cells:
         text = cells.get(f"{column}_se", "")
         if text and text not in ("nan", "inf"):
             spread[column] = float(text)
@@ -93,18 +92,18 @@ def deviations(header: list[str], row: list[str]) -> dict[str, float]:
 
 
 def differences(before: Path, after: Path) -> Iterator[float]:
-    """Give the difference of each number of two tables or texts; infinity where words or shapes differ."""
+    """Give the difference of each number of two texts, or of common columns; infinity where words differ."""
     if before.suffix != ".csv":
         yield from text_differences(before.read_text(encoding="utf-8"), after.read_text(encoding="utf-8"))
         return
-    old = list(csv.reader(before.read_text(encoding="utf-8").splitlines()))
-    new = list(csv.reader(after.read_text(encoding="utf-8").splitlines()))
-    if len(old) != len(new) or [len(r) for r in old] != [len(r) for r in new]:
+    old, new = table(before), table(after)
+    if len(old) != len(new):
         yield math.inf
         return
     for first, second in zip(old, new, strict=True):
-        spread = deviations(old[0], first) if first is not old[0] else {}
-        for column, a, b in zip(old[0], first, second, strict=True):
+        spread = deviations(first)
+        for column in first.keys() & second.keys():
+            a, b = first[column], second[column]
             if a == b:
                 continue
             if NUMBER.fullmatch(a) and NUMBER.fullmatch(b):
@@ -112,6 +111,17 @@ def differences(before: Path, after: Path) -> Iterator[float]:
                 yield abs(float(a) - float(b)) / size
             else:
                 yield from text_differences(a, b)
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def columns_of_one(before: Path, after: Path) -> list[str]:
+    """List the columns that only one of two tables has, `-` where it went and `+` where it came."""
+    headers = [next(csv.reader(path.read_text(encoding="utf-8").splitlines()[:1]), []) for path in (before, after)]
+    gone = [f"-{column}" for column in headers[0] if column not in headers[1]]
+    return gone + [f"+{column}" for column in headers[1] if column not in headers[0]]
 
 
 def text_differences(before: str, after: str) -> Iterator[float]:
@@ -141,7 +151,8 @@ def compare(before: Path, after: Path) -> int:
         else:
             largest = max(differences(old, new), default=0.0)
             word = "words or shape" if math.isinf(largest) else f"{largest:.1e}"
-            print(f"{name}: {word}")
+            columns = columns_of_one(old, new) if name.suffix == ".csv" else []
+            print(f"{name}: {word}", *columns)
             worst = max(worst, int(largest > LIMIT))
     print(f"{same} files the same to the bit")
     return worst

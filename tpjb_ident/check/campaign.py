@@ -40,6 +40,11 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
     list of Problem
         Errors first; empty where nothing was found. Bad input never raises: it is in the list. A problem
         with a `run` concerns that run alone; one without concerns the campaign.
+
+    Examples
+    --------
+    >>> ti.check_campaign(demo)  # nothing found
+    []
     """
     try:
         campaign = as_campaign(campaign, "check_campaign: campaign")

@@ -66,6 +66,11 @@ class CompareSettings:
         The effects are sizes beside measured pivots: none of them is left out.
     identify : IdentifySettings, optional
         Default: what `identify` takes.
+
+    Examples
+    --------
+    >>> ti.CompareSettings(variants=("kirk", "measured"), thermal="isothermal").thermal
+    'isothermal'
     """
 
     variants: tuple[str, ...] = DEFAULT_VARIANTS
@@ -116,6 +121,13 @@ class Comparison(Presented):
     variants : tuple of Variant
     remarks : tuple of str
         What the campaign lacks, and what was left out for it.
+
+    Examples
+    --------
+    >>> settings = ti.CompareSettings(variants=("kirk",), thermal="isothermal")
+    >>> comparison = ti.compare_campaign(demo, rocker, settings)
+    >>> comparison.to_dataframe()[["kyy_N_per_m", "kyy_N_per_m_predicted"]].shape
+    (7, 2)
     """
 
     campaign: Campaign | TableSource
@@ -191,6 +203,12 @@ def compare_campaign(
         No dynamic runs, or an unknown pivot model.
     rigdata.problem.RigDataError
         Records that are not what they claim to be.
+
+    Examples
+    --------
+    >>> comparison = ti.compare_campaign(demo, rocker, ti.CompareSettings(variants=("rigid",), thermal="isothermal"))
+    >>> len(comparison.identification.points), [variant.name for variant in comparison.variants]
+    (7, ['rigid'])
     """
     from tpjb_ident.dynamic.identify import identify
     from tpjb_ident.dynamic.settings import IdentifySettings

@@ -127,6 +127,17 @@ def diagnose_campaign(
     ------
     ComparisonError
         The campaign has no dynamic runs.
+
+    Examples
+    --------
+    >>> from model.effects import known_effects
+    >>> from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+    >>> campaign = ti.load_campaign(demo)
+    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "oil_viscosity"}
+    >>> bearing = ti.load_bearing(campaign.bearing_text)
+    >>> found = diagnose_campaign(campaign, bearing, settings=DiagnoseSettings(skip=others))
+    >>> print(found.diagnosis.verdict.effects[0].name)
+    pivot_flexibility
     """
     settings = settings or DiagnoseSettings()
     measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)

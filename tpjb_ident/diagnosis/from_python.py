@@ -70,6 +70,17 @@ def diagnose(
         The campaign has no dynamic runs.
     ArgumentError
         No campaign, or no bearing anywhere.
+
+    Examples
+    --------
+    Asked about two effects; without settings about all of the library.
+
+    >>> from model.effects import known_effects
+    >>> from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "oil_viscosity"}
+    >>> result = ti.diagnose(demo, settings=DiagnoseSettings(skip=others))
+    >>> print(result.summary().splitlines()[0])
+    demo: All pivots have 39.3 ± 1.8 % of the formula's stiffness. That explains the disagreement.
     """
     opened = as_campaign(campaign, "campaign")
     chosen = settings or DiagnoseSettings()
@@ -109,6 +120,13 @@ def plan(
     ------
     ArgumentError
         No dynamic runs.
+
+    Examples
+    --------
+    >>> points = {"load": [2500.0, 7500.0], "speed": 138.0, "excitation": 157.0}
+    >>> campaign = ti.plan(rocker, points, locus=0, dry_tests=False)
+    >>> campaign.to_frame().columns[:3].tolist()
+    ['effect', 'parameter', 'unit']
     """
     drawn = as_bearing(bearing, "bearing")
     tests = points_of(points) if isinstance(points, Mapping) else points

@@ -80,6 +80,12 @@ def identify(
         None of the records can be read. Single ones are left out and named in the result's conditions.
     RecordTooShortError
         None of the records can tell its lines apart.
+
+    Examples
+    --------
+    >>> result = ti.identify(demo)
+    >>> print(result.points[0])
+    2.5 kN, 25 Hz: kxx 53.12 ± 0.63 MN/m, cxx 582.3 ± 6.6 kN s/m, kyy 90.7 ± 1.1 MN/m, cyy 689.1 ± 8.0 kN s/m
     """
     settings = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")

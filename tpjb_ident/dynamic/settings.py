@@ -34,6 +34,12 @@ class IdentifySettings:
         Of those draws.
     keep_weights : bool
         Keep the weight of every window and method; without, only whether the window counted (nearly no memory).
+
+    Examples
+    --------
+    >>> result = ti.identify(demo, ti.IdentifySettings(method="rlm:tukey", clearance=80e-6))
+    >>> result.method
+    'rlm:tukey'
     """
 
     method: str = "mm-eiv"

@@ -49,13 +49,7 @@ def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
 
 
 def write_intervals(folder: Path, points: tuple[StaticPoint, ...]) -> None:
-    """Write the same table beside files of a form that holds no intervals.
-
-    Parameters
-    ----------
-    folder : Path
-    points : tuple of StaticPoint
-    """
+    """Write the same table beside files of a form that holds no intervals."""
     _write_csv(folder / INTERVALS, points)
 
 
@@ -79,11 +73,6 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
 
     Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
     are red.
-
-    Raises
-    ------
-    ExportError
-        openpyxl is not installed.
     """
     try:
         from openpyxl import Workbook

@@ -35,7 +35,16 @@ WithDerivative = tuple[FloatArray, FloatArray]
 
 
 class Law(Protocol):
-    """Shape of a law. `u` (n,) is load over reference load, `q` (k,) the shape parameters."""
+    """Shape of a law. `u` (n,) is load over reference load, `q` (k,) the shape parameters.
+
+    Examples
+    --------
+    >>> from tpjb_ident.pivot.laws import Linear
+    >>> law = Linear()
+    >>> shape, by_parameter = law.phi(np.array([0.5, 2.0]), law.prior_mean)
+    >>> print(law.name, shape)
+    linear [0.5 2. ]
+    """
 
     @property
     def name(self) -> str:

@@ -56,6 +56,14 @@ def write_report(
     -------
     Path
         report.html; the figures lie beside it in ``figures`` as SVG and PNG.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> settings = ti.CompareSettings(variants=("kirk",), thermal="isothermal")
+    >>> page = ti.write_report(Path("."), ti.compare_campaign(demo, rocker, settings))
+    >>> page.name
+    'report.html'
     """
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)

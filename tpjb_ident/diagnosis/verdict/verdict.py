@@ -85,6 +85,13 @@ class Verdict:
 
     `indistinguishable` holds names of effects; where another pad or direction of the same effect would do, that is
     spelt out there.
+
+    Examples
+    --------
+    >>> nothing = Remainder(sigma=1.0, share=0.0, where="", p=0.5)
+    >>> verdict = Verdict("consistent", (), (), (), "", (), (), {}, {"before": 1.0, "after": 1.0}, nothing)
+    >>> verdict.to_dict()["schema"], verdict.effects
+    ('tpjb-diagnosis/2', ())
     """
 
     verdict: VerdictName

@@ -66,6 +66,14 @@ def estimate_dynamic_stiffness(
     ------
     ArgumentError
         Shapes that do not fit, an unknown method or norm, omega not positive.
+
+    Examples
+    --------
+    >>> stiffness, damping, omega = np.diag([3e8, 4.5e8]), np.diag([5e5, 7e5]), 2 * np.pi * 25
+    >>> D = 1e-6 * np.array([[1, 0], [0, 1], [1, 1], [1, -1]], dtype=complex)  # four directions
+    >>> est = ti.estimate_dynamic_stiffness(D, D @ (stiffness + 1j * omega * damping).T, omega, method="ols")
+    >>> print(np.round(est.k / 1e6, 3).diagonal(), np.round(est.c / 1e3, 3).diagonal())
+    [300. 450.] [500. 700.]
     """
     if method not in METHODS:
         raise ArgumentError(unknown_name("method", method, METHODS))

@@ -93,6 +93,13 @@ def r_matrix(D: ArrayLike, F: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     ------
     ArgumentError
         Shapes other than (n, 2), or different n.
+
+    Examples
+    --------
+    >>> R, f = ti.r_matrix([[1e-6, 2e-6]], [[300.0, 900.0]])
+    >>> print((R * 1e6).real, f.real)
+    [[1. 2. 0. 0.]
+     [0. 0. 1. 2.]] [300. 900.]
     """
     displacement, force = np.asarray(D, dtype=complex), np.asarray(F, dtype=complex)
     if displacement.ndim != 2 or displacement.shape[1] != 2 or displacement.shape != force.shape:

@@ -58,6 +58,12 @@ class DynamicStiffness:
         zero, along the weaker displacement direction first; NaN when not known.
     systematic : (8, 8) ndarray or None
         Covariance from calibration, common to all points of a campaign.
+
+    Examples
+    --------
+    >>> est = ti.estimate_dynamic_stiffness(1e-6 * np.eye(2), 300.0 * np.eye(2), 157.0, method="ols")
+    >>> print(est.h[0, 0].real, est.k.shape)
+    300000000.0 (2, 2)
     """
 
     h: ComplexArray

@@ -58,6 +58,12 @@ class Identification(Presented):
         About the campaign as a whole.
     bands : tuple of BandResult
         Of runs that were excited over a band.
+
+    Examples
+    --------
+    >>> result = ti.identify(demo)
+    >>> result.to_dataframe()[["static_load_N", "kyy_N_per_m", "kyy_N_per_m_lo", "kyy_N_per_m_hi"]].shape
+    (7, 4)
     """
 
     campaign: str
