@@ -12,6 +12,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from tests.command_line import tpjb
+from tests.manifests import manifest
 from tests.report.tags import Page
 from tpjb_ident.runtime.tables import safe_for_spreadsheets, write_table
 
@@ -132,7 +133,7 @@ def test_a_strange_name_in_a_message_is_one_printable_line(tmp_path, name):
 
 @pytest.mark.parametrize("name", [*NAMES, "../x", "/x", "C:x", "a/b"])
 def test_a_run_has_a_plain_name_or_none(tmp_path, name):
-    text = 'schema = "tpjb-rig/1"\nid = "t"\nbearing = "b.toml"\n[[runs]]\nkind = "clearance"\nfile = "r.csv"\n'
-    (tmp_path / "campaign.toml").write_text(text + f"id = '{name.replace(chr(27), '?')}'\n", encoding="utf-8")
+    run = {"id": name.replace(chr(27), "?"), "kind": "clearance", "file": "r.csv"}
+    (tmp_path / "campaign.toml").write_text(manifest({}, run), encoding="utf-8")
     with pytest.raises(RigDataError, match=r"run id .* cannot be used"):
         rigdata.load_campaign(tmp_path)

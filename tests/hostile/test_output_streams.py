@@ -10,23 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.manifests import PROBE, manifest
 from tpjb_ident.cli import main
 
-MANIFEST = """\
-schema = "tpjb-rig/1"
-id = "Prüfstand µ"
-bearing = "none.toml"
-[acquisition]
-sample_rate = "10 Hz"
-[channels.X1A]
-quantity = "displacement"
-axis = "0 deg"
-unit = "um"
-[[runs]]
-id = "c-1"
-file = "c-1.csv"
-kind = "clearance"
-"""
+HEAD = {"id": "Prüfstand µ", "bearing": "none.toml"}
+SWEEP = {"id": "c-1", "file": "c-1.csv", "kind": "clearance"}
+MANIFEST = manifest({"X1A": PROBE}, SWEEP, head=HEAD, acquisition={"sample_rate": "10 Hz"})
 
 
 @pytest.fixture

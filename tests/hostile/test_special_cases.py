@@ -18,20 +18,21 @@ from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.readers.base import FORMATS
 from rigdata.readers.formats.foreign import read_foreign
+from tests.manifests import PROBE, manifest
 
 pytestmark = pytest.mark.slow
-HEAD = 'schema = "tpjb-rig/1"\nid = "t"\nbearing = "b.toml"\n[acquisition]\nsample_rate = "10 Hz"\n'
-CHANNEL = '[channels.X1A]\nquantity = "displacement"\naxis = "{axis}"\nunit = "{unit}"\nsensitivity = "{gain}"\n'
-RUN = '[[runs]]\nid = "c-1"\nfile = "c-1.csv"\nkind = "clearance"\n'
+RUN = {"id": "c-1", "file": "c-1.csv", "kind": "clearance"}
+VOLTS = PROBE | {"unit": "V", "sensitivity": "7.78 mV/um"}
 GIGABYTES = 2**32
 
 
-def channel(axis="0 deg", unit="V", gain="7.78 mV/um"):
-    return CHANNEL.format(axis=axis, unit=unit, gain=gain)
+def text_of(channel=PROBE, name="X1A"):
+    """Manifest of one channel and one run."""
+    return manifest({name: channel}, RUN, acquisition={"sample_rate": "10 Hz"})
 
 
 def folder_campaign(folder, record=None):
-    (folder / "campaign.toml").write_text(HEAD + channel(unit="um") + RUN, encoding="utf-8")
+    (folder / "campaign.toml").write_text(text_of(), encoding="utf-8")
     if record is not None:
         (folder / "c-1.csv").write_bytes(record)
     return rigdata.load_campaign(folder)
@@ -39,7 +40,7 @@ def folder_campaign(folder, record=None):
 
 def hdf5_campaign(path, fill):
     with h5py.File(path, "w") as file:
-        file.attrs["manifest"] = HEAD + channel(unit="um") + RUN
+        file.attrs["manifest"] = text_of()
         group = file.create_group("runs/c-1")
         group.attrs["sample_rate_hz"] = 100.0
         fill(group)
@@ -84,7 +85,7 @@ def test_a_dataset_that_claims_billions_of_rows(tmp_path, rows):
 
 def test_a_manifest_of_more_runs_than_any_campaign_has():
     with pytest.raises(RigDataError, match=r"more than 100000 runs|larger than"):
-        parse_manifest(HEAD + channel() + "[[runs]]\n" * 100_001)
+        parse_manifest(text_of(VOLTS) + "[[runs]]\n" * 100_001)
 
 
 @pytest.mark.parametrize("depth", [3, 63, 200])
@@ -126,13 +127,13 @@ def test_nan_and_infinities_are_missing_values_not_numbers(tmp_path):
 @pytest.mark.parametrize("gain", ["nan mV/um", "inf mV/um", "1e999 mV/um", "1e-400 mV/um"])
 def test_endless_and_vanishing_sensitivities_are_named(gain):
     with pytest.raises(RigDataError, match="sensitivity"):
-        parse_manifest(HEAD + channel(gain=gain) + RUN)
+        parse_manifest(text_of(VOLTS | {"sensitivity": gain}))
 
 
 @pytest.mark.parametrize("unit", ["0", "-um", "um^0", "um^99999", "1e5 um", "um/0", "V**V", "\u202emu", "µ" * 500])
 def test_units_that_are_none(unit):
     with pytest.raises(RigDataError, match="unit"):
-        parse_manifest(HEAD + channel(unit=unit, gain="1 V/V") + RUN)
+        parse_manifest(text_of(VOLTS | {"unit": unit, "sensitivity": "1 V/V"}))
 
 
 @pytest.mark.parametrize("value", ['"1e999 mm"', '"nan mm"', '"-1e308 km"', '"0 mm"', "nan", "inf", "9" * 400])
@@ -146,8 +147,7 @@ def test_impossible_diameters_of_a_bearing(rocker_file, value):
 
 @pytest.mark.parametrize("name", ["Größe µ", "شبه", "\u202eA1X", "日本", "e\u0301", "\U0001f600", "a\u2066b"])
 def test_channel_names_of_any_writing_are_taken_or_told_in_print(tmp_path, name):
-    text = HEAD + channel(unit="um").replace("channels.X1A", f'channels."{name}"') + RUN
-    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text(text_of(name=name), encoding="utf-8")
     (tmp_path / "c-1.csv").write_text(f"{name}\n" + "1.5\n" * 5, encoding="utf-8")
     try:
         assert len(rigdata.load_campaign(tmp_path).run("c-1").record(name).values) == 5

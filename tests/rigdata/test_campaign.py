@@ -19,73 +19,26 @@ from hypothesis import strategies as st
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.safe_path import inside
+from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
 
-MANIFEST = """\
-schema = "tpjb-rig/1"
-id = "rocker-A"
-bearing = "rocker.toml"
-description = "free text"
-
-[housing]
-mass = "30 kg"
-
-[acquisition]
-sample_rate = "100 Hz"
-
-[channels.X1A]
-quantity = "displacement"
-axis = "45 deg"
-unit = "V"
-sensitivity = "7.78 mV/um"
-polarity = -1
-
-[channels.X1B]
-quantity = "displacement"
-axis = "115 deg"
-unit = "V"
-sensitivity = "7.78 mV/um"
-polarity = -1
-
-[channels.L1H]
-quantity = "force"
-axis = "0 deg"
-unit = "N"
-
-[channels.T2]
-quantity = "temperature"
-pad = 2
-position = 0.75
-unit = "degC"
-
-[channels.T1]
-quantity = "temperature"
-pad = 1
-position = 0.75
-unit = "degC"
-
-[channels.K1]
-quantity = "speed"
-unit = "V"
-sensitivity = "100 mV/Hz"
-
-[channels.spare]
-quantity = "ignore"
-
-[[runs]]
-id = "l-1"
-file = "runs/l-1.csv"
-kind = "locus"
-shaft_speed = "22 Hz"
-static_load = "5 kN"
-static_load_direction = "-90 deg"
-
-[[runs]]
-id = "p-1"
-file = "runs/p-1.csv"
-kind = "dry_pivot"
-pad = 1
-"""
+VOLTS = PROBE | {"unit": "V", "sensitivity": "7.78 mV/um", "polarity": -1}
+THERMOMETER = {"quantity": "temperature", "position": 0.75, "unit": "degC"}
+MANIFEST = manifest(
+    {
+        "X1A": VOLTS | {"axis": "45 deg"},
+        "X1B": VOLTS | {"axis": "115 deg"},
+        "L1H": {"quantity": "force", "axis": "0 deg", "unit": "N"},
+        "T2": THERMOMETER | {"pad": 2},
+        "T1": THERMOMETER | {"pad": 1},
+        "K1": {"quantity": "speed", "unit": "V", "sensitivity": "100 mV/Hz"},
+        "spare": {"quantity": "ignore"},
+    },
+    {"id": "l-1", "file": "runs/l-1.csv", "kind": "locus", **SET_POINT},
+    {"id": "p-1", "file": "runs/p-1.csv", "kind": "dry_pivot", "pad": 1},
+    head={"id": "rocker-A", "bearing": "rocker.toml", "description": "free text"},
+    acquisition={"sample_rate": "100 Hz"},
+)
 X, Y = 3e-6, -5e-6
 AXES = np.radians([45.0, 115.0])
 

@@ -10,43 +10,26 @@ from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.run import speed_from_pulses
 from rigdata.units import UnitError
+from tests.manifests import SET_POINT, manifest
 
-MANIFEST = """schema = "tpjb-rig/1"
-id = "a"
-bearing = "b.toml"
-[housing]
-mass = "30 kg"
-mass_uncertainty = "0.5 kg"
-[acquisition]
-mains = "60 Hz"
-[channels.F]
-quantity = "force"
-axis = "0 deg"
-unit = "N"
-axis_uncertainty = "0.5 deg"
-delay = "0.2 ms"
-delay_uncertainty = "20 us"
-filter = "butterworth 2 low 400 Hz"
-clock = "B"
-zero_uncertainty = "50 N"
-[channels.CMD]
-quantity = "command"
-axis = "0 deg"
-[channels.KEY]
-quantity = "keyphasor"
-[[runs]]
-id = "r"
-kind = "dynamic"
-shaft_speed = "22 Hz"
-static_load = "5 kN"
-static_load_direction = "-90 deg"
-excitation = "random"
-excitation_band = "5..120 Hz"
-[[runs]]
-id = "b"
-kind = "baseline"
-excitation_frequency = "25 Hz"
-"""
+FORCE = {
+    "quantity": "force",
+    "axis": "0 deg",
+    "unit": "N",
+    "axis_uncertainty": "0.5 deg",
+    "delay": "0.2 ms",
+    "delay_uncertainty": "20 us",
+    "filter": "butterworth 2 low 400 Hz",
+    "clock": "B",
+    "zero_uncertainty": "50 N",
+}
+MANIFEST = manifest(
+    {"F": FORCE, "CMD": {"quantity": "command", "axis": "0 deg"}, "KEY": {"quantity": "keyphasor"}},
+    {"id": "r", "kind": "dynamic", "excitation": "random", "excitation_band": "5..120 Hz", **SET_POINT},
+    {"id": "b", "kind": "baseline", "excitation_frequency": "25 Hz"},
+    housing={"mass": "30 kg", "mass_uncertainty": "0.5 kg"},
+    acquisition={"mains": "60 Hz"},
+)
 
 
 @pytest.mark.parametrize("family", ["bessel", "butterworth"])

@@ -13,10 +13,9 @@ import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.text.cells import MISSING
-from tests.rigdata.manifests import PROBE, manifest
+from tests.manifests import PROBES, SWEEP, manifest
 from tpjb_ident.check.campaign import check_campaign
 
-PROBES = {"X1A": PROBE, "X1B": PROBE | {"axis": "90 deg"}}
 CLOCK = {"quantity": "time", "unit": "s"}
 ROWS = [(0.5 * i, 1.5 + i, -2.25 * i) for i in range(30)]
 
@@ -24,8 +23,7 @@ ROWS = [(0.5 * i, 1.5 + i, -2.25 * i) for i in range(30)]
 def make(folder: Path, data: bytes | str, csv: str = "", time: bool = True, clock: dict = CLOCK) -> rigdata.Run:
     (folder / "runs").mkdir(exist_ok=True)
     (folder / "b.toml").write_text('name = "b"\n')
-    run = {"id": "c-1", "file": "runs/c-1.csv", "kind": "clearance"}
-    text = manifest(PROBES | ({"Zeit": clock} if time else {}), run, sample_rate="10 Hz")
+    text = manifest(PROBES | ({"Zeit": clock} if time else {}), SWEEP, acquisition={"sample_rate": "10 Hz"})
     (folder / "campaign.toml").write_text(text + csv)
     (folder / "runs" / "c-1.csv").write_bytes(data if isinstance(data, bytes) else data.encode())
     return rigdata.load_campaign(folder).run("c-1")

@@ -18,7 +18,7 @@ from rigdata.readers.base import FORMATS
 from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
 from rigdata.readers.series import Series, equidistant, is_time, on_one_clock, seconds
-from tests.rigdata.manifests import PROBE, SET_POINT, manifest
+from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
 
 RATE, COUNT = 1000.0, 2000
@@ -144,7 +144,7 @@ def test_every_format_comes_through_the_same_record(campaign):
 
 
 def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
-    text = (campaign / "campaign.toml").read_text(encoding="utf-8").replace('channels."X1A"', 'channels."X1a"')
+    text = (campaign / "campaign.toml").read_text(encoding="utf-8").replace("channels.X1A", "channels.X1a")
     (campaign / "campaign.toml").write_text(text, encoding="utf-8")
     with pytest.raises(RigDataError, match="Did you mean 'X1A'"):
         load_campaign(campaign).run("one").record("X1a")

@@ -14,14 +14,10 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers.hdf5.guards import too_long_text
-from tests.rigdata.manifests import PROBE, manifest
+from tests.manifests import PROBES, SWEEP, manifest
 from tpjb_ident.check.campaign import check_campaign
 
-MANIFEST = manifest(
-    {"X1A": PROBE, "X1B": PROBE | {"axis": "90 deg"}},
-    {"id": "c-1", "file": "runs/c-1.csv", "kind": "clearance"},
-    sample_rate="10 Hz",
-)
+MANIFEST = manifest(PROBES, SWEEP, acquisition={"sample_rate": "10 Hz"})
 N = 1000
 
 

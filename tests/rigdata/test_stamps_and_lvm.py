@@ -11,7 +11,7 @@ from rigdata import RigDataError, load_campaign
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
-from tests.rigdata.manifests import PROBE, SET_POINT, manifest
+from tests.manifests import PROBE, SET_POINT, manifest
 
 RATE, COUNT = 1000.0, 400
 TIME = np.arange(COUNT) / RATE
