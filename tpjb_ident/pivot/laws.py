@@ -39,8 +39,7 @@ class Law(Protocol):
 
     Examples
     --------
-    >>> from tpjb_ident.pivot.laws import Linear
-    >>> law = Linear()
+    >>> law = LAWS["linear"]
     >>> shape, by_parameter = law.phi(np.array([0.5, 2.0]), law.prior_mean)
     >>> print(law.name, shape)
     linear [0.5 2. ]
