@@ -23,5 +23,5 @@ def unknown_name(kind: str, name: object, choices: Iterable[str]) -> str:
     """The refusal of a name that a registry does not hold, with the nearest one and all there are."""
     names = list(choices)
     near = nearest_name(name, names)
-    hint = f"; did you mean {near!r}?" if near else ""
-    return f"unknown {kind} {name!r}{hint} Known: {', '.join(names)}"
+    question = f"; did you mean {near!r}?" if near else ""
+    return f"unknown {kind} {name!r}{question} Known: {', '.join(names)}"

@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import refuse
+from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
 from rigdata.rows import RowReader, Rows
@@ -74,6 +74,9 @@ class Run:
         """Name of the file, as the user knows it."""
         return self.reader.file
 
+    def _refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
+        return refuse(self.file, place, fault, remedy, self.id)
+
     @property
     def length(self) -> int:
         """Samples per channel."""
@@ -85,7 +88,7 @@ class Run:
         rate = self.reader.rate()
         if not LEAST_RATE <= rate <= MOST_RATE:
             remedy = "Check the time column, and sample_rate in the manifest"
-            raise refuse(self.file, "sample rate", f"is {rate:g} Hz", remedy, self.id)
+            raise self._refuse("sample rate", f"is {rate:g} Hz", remedy)
         return rate
 
     def time(self, start: int | None = None, stop: int | None = None) -> FloatArray:
@@ -135,7 +138,7 @@ class Run:
         channel = self.channels.get(name)
         if channel is None:
             remedy = f"Described: {', '.join(self.channels)}"
-            raise refuse(self.file, f"channel {name}", "is not described in the manifest", remedy, self.id)
+            raise self._refuse(f"channel {name}", "is not described in the manifest", remedy)
         first, last = self._slice(start, stop)
         (reading,) = self.reader.read([name], first, last)
         rate = self.sample_rate  # rejected before times are counted from it
@@ -193,12 +196,12 @@ class Run:
         if len(chosen) < 2:
             fault = f"has {len(chosen)} channels, two are needed"
             remedy = f"Describe two {quantity} channels with different axes in the manifest"
-            raise refuse(self.file, f"quantity {quantity}", fault, remedy, self.id)
+            raise self._refuse(f"quantity {quantity}", fault, remedy)
         axes = np.array([c.axis for c in chosen])
         if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
             names = ", ".join(c.name for c in chosen)
             remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
-            raise refuse(self.file, f"channels {names}", "all measure along one line", remedy, self.id)
+            raise self._refuse(f"channels {names}", "all measure along one line", remedy)
         return chosen
 
     def row_reader(self, quantities: Sequence[str]) -> RowReader:

@@ -213,7 +213,12 @@ class Findings:
 
     def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
         """Note a problem of the key at `path`."""
-        self.append(Problem(severity, self.file, _place_of(self.lines, path), what, cure, run))
+        place, at = _spell(path), path
+        while at and at not in self.lines:
+            at = at[:-1]
+        if at:
+            place = f"line {self.lines[at]}, {place}"
+        self.append(Problem(severity, self.file, place, what, cure, run))
 
     def append(self, problem: Problem) -> None:
         """Note a problem that was found elsewhere."""
@@ -261,7 +266,9 @@ class Table:
         key, value = field.key, self.data.get(field.key)
         if value is None:
             if needed or field.required:
-                self.error(key, f"{key} is missing", _remedy_of_missing(field))
+                is_text = field.kind in ("text", "choice")
+                remedy = f'Add {key} = "..."' if is_text else f"Add {key}, a {field.kind} with its unit"
+                self.error(key, f"{key} is missing", remedy)
             return field.default
         if field.kind in RAW:
             return value
@@ -308,12 +315,6 @@ class Table:
         return number
 
 
-def _remedy_of_missing(field: Field) -> str:
-    if field.kind in ("text", "choice"):
-        return f'Add {field.key} = "..."'
-    return f"Add {field.key}, a {field.kind} with its unit"
-
-
 def key_lines(text: str) -> dict[Path, int]:
     """Line (1-based) of every table and key, by path."""
     lines: dict[Path, int] = {}
@@ -339,16 +340,8 @@ def key_lines(text: str) -> dict[Path, int]:
     return lines
 
 
-def _place_of(lines: dict[Path, int], path: Path) -> str:
-    """Where `path` is: ``"line 14, [channels.X1A] sensitivity"``."""
-    spelt = _spell(path)
-    at: Path = path
-    while at and at not in lines:
-        at = at[:-1]
-    return f"line {lines[at]}, {spelt}" if at else spelt
-
-
 def _spell(path: Path) -> str:
+    """``"[channels.X1A] sensitivity"``."""
     if len(path) == 1:
         return str(path[0])
     if path and path[0] == "runs" and isinstance(path[1], int):

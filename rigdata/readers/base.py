@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -93,14 +93,6 @@ def undescribed(names: Sequence[str], members: str, file: str, run: str) -> tupl
         listed += f", ... ({len(names)} in all)"
     remedy = "Nothing, or describe them in the manifest"
     return (Problem("note", file, members, f"{members} without a description: {listed}", remedy, run),)
-
-
-def missing_channel(name: str, names: Iterable[str]) -> tuple[str, str, str]:
-    """Place, what is wrong and what to do where a file lacks a channel: the nearest it has, or all of them."""
-    held = list(names)
-    close = nearest_name(name, held)
-    remedy = f"Did you mean {close!r}?" if close else f"It holds: {', '.join(held)[:200]}"
-    return f"channel {name}", "is missing in the file", remedy
 
 
 def rate_of_time(time: FloatArray) -> float:

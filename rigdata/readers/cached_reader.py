@@ -13,8 +13,9 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
-from rigdata.problem import refuse
-from rigdata.readers.base import missing_channel, rate_of_time
+from rigdata.near_names import hint
+from rigdata.problem import RigDataError, refuse
+from rigdata.readers.base import rate_of_time
 from rigdata.readers.series import Columns
 
 #: Parsed columns cached by a campaign before the oldest run is let go [bytes].
@@ -43,20 +44,14 @@ class ReadingCache:
         value = make()
         with self._lock:
             self._entries[key] = value
-            size = self.nbytes
-            while size > self._limit and len(self._entries) > 1:
-                _, oldest = self._entries.popitem(last=False)
-                size -= _bytes_of(oldest)
+            while self.nbytes > self._limit and len(self._entries) > 1:
+                self._entries.popitem(last=False)
         return value
 
     @property
     def nbytes(self) -> int:
         """Memory taken by all columns [bytes]."""
-        return sum(_bytes_of(value) for value in self._entries.values())
-
-
-def _bytes_of(value: Any) -> int:
-    return int(getattr(value, "nbytes", 0))
+        return sum(int(getattr(value, "nbytes", 0)) for value in self._entries.values())
 
 
 @dataclass(frozen=True)
@@ -69,6 +64,9 @@ class CachedReader:
     channels: Mapping[str, Channel] = field(repr=False)
     stated_rate: float | None = None
     cache: ReadingCache = field(default_factory=ReadingCache, repr=False, compare=False)
+
+    def _refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
+        return refuse(self.file, place, fault, remedy, self.run)
 
     def _columns(self, names: Sequence[str]) -> Columns:
         """All columns, or `names` at least."""
@@ -87,9 +85,9 @@ class CachedReader:
         try:
             state = self.path.stat()
         except OSError as error:
-            raise refuse(self.file, "", "the file is not there", "Restore it, or delete the run", self.run) from error
+            raise self._refuse("", "the file is not there", "Restore it, or delete the run") from error
         if not self.path.is_file():
-            raise refuse(self.file, "", "is not an ordinary file", "Name a record in the manifest", self.run)
+            raise self._refuse("", "is not an ordinary file", "Name a record in the manifest")
         return self.path, state.st_size, state.st_mtime_ns
 
     def length(self) -> int:
@@ -101,8 +99,9 @@ class CachedReader:
         columns = self._columns(names)
         for name in names:
             if name not in columns.values:
-                place, fault, remedy = missing_channel(name, filter(None, self.names()))
-                raise refuse(self.file, place, fault, remedy, self.run)
+                held = [column for column in self.names() if column]
+                remedy = hint(name, held, "It holds:")[:220]
+                raise self._refuse(f"channel {name}", "is missing in the file", remedy)
         return [np.asarray(columns.values[name][start:stop], dtype=float) for name in names]
 
     def rate(self) -> float:
@@ -114,7 +113,7 @@ class CachedReader:
         if self.stated_rate is None:
             fault = "there are neither usable times nor a sample rate"
             remedy = 'Add sample_rate to the run or to [acquisition], or a channel with quantity = "time"'
-            raise refuse(self.file, "", fault, remedy, self.run)
+            raise self._refuse("", fault, remedy)
         return self.stated_rate
 
     def time(self, start: int, stop: int) -> FloatArray:

@@ -59,21 +59,17 @@ def read_sandboxed(module: str, path: Path) -> list[Series]:
     if child.returncode != 0 or not head:
         fault = f"made its library crash (exit status {child.returncode}): it is damaged"
         raise refuse("", "", fault, _AGAIN)
-    answer = json.loads(head)
-    if isinstance(answer, dict):
-        raise refuse("", "", str(answer["error"]), _AGAIN)
-    return _unpack(answer, body)
-
-
-def _unpack(heads: list[list[str]], body: bytes) -> list[Series]:
+    heads = json.loads(head)
+    if isinstance(heads, dict):
+        raise refuse("", "", str(heads["error"]), _AGAIN)
     numbers, start = np.frombuffer(body, dtype=float), 0
     series = []
     for name, unit, group, length, is_timed in heads:
-        middle = start + int(length)
-        end = middle + int(length) if is_timed else middle
-        time = numbers[middle:end] if is_timed else None
-        series.append(Series(name, unit, numbers[start:middle], time, group))
-        start = end
+        values, start = numbers[start : start + length], start + length
+        time = None
+        if is_timed:
+            time, start = numbers[start : start + length], start + length
+        series.append(Series(name, unit, values, time, group))
     return series
 
 
@@ -99,14 +95,6 @@ def _limit_memory(path: Path) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def _limit_time(seconds: int) -> None:
-    """Allow so much processor time (not on Windows)."""
-    with contextlib.suppress(ImportError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.getrlimit(resource.RLIMIT_CPU)[1]))
-
-
 def main(module: str, path: Path) -> None:
     """Read a file and write its channels to the standard output: one line of JSON, then the numbers."""
     reader = importlib.import_module(f"rigdata.readers.formats.{module}")
@@ -125,5 +113,8 @@ def main(module: str, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    _limit_time(int(sys.argv[3]))
+    with contextlib.suppress(ImportError):  # no limits on Windows
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[3]), resource.getrlimit(resource.RLIMIT_CPU)[1]))
     main(sys.argv[1], Path(sys.argv[2]))

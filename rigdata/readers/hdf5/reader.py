@@ -110,7 +110,6 @@ def _text_attribute(handle: Any, name: str, file: str) -> str:
 class _Facts:
     """What every request needs, cached until the file changes."""
 
-    signature: tuple[int, int]
     length: int
     rate: float | None
     has_time: bool
@@ -127,13 +126,16 @@ class Hdf5Reader:
     stated_rate: float | None = None
     described: frozenset[str] = field(default=frozenset(), repr=False)
     clock: Channel | None = field(default=None, repr=False)
-    cached_facts: dict[str, _Facts] = field(default_factory=dict, repr=False, compare=False)
+    cached_facts: dict[tuple[int, int], _Facts] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def file(self) -> str:
         """Display name of file and group."""
         return f"{self.base}:/runs/{self.run}"
+
+    def _refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
+        return refuse(self.file, place, fault, remedy, self.run)
 
     @contextmanager
     def _group(self, cache: int | None = None) -> Iterator[Any]:
@@ -147,9 +149,9 @@ class Hdf5Reader:
             group = resolve(handle, f"runs/{self.run}", self.base, self.run)
             if group is None:
                 remedy = "Delete the run from the manifest, or add the group"
-                raise refuse(self.file, "", "the group is missing", remedy, self.run)
+                raise self._refuse("", "the group is missing", remedy)
             if not isinstance(group, h5py.Group):
-                raise refuse(self.file, "", "is not a group", "Store one dataset per channel in a group", self.run)
+                raise self._refuse("", "is not a group", "Store one dataset per channel in a group")
             yield group
 
     @contextmanager
@@ -204,28 +206,28 @@ class Hdf5Reader:
         if dataset is None:
             names = ", ".join(str(member)[:40] for member in itertools.islice(group, 20))
             remedy = f"It holds: {names or 'nothing'}"
-            raise refuse(self.file, place, "channel is missing in the file", remedy, self.run)
+            raise self._refuse(place, "channel is missing in the file", remedy)
         if not isinstance(dataset, h5py.Dataset):
-            raise refuse(self.file, place, "is not a dataset", "Store one 1-D dataset per channel", self.run)
+            raise self._refuse(place, "is not a dataset", "Store one 1-D dataset per channel")
         if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
             fault = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
-            raise refuse(self.file, place, fault, "Store one 1-D dataset of numbers per channel", self.run)
+            raise self._refuse(place, fault, "Store one 1-D dataset of numbers per channel")
         if dataset.shape[0] > MAX_SAMPLES:
-            raise refuse(self.file, place, f"claims {dataset.shape[0]} samples", "Split the run", self.run)
+            raise self._refuse(place, f"claims {dataset.shape[0]} samples", "Split the run")
         self._check_storage(dataset, place)
         return dataset
 
     def _check_storage(self, dataset: Any, place: str) -> None:
         """Reject data that is outside the file, or needs foreign code or vast memory to unpack."""
         if dataset.is_virtual or dataset.external:
-            raise refuse(self.file, place, "holds its data in another file", "Copy the data into this file", self.run)
+            raise self._refuse(place, "holds its data in another file", "Copy the data into this file")
         for code, *_ in _filters(dataset):
             if code not in _FILTERS:
                 fault = f"needs HDF5 filter {code}, which is not a built-in one"
-                raise refuse(self.file, place, fault, "Use gzip", self.run)
+                raise self._refuse(place, fault, "Use gzip")
         chunk = dataset.chunks
         if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
-            raise refuse(self.file, place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB", self.run)
+            raise self._refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
 
     def names(self) -> tuple[str, ...]:
         """Names of all members of the group."""
@@ -237,17 +239,17 @@ class Hdf5Reader:
         try:
             state = self.path.stat()
         except OSError as error:
-            raise refuse(self.file, "", "the file is not there", "Check the path", self.run) from error
+            raise self._refuse("", "the file is not there", "Check the path") from error
         signature = (state.st_size, state.st_mtime_ns)
-        facts = self.cached_facts.get("")
-        if facts is None or facts.signature != signature:
+        if signature not in self.cached_facts:
             with nullcontext(opened) if opened is not None else self._group() as group:
                 rate = self._checked_rate(group.attrs)
                 clock = self.clock is not None and has_link(group, self.clock.name)
                 members = tuple(itertools.islice(group, _MAX_MEMBERS))
-                facts = _Facts(signature, self._length(group), rate, clock, members)
-            self.cached_facts[""] = facts
-        return facts
+                facts = _Facts(self._length(group), rate, clock, members)
+            self.cached_facts.clear()
+            self.cached_facts[signature] = facts
+        return self.cached_facts[signature]
 
     def _length(self, group: Any) -> int:
         """Length that most channels have; one that differs is rejected when it is asked for."""
@@ -264,7 +266,7 @@ class Hdf5Reader:
             raise RigDataError(problems[:_LISTED])
         if not lengths:
             fault = "the group holds no dataset of numbers"
-            raise refuse(self.file, "", fault, "Store one dataset per channel", self.run)
+            raise self._refuse("", fault, "Store one dataset per channel")
         return max(lengths, key=lambda n: (lengths[n], n))
 
     def _checked_rate(self, attributes: Any) -> float | None:
@@ -272,13 +274,13 @@ class Hdf5Reader:
             return None
         place, remedy = f"attribute {_RATE}", "Store one positive number, in Hz"
         if not is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
-            raise refuse(self.file, place, "is not a number", remedy, self.run)
+            raise self._refuse(place, "is not a number", remedy)
         try:
             rate = float(np.asarray(attributes[_RATE]).reshape(()))
         except (ValueError, TypeError) as error:
-            raise refuse(self.file, place, "is not a number", remedy, self.run) from error
+            raise self._refuse(place, "is not a number", remedy) from error
         if not 0.0 < rate < MOST_RATE:
-            raise refuse(self.file, place, f"is {rate}", remedy, self.run)
+            raise self._refuse(place, f"is {rate}", remedy)
         return rate
 
     def length(self) -> int:
@@ -296,13 +298,13 @@ class Hdf5Reader:
                 return rate
         if self.stated_rate is None:
             remedy = "Add the group attribute sample_rate_hz, or [acquisition] sample_rate"
-            raise refuse(self.file, "attribute sample_rate_hz", "there is no sample rate", remedy, self.run)
+            raise self._refuse("attribute sample_rate_hz", "there is no sample rate", remedy)
         return self.stated_rate
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings; only the chunks of the slice are read."""
         if stop - start > MAX_REQUEST:
-            raise refuse(self.file, "", f"{stop - start} samples asked for at once", "Read the run in slices", self.run)
+            raise self._refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
         with self._group() as group:
             length = self._facts(group).length
             columns = []
@@ -310,9 +312,7 @@ class Hdf5Reader:
                 dataset = self._dataset(group, name)
                 if dataset.shape[0] != length:
                     fault = f"has {dataset.shape[0]} samples, the others {length}"
-                    raise refuse(
-                        self.file, f"dataset {name}", fault, "Store all channels of a run with one length", self.run
-                    )
+                    raise self._refuse(f"dataset {name}", fault, "Store all channels of a run with one length")
                 columns.append(self._samples(dataset, name, start, stop))
             return columns
 
@@ -322,7 +322,7 @@ class Hdf5Reader:
                 return np.asarray(dataset[start:stop], dtype=np.float64)
         except (OSError, RuntimeError) as error:  # what a filter says of damaged bytes
             fault = f"the stored samples are damaged ({_first_line(error)})"
-            raise refuse(self.file, f"dataset {name}", fault, "Copy the file again from the rig", self.run) from error
+            raise self._refuse(f"dataset {name}", fault, "Copy the file again from the rig") from error
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.manifest.manifest import CsvSpec
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import suffix_hint, undescribed
 from rigdata.readers.cached_reader import CachedReader
 from rigdata.readers.series import Columns
@@ -40,7 +40,7 @@ class CsvReader(CachedReader):
             raise RigDataError([replace(p, cure=hint) for p in error.problems]) from error
         except (OSError, UnicodeError) as error:
             fault = f"cannot be read ({getattr(error, 'strerror', error)})"
-            raise refuse(self.file, "", fault, "Check the file and its rights", self.run) from error
+            raise self._refuse("", fault, "Check the file and its rights") from error
 
     def names(self) -> tuple[str, ...]:
         """Names of all columns, "" where one has none."""
@@ -60,7 +60,7 @@ class CsvReader(CachedReader):
         wanted = [name for name in head.names if name in used]
         if not wanted:
             fault = "holds none of the channels that are used"
-            raise refuse(self.file, "", fault, "Check the channels' names", self.run)
+            raise self._refuse("", fault, "Check the channels' names")
         if names is not None:
             first = clock_name if clock_name in wanted else wanted[0]
             wanted = [name for name in wanted if name == first or name in names]
@@ -68,7 +68,7 @@ class CsvReader(CachedReader):
             return read_table(Source(self.path, self.file, self.run, head, clock_name), wanted)
         except OSError as error:
             fault = f"cannot be read ({error})"
-            raise refuse(self.file, "", fault, "Check the file and its rights", self.run) from error
+            raise self._refuse("", fault, "Check the file and its rights") from error
 
     def _clock(self) -> Channel | None:
         return next((c for c in self.channels.values() if c.quantity == "time"), None)
@@ -88,7 +88,7 @@ class CsvReader(CachedReader):
         place = f"column {clock.name}"
         usable = np.flatnonzero(np.isfinite(times))
         if len(usable) < min(2, len(times)):
-            raise refuse(self.file, place, "holds no times", "Set its quantity to ignore", self.run)
+            raise self._refuse(place, "holds no times", "Set its quantity to ignore")
         if len(usable) < len(times):
             times = np.interp(np.arange(len(times)), usable, times[usable])
         back = np.flatnonzero(np.diff(times) < 0)
@@ -96,7 +96,7 @@ class CsvReader(CachedReader):
             before, after = times[back[0]], times[back[0] + 1]
             place = f"line {self._head().data_line + int(back[0]) + 1}, {place}"
             fault = f"time runs backwards ({before:g} s, then {after:g} s)"
-            raise refuse(self.file, place, fault, "Sort or split the run", self.run)
+            raise self._refuse(place, fault, "Sort or split the run")
         return times
 
     def problems(self) -> tuple[Problem, ...]:

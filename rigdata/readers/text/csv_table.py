@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.readers.base import MAX_SAMPLES
 from rigdata.readers.series import Columns
 from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
@@ -32,6 +32,14 @@ class Source:
     run: str | None
     head: Head = field(repr=False)
     clock: str = ""
+
+    def problem(self, severity: Severity, place: str, fault: str, remedy: str) -> Problem:
+        """Something wrong with the file."""
+        return Problem(severity, self.file, place, fault, remedy, self.run)
+
+    def refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
+        """The error that stops the reading of the file."""
+        return RigDataError(self.problem("error", place, fault, remedy))
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Line number, from 1, and cells of every line of samples that is not blank."""
@@ -123,7 +131,7 @@ def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[st
             for batch in pv.open_csv(stream, **_options(source, names, numbers, odd_lines)):
                 length += batch.num_rows
                 if length > MAX_SAMPLES:
-                    raise refuse(source.file, "", "has too many lines", "Split the run", source.run)
+                    raise source.refuse("", "has too many lines", "Split the run")
                 for name, column in zip(names, batch.columns, strict=True):
                     if name in stamped:
                         column = pc.ascii_trim_whitespace(column)
@@ -135,7 +143,7 @@ def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[st
             if numbers:
                 raise
             fault = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
-            raise refuse(source.file, "", fault, "Export the run again", source.run) from error
+            raise source.refuse("", fault, "Export the run again") from error
     columns = {name: np.concatenate(column) for name, column in parts.items()}
     for name in stamped:
         cells = [None if cell is None or is_missing(cell) else cell for cell in columns[name]]
@@ -182,12 +190,12 @@ def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
         more = f", and in {counts[name] - 1} more lines" if counts[name] > 1 else ""
         kind = "time stamp" if index in head.stamps else "number"
         place = f"line {number}, column {index + 1} ({name})"
-        problems.append(Problem("error", source.file, place, f"{cell!r} is not a {kind}{more}", remedy, source.run))
+        problems.append(source.problem("error", place, f"{cell!r} is not a {kind}{more}", remedy))
     return problems
 
 
 def _cut_off(source: Source, place: str, fault: str) -> Problem:
-    return Problem("warning", source.file, place, fault, "Copy the file again from the rig", source.run)
+    return source.problem("warning", place, fault, "Copy the file again from the rig")
 
 
 def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...]:
@@ -205,9 +213,9 @@ def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...
     problems = []
     for number, count in wrong[:_LISTED]:
         fault = f"has {count} cells, the names have {width}"
-        problems.append(Problem("error", source.file, f"line {number}", fault, remedy, source.run))
+        problems.append(source.problem("error", f"line {number}", fault, remedy))
     if not problems:
-        raise refuse(source.file, "", f"{len(odd_lines)} lines have a wrong number of cells", remedy, source.run)
+        raise source.refuse("", f"{len(odd_lines)} lines have a wrong number of cells", remedy)
     raise RigDataError(problems)
 
 
