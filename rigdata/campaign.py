@@ -228,8 +228,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
             return ForeignReader(target, entry.file, entry.id, manifest.channels, rate, cache)
         return CsvReader(target, entry.file, entry.id, manifest.channels, rate, cache, manifest.csv)
 
-    campaign = _assembled(manifest, reader_of, problems)
-    return replace(campaign, path=folder, bearing_text=bearing, files=files)
+    return _assembled(manifest, reader_of, problems, path=folder, bearing_text=bearing, files=files)
 
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
@@ -280,7 +279,7 @@ def _load_hdf5(path: Path) -> Campaign:
     def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
         return Hdf5Reader(path, entry.id, path.name, rate, frozenset(manifest.channels), clock)
 
-    return replace(_assembled(manifest, reader_of, problems), path=path, bearing_text=bearing, files=files)
+    return _assembled(manifest, reader_of, problems, path=path, bearing_text=bearing, files=files)
 
 
 def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[str, str], str]:
@@ -294,7 +293,10 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
 
 
 def _assembled(
-    manifest: Manifest, reader_of: Callable[[RunEntry, float | None], RunReader], problems: list[Problem]
+    manifest: Manifest,
+    reader_of: Callable[[RunEntry, float | None], RunReader],
+    problems: list[Problem],
+    **source: Any,
 ) -> Campaign:
     """The campaign of a manifest, with a reader for each run; refused if anything is wrong with either."""
     channels = {name: channel for name, channel in manifest.channels.items() if channel.quantity != "ignore"}
@@ -324,13 +326,12 @@ def _assembled(
     return Campaign(
         id=manifest.id,
         description=manifest.description,
-        path=Path(),
         bearing_name=manifest.bearing,
-        bearing_text="",
         housing_mass=manifest.housing_mass,
         channels=channels,
         runs=tuple(runs),
         notes=(*manifest.notes, *problems),
         mass_uncertainty=manifest.mass_uncertainty,
         mains=manifest.mains,
+        **source,
     )

@@ -14,8 +14,7 @@ from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
-from rigdata.record import Record, VectorRecord
-from rigdata.rows import RowReader, Rows
+from rigdata.record import Record, RowReader, Rows, VectorRecord
 from rigdata.vector import COLLINEAR_SINE, vector_rows
 
 

@@ -46,7 +46,6 @@ _MOST_OF = 0.8
 class Survey:
     """What was found in a folder of exports."""
 
-    exports: tuple[str, ...]
     rates: tuple[float, ...]
     channels: dict[str, ChannelGuess]
     runs: tuple[RunGuess, ...]
@@ -68,7 +67,6 @@ def survey(exports: Sequence[Export], described: Mapping[str, ChannelGuess] | No
     runs = _common_speeds(_one_direction([guess_run(export, channels) for export in exports]))
     line = _common_line(exports, quantities, runs)
     return Survey(
-        exports=tuple(e.name for e in exports),
         rates=tuple(e.rate for e in exports),
         channels=channels,
         runs=runs,
@@ -196,16 +194,12 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     if surveyed.clock:
         head = f"[channels.{_key(surveyed.clock)}]"
-        lines += [
-            head,
-            'quantity = "time"   # (guess) by its name',
-            'unit = "s"   # (guess); times of day become seconds',
-            "",
-        ]
+        unit = 'unit = "s"   # (guess); times of day become seconds'
+        lines += [head, 'quantity = "time"   # (guess) by its name', unit, ""]
     for block in channel_blocks(surveyed).values():
         lines += [*block, ""]
-    for export, run in zip(surveyed.exports, surveyed.runs, strict=True):
-        lines += [*run_lines(export, run, surveyed), ""]
+    for run in surveyed.runs:
+        lines += [*run_lines(run, surveyed), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -219,9 +213,8 @@ def channel_blocks(surveyed: Survey) -> dict[str, list[str]]:
         model = first.setdefault(kind, name) if open_still else name
         blocks[name] = _channel_lines(name, guess, "" if model == name else model)
         if name in surveyed.per_hertz and guess.unit:
-            text = (
-                f'sensitivity = "{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"   # (guess) the probes show the speed'
-            )
+            ratio = f"{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"
+            text = f'sensitivity = "{ratio}"   # (guess) the probes show the speed'
             blocks[name] = [text if line.startswith("sensitivity") else line for line in blocks[name]]
     return blocks
 
@@ -229,10 +222,7 @@ def channel_blocks(surveyed: Survey) -> dict[str, list[str]]:
 def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
     head = f"[channels.{_key(name)}]"
     if not guess.quantity or guess.quantity == "ignore":
-        return [
-            head,
-            f'quantity = "ignore"   # (guess) {guess.why}; or displacement, force, acceleration, ..',
-        ]
+        return [head, f'quantity = "ignore"   # (guess) {guess.why}; or displacement, force, acceleration, ..']
     lines = [head, f'quantity = "{guess.quantity}"   # (guess) {guess.why}']
     if guess.quantity in _DIRECTED:
         if guess.axis:
@@ -240,9 +230,8 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
         else:
             lines.append(draft_line(CHANNEL, "axis", f'"{MARK} deg"'))
     if like:
-        lines.append(
-            f"like = {_toml_string(like)}   # (guess) a sensor of the same type; or its own unit, sensitivity, .."
-        )
+        remark = "(guess) a sensor of the same type; or its own unit, sensitivity, .."
+        lines.append(f"like = {_toml_string(like)}   # {remark}")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
         if quantity_of_unit(guess.unit) == "":
@@ -256,13 +245,13 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str) -> list[str]:
     return lines
 
 
-def run_lines(export: str, run: RunGuess, surveyed: Survey) -> list[str]:
+def run_lines(run: RunGuess, surveyed: Survey) -> list[str]:
     """Lines of a run's table."""
-    stem = export.rpartition("/")[2].rpartition(".")[0]
+    stem = run.file.rpartition("/")[2].rpartition(".")[0]
     kind = f'kind = "{MARK}"   # {", ".join(KINDS)}'
     if run.kind:
         kind = f'kind = "{run.kind}"   # (guess) {run.why}'
-    lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(export)}", kind]
+    lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}", kind]
     if run.kind in ("dynamic", "locus", ""):
         if math.isfinite(run.speed):
             lines.append(_line("shaft_speed", run.speed, "Hz", run.why_speed))
@@ -271,8 +260,8 @@ def run_lines(export: str, run: RunGuess, surveyed: Survey) -> list[str]:
             lines.append(_line("shaft_speed", surveyed.speed_line, "Hz", f"most records hold this line{mains}"))
         lines.append(_line("static_load", run.load / 1e3, "kN", "by the file's name"))
     if run.kind == "dry_pivot":
-        manifest_guess = f"pad = {run.pad}   # (guess) by the file's name"
-        lines.append(manifest_guess if run.pad else draft_line(RUN, "pad", f'"{MARK}"'))
+        guess = f"pad = {run.pad}   # (guess) by the file's name"
+        lines.append(guess if run.pad else draft_line(RUN, "pad", f'"{MARK}"'))
     if run.kind != "clearance":
         lines.append(_line("static_load_direction", run.direction, "deg", "by the cells"))
     if run.kind in ("dynamic", ""):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Mapping
@@ -68,24 +69,15 @@ def usable_unit(unit: str) -> str:
 
 def quantity_of_unit(unit: str) -> str:
     """Quantity that an engineering unit belongs to; "" for volts and for nothing known."""
-    if not unit or _is_signal(unit):
-        return ""
+    with contextlib.suppress(UnitError):
+        if not unit or is_signal(unit):
+            return ""
     for quantity, dimension in DIMENSIONS.items():
-        if quantity == "time":
-            continue
-        try:
+        with contextlib.suppress(UnitError):
             unit_factor(unit, dimension)
-        except UnitError:
-            continue
-        return quantity
+            if quantity != "time":
+                return quantity
     return ""
-
-
-def _is_signal(unit: str) -> bool:
-    try:
-        return is_signal(unit)
-    except UnitError:
-        return False
 
 
 def _axis(name: str, quantity: str) -> str:
@@ -119,6 +111,7 @@ _BY_NAME = (
 class RunGuess:
     """What a record may be."""
 
+    file: str
     kind: str
     why: str
     lines: tuple[SpectralPeak, ...] = ()
@@ -148,6 +141,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     direction = _direction(forces, channels, steps=kind == "dry_pivot")
     speed, why_speed = _speed(export, channels, stem)
     return RunGuess(
+        file=export.name,
         kind=kind,
         why=reason,
         lines=lines,
@@ -210,7 +204,8 @@ def _direction(forces: list[Series], channels: Mapping[str, ChannelGuess], steps
         if steps and len(good):
             mean = float(good[-tenth:].mean() - good[:tenth].mean())
         parts.append(mean)
-    return float(round(math.degrees(math.atan2(parts[1], parts[0])))) if any(parts) else float("nan")
+    horizontal, vertical = parts
+    return float(round(math.degrees(math.atan2(vertical, horizontal)))) if any(parts) else float("nan")
 
 
 def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> tuple[str, str]:

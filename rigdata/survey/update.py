@@ -103,8 +103,8 @@ def _update_channels(blocks: list[_Block], before: Survey, after: Survey, change
 
 
 def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: list[str]) -> None:
-    old = {e: run_lines(e, r, before) for e, r in zip(before.exports, before.runs, strict=True)}
-    new = {e: run_lines(e, r, after) for e, r in zip(after.exports, after.runs, strict=True)}
+    old = {run.file: run_lines(run, before) for run in before.runs}
+    new = {run.file: run_lines(run, after) for run in after.runs}
     present = {b.name for b in blocks if b.kind == "runs"}
     for block in blocks:
         if block.kind == "runs" and block.name in new:
@@ -135,11 +135,13 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
     while lines and not lines[-1].strip():
         lines.pop()
     # a sensor is described in full or by another one of its type
-    instead = ({"unit", "sensitivity"} if any(_entry(line)[0] == "like" for line in lines) else set()) | (
-        {"like"} if any(_entry(line)[0] == "unit" for line in lines) else set()
-    )
+    present = {_entry(line)[0] for line in lines}
+    if "like" in present:
+        have |= {"unit", "sensitivity"}
+    if "unit" in present:
+        have.add("like")
     for key, (value, line) in wanted.items():
-        if key not in have | instead:
+        if key not in have:
             lines.append(line)
             changes.append(f"{place}: {key} {value} added")
     block.lines = lines

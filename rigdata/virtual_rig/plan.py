@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, radians
 from typing import Literal
 
@@ -116,12 +116,8 @@ class RigPlan:
     @classmethod
     def short(cls) -> RigPlan:
         """Three loads at 25 Hz, ten locus directions, five dry tests, one sweep: a campaign for a demo."""
-        return cls(
-            dynamic=operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)]),
-            locus=locus_points(10),
-            dry=tuple(DryTest(pad) for pad in range(1, 6)),
-            clearance=(ClearanceSweep(),),
-        )
+        dynamic = operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)])
+        return replace(cls.like_paper(), dynamic=dynamic, locus=locus_points(10))
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""

@@ -13,7 +13,7 @@ import pytest
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
-from rigdata.rows import VectorRows
+from rigdata.record import VectorRows
 from rigdata.run import Run
 from tpjb_ident.dynamic.records import extraction
 from tpjb_ident.dynamic.records.extraction import MAX_JITTER, extract

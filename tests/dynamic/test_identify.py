@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.rows import VectorRows
+from rigdata.record import VectorRows
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
 from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.identify import identify

@@ -348,5 +348,5 @@ def test_unreadable_file(tmp_path, monkeypatch):
     def no_rights(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("rigdata.readers.text.csv_table.open_numbers", no_rights)
+    monkeypatch.setattr("rigdata.readers.text.csv.open_numbers", no_rights)
     refused(run, "Permission denied")

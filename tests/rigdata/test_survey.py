@@ -48,11 +48,11 @@ def found(exports):
 
 
 def test_kinds_and_set_points_are_guessed_right(found):
-    kinds = dict(zip((e.rpartition("/")[2][0] for e in found.exports), (r.kind for r in found.runs), strict=True))
+    by_name = {run.file.rpartition("/")[2]: run for run in found.runs}
+    kinds = {name[0]: run.kind for name, run in by_name.items()}
     assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
     assert found.clock == "Zeit"
     assert found.speed_line == pytest.approx(22.0, abs=0.3)
-    by_name = {e.rpartition("/")[2]: r for e, r in zip(found.exports, found.runs, strict=True)}
     for name, load, line in (("d-02500-25-01.csv", 2500.0, 25.0), ("d-05000-40-02.csv", 5000.0, 40.0)):
         assert by_name[name].load == load
         assert by_name[name].lines[0].frequency == pytest.approx(line, abs=0.2)

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from rigdata.record import Record, VectorRecord
-from rigdata.rows import RowReader, VectorRows
+from rigdata.record import Record, RowReader, VectorRecord, VectorRows
 
 RATE, SECONDS = 10_000.0, 60.0
 POINT = OperatingPoint(5000.0, -np.pi / 2, 2 * np.pi * 22, 2 * np.pi * 25)

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.series import Series, is_time, seconds
-from rigdata.readers.text.csv_table import Source, read_table
+from rigdata.readers.text.csv import Source, read_table
 from rigdata.readers.text.head import find_head, without_unit
 
 _RATE_TEXT = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"

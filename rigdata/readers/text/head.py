@@ -143,7 +143,8 @@ class _HeadFinder:
                 if not matched:
                     continue
                 below = self.lines[number + 1 : number + 2 + _MAX_UNIT_LINES]
-                rank = (matched, any(_holds_a_number(line, delimiter) for line in below))
+                cells = itertools.chain.from_iterable(split_line(line, delimiter) for line in below)
+                rank = (matched, any(map(looks_like, cells)))
                 if rank > best_rank:
                     best, best_rank = _NamesLine(number + 1, delimiter, names, matched), rank
             if best_rank == (len(self.channels), True):
@@ -273,10 +274,6 @@ class _HeadFinder:
             text = bracket[1] if bracket else "".join(below[i : i + 1])
             units.append(text.strip().strip("[]()"))
         return tuple(units)
-
-
-def _holds_a_number(line: str, delimiter: str) -> bool:
-    return any(map(looks_like, split_line(line, delimiter)))
 
 
 def _is_row_of_numbers(cells: list[str]) -> bool:

@@ -153,9 +153,9 @@ def _show_survey(c: Command, guesses: Survey, name: str) -> None:
     channels = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in guesses.channels.items()]
     c.show(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], channels, words=range(5))
     runs = []
-    for export, rate, run in zip(guesses.exports[:MOST_RECORDS], guesses.rates, guesses.runs, strict=False):
+    for rate, run in zip(guesses.rates, guesses.runs[:MOST_RECORDS], strict=False):
         lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3]) or "-"
-        runs.append([export, run.kind or "?", f"{rate:g}" if rate > 0 else "?", lines, run.why])
+        runs.append([run.file, run.kind or "?", f"{rate:g}" if rate > 0 else "?", lines, run.why])
     c.show(f"{name}: records, guessed", ["file", "kind", "rate Hz", "lines Hz", "why"], runs, words=(0, 1, 3, 4))
-    if len(guesses.exports) > len(runs):
-        c.print(f"... and {len(guesses.exports) - len(runs)} more records")
+    if len(guesses.runs) > len(runs):
+        c.print(f"... and {len(guesses.runs) - len(runs)} more records")

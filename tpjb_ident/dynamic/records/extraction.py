@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import FloatArray, IntArray
-from rigdata.rows import RowReader
+from rigdata.record import RowReader
 from tpjb_ident.dynamic.records.lines import LineSet
 from tpjb_ident.dynamic.records.phasors import SCALE_LIMIT, LineFitter, PhasorBlock, fit_uneven, usual_scale
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors

@@ -17,8 +17,7 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
-from rigdata.record import Record, VectorRecord
-from rigdata.rows import RowReader, VectorRows
+from rigdata.record import Record, RowReader, VectorRecord, VectorRows
 from rigdata.run import Run
 from tpjb_ident.dynamic.records.run_data import MeasuredRun
 

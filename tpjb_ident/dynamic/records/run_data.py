@@ -12,8 +12,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from rigdata.record import Record, VectorRecord
-from rigdata.rows import RowReader
+from rigdata.record import Record, RowReader, VectorRecord
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.lines import LineSet, LineSettings
 from tpjb_ident.dynamic.records.phasors import PhasorBlock
