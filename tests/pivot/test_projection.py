@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tpjb_ident.pivot.blocks import pad_axes
+from tests.pivot.test_assemble import on_pad, vectors
 from tpjb_ident.pivot.dry_record import PadDirection, displacement_direction, load_direction
 
 LOADS = np.linspace(100.0, 3000.0, 24)
@@ -16,21 +16,11 @@ HOLDS = np.repeat(np.arange(8), 3)
 
 
 def blocks(load, displacement, hold=HOLDS, angle=0.0):
-    """Loads and displacements (n, 2) on the axes of a pad."""
-    count = len(load)
-    (along, across), (deflection, aside) = (pad_axes(angle) @ vector.T for vector in (load, displacement))
-    return SimpleNamespace(
-        load=along, across_load=across, deflection=deflection, across=aside, hold=hold, time=0.1 * np.arange(count),
-        duration=np.full(count, 0.1),
-    )  # fmt: skip
+    return on_pad(angle, load, displacement, hold, np.ones(len(load)))
 
 
 def white(scale):
     return SimpleNamespace(covariance=lambda time, duration: scale**2 * np.eye(len(time)))
-
-
-def vectors(angle, size):
-    return np.outer(size, [math.cos(angle), math.sin(angle)])
 
 
 @pytest.mark.parametrize("off", [-0.5, -0.03, 0.0, 0.02, 0.4])

@@ -43,6 +43,11 @@ X, Y = 3e-6, -5e-6
 AXES = np.radians([45.0, 115.0])
 
 
+@pytest.fixture
+def campaign(tmp_path):
+    return rigdata.load_campaign(write(tmp_path))
+
+
 def write(folder: Path, manifest: str = MANIFEST, rows: int = 50) -> Path:
     (folder / "runs").mkdir(parents=True, exist_ok=True)
     (folder / "campaign.toml").write_text(manifest, encoding="utf-8")
@@ -54,8 +59,7 @@ def write(folder: Path, manifest: str = MANIFEST, rows: int = 50) -> Path:
     return folder
 
 
-def test_what_a_campaign_tells(tmp_path):
-    campaign = rigdata.load_campaign(write(tmp_path))
+def test_what_a_campaign_tells(campaign):
     assert (campaign.id, campaign.description, campaign.bearing_name) == ("rocker-A", "free text", "rocker.toml")
     assert campaign.bearing_text == 'name = "rocker"\n'
     assert campaign.housing_mass == 30.0
@@ -75,26 +79,21 @@ def test_what_a_campaign_tells(tmp_path):
         run.id = "other"
 
 
-def test_the_manifest_file_itself_can_be_given(tmp_path):
-    assert rigdata.load_campaign(write(tmp_path) / "campaign.toml").id == "rocker-A"
-
-
-def test_probes_at_any_two_angles_become_x_and_y(tmp_path):
-    vector = rigdata.load_campaign(write(tmp_path)).run("l-1").vector("displacement", 3, 8)
+def test_probes_at_any_two_angles_become_x_and_y(campaign):
+    vector = campaign.run("l-1").vector("displacement", 3, 8)
     assert vector.values == pytest.approx(np.tile([X, Y], (5, 1)), abs=1e-12)
     assert vector.names == ("X1A", "X1B")
     assert vector.rate == 100.0
 
 
-def test_speed_and_temperatures(tmp_path):
-    run = rigdata.load_campaign(write(tmp_path)).run("l-1")
+def test_speed_and_temperatures(campaign):
+    run = campaign.run("l-1")
     assert run.speed().values[0] == pytest.approx(2 * np.pi * 22)
     assert [(t.name, t.pad, t.position) for t in run.temperatures()] == [("T1", 1, 0.75), ("T2", 2, 0.75)]
     assert run.record("T1").values[0] == pytest.approx(313.15)
 
 
-def test_vectors_that_cannot_be_made(tmp_path):
-    campaign = rigdata.load_campaign(write(tmp_path))
+def test_vectors_that_cannot_be_made(campaign, tmp_path):
     with pytest.raises(RigDataError, match="has 1 channels, two are needed"):
         campaign.run("l-1").vector("force")
     with pytest.raises(RigDataError, match="has 0 channels"):
@@ -113,15 +112,13 @@ def test_fingerprint_names_every_file(tmp_path):
     assert rigdata.load_campaign(folder).fingerprint()["runs/p-1.csv"] == "missing"
 
 
-def test_a_campaign_travels_to_worker_processes(tmp_path):
-    campaign = rigdata.load_campaign(write(tmp_path))
+def test_a_campaign_travels_to_worker_processes(campaign):
     campaign.run("l-1").record("X1A")
     again = pickle.loads(pickle.dumps(campaign))
     assert np.array_equal(again.run("l-1").record("X1A").values, campaign.run("l-1").record("X1A").values)
 
 
-def test_threads_share_a_campaign(tmp_path):
-    campaign = rigdata.load_campaign(write(tmp_path))
+def test_threads_share_a_campaign(campaign):
     results: list[float] = []
     work = [
         threading.Thread(target=lambda: results.append(campaign.run("l-1").record("X1A").values[0])) for _ in range(8)
@@ -264,23 +261,17 @@ def test_messages_cannot_steer_a_terminal():
     assert "\\x1b[31m" in str(problem)
 
 
-def test_folder_without_manifest_names_the_hdf5_file_in_it(tmp_path):
-    (tmp_path / "c.h5").write_bytes(b"")
-    with pytest.raises(RigDataError, match=r"c\.h5"):
-        rigdata.load_campaign(tmp_path)
-
-
-def test_manifest_in_another_encoding_names_the_line(tmp_path):
+def test_manifests_given_as_a_file_in_another_encoding_or_left_out(tmp_path):
     folder = write(tmp_path)
+    (folder / "campaign.toml").write_bytes(MANIFEST.encode("utf-8-sig"))
+    for path in (folder, folder / "campaign.toml"):
+        assert rigdata.load_campaign(path).id == "rocker-A"
     (folder / "campaign.toml").write_bytes(MANIFEST.replace("free text", "Prüfstand").encode("cp1252"))
     with pytest.raises(RigDataError, match="line 4"):
         rigdata.load_campaign(folder)
-
-
-def test_manifest_with_byte_order_mark(tmp_path):
-    folder = write(tmp_path)
-    (folder / "campaign.toml").write_bytes(MANIFEST.encode("utf-8-sig"))
-    assert rigdata.load_campaign(folder).id == "rocker-A"
+    (folder / "campaign.toml").rename(folder / "c.h5")
+    with pytest.raises(RigDataError, match=r"c\.h5"):
+        rigdata.load_campaign(folder)
 
 
 def test_raw_data_is_not_touched(tmp_path):
