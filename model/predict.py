@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from model.bearing import Bearing
-from model.dynamics.reduction import bearing_impedance, friction_regimes
+from model.dynamics import bearing_impedance, friction_regimes
 from model.effects import Effect, apply_effects
 from model.errors import ModelError, OptionError
 from model.growth import grown
@@ -169,9 +169,8 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
     """Impedance (n, 2, 2) at the excitation frequencies, NaN without an equilibrium; how pivots with friction move."""
     if not equilibrium.converged:
         return np.full((len(lines), 2, 2), complex(math.nan, math.nan)), ()
-    return bearing_impedance(setup, equilibrium, lines), friction_regimes(
-        setup, equilibrium, lines
-    ) if setup.friction else ()
+    regimes = friction_regimes(setup, equilibrium, lines) if setup.friction else ()
+    return bearing_impedance(setup, equilibrium, lines), regimes
 
 
 def solve_as_it_runs(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from model.dynamics.reduction import PadMatrices, pad_matrices
+from model.dynamics import PadMatrices, pad_matrices
 from model.setup import Setup
 from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium
@@ -86,9 +86,13 @@ class Prediction:
     def __repr__(self) -> str:
         return f"<Prediction {self.summary()}>"
 
+    @property
+    def _frequencies(self) -> FloatArray:
+        return np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+
     def summary(self) -> str:
         """Operating point, direct coefficients in MN/m and kN s/m, position and extremes, in one line."""
-        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        lines = self._frequencies
         h = self.h.reshape(-1, 2, 2)[0]
         direct = [h[0, 0].real / 1e6, h[1, 1].real / 1e6, *(h.imag[[0, 1], [0, 1]] / (2e3 * math.pi * lines[0]))]
         more = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
@@ -100,7 +104,7 @@ class Prediction:
     def _repr_html_(self) -> str:
         """Coefficients over the excitation frequency, for a notebook."""
         names = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
-        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
+        lines = self._frequencies
         cells = np.concatenate([self.k.reshape(-1, 4) / 1e6, self.c.reshape(-1, 4) / 1e3], axis=1)
         heads = ["excitation, Hz", *(f"{n}, {'MN/m' if n[0] == 'k' else 'kN s/m'}" for n in names)]
         rows = [[f"{line:.4g}", *(f"{v:.4g}" for v in row)] for line, row in zip(lines, cells, strict=True)]
@@ -111,18 +115,16 @@ class Prediction:
         """One row per excitation frequency: point, K, C, position, conditions; SI, names as in prediction.csv."""
         import pandas as pd
 
-        lines = np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
         table: dict[str, Any] = {
             "static_load_N": self.load,
             "static_load_direction_deg": math.degrees(self.load_direction),
             "shaft_speed_Hz": self.speed / (2 * math.pi),
-            "excitation_Hz": lines,
+            "excitation_Hz": self._frequencies,
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
             columns = values.reshape(-1, 4).T
-            table.update(
-                {f"{kind}{at}_{unit}": column for at, column in zip(("xx", "xy", "yx", "yy"), columns, strict=True)}
-            )
+            for at, column in zip(("xx", "xy", "yx", "yy"), columns, strict=True):
+                table[f"{kind}{at}_{unit}"] = column
         x, y = self.position
         return pd.DataFrame(table | {"x_m": x, "y_m": y, "status": "; ".join(self.status)})
 

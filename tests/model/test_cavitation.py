@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.dynamics.reduction import bearing_impedance
+from model.dynamics import bearing_impedance
 from model.effects import Effect
 from model.film.models import film_solver
 from model.film.reynolds import solve_film

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.dynamics.reduction import mass_centre_offset, pad_matrices, reduce_pads
+from model.dynamics import mass_centre_offset, pad_matrices, reduce_pads
 from model.effects import Effect
 from model.options import Options
 from model.pivots import pivot_laws

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.dynamics.reduction import flexing_impedance
+from model.dynamics import flexing_impedance
 from model.effects import Effect
 from model.errors import OptionError
 from model.options import Options

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing
-from model.dynamics.reduction import bearing_impedance, describing, friction_impedance
+from model.dynamics import bearing_impedance, describing, friction_impedance
 from model.effects import Effect, EffectError, apply_effects, known_effects
 from model.measured_pivot import MeasuredPivot
 from model.options import Options

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from model.bearing import Bearing
-from model.dynamics.reduction import bearing_impedance
+from model.dynamics import bearing_impedance
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
 from model.film.turbulence import ACROSS, ALONG, SHEAR, excess, solve_turbulent_film

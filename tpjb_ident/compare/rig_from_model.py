@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from model.bearing import Bearing
-from model.dynamics.reduction import bearing_impedance
+from model.dynamics import bearing_impedance
 from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.predict import predict_setup

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from model.dynamics.reduction import bearing_impedance, with_structure
+from model.dynamics import bearing_impedance, with_structure
 from model.effects import Effect, apply_effects
 from model.instruments import Instruments
 from model.predict import solve_as_it_runs

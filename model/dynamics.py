@@ -27,6 +27,8 @@ from rigdata.problem import Condition
 
 #: Turns of pressure and deformation, and the share of the deformation at which they end.
 MOST_TURNS, SETTLED = 40, 1e-7
+#: Halvings of the amplitude with which a pivot with friction vibrates.
+HALVINGS = 60
 
 
 def flexing_impedance(
@@ -113,9 +115,6 @@ def _by_shape(
     return np.asarray(by_shape[:, :count] + 1j * by_shape[:, count:])
 
 
-HALVINGS = 60
-
-
 def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray:
     """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m]."""
     share = slip / (stick * np.maximum(amplitude, slip / stick))
@@ -143,9 +142,8 @@ def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: fl
     if not slip > 0.0:
         return np.zeros_like(pad_impedance)
     low = np.full(pad_impedance.shape, slip / stick)
-    held = (
-        np.abs(pad_impedance + stick) * low >= drive
-    )  # tilted as far as the contact gives, it would take more than there is
+    # tilted as far as the contact gives, it would take more than there is
+    held = np.abs(pad_impedance + stick) * low >= drive
     high = np.maximum(2.0 * low, 2.0 * drive / np.maximum(np.abs(pad_impedance), 1e-30) + 2.0 * low)
     for _ in range(HALVINGS):
         middle = np.sqrt(low * high)
@@ -233,9 +231,8 @@ def reduce_pads(
             rough = [(m, pads[k]) for m, k in enumerate(alike) if pads[k].friction[0]]
             total = total + sum(_reduce_with_friction(pad, z[m], film[m], vibration) for m, pad in rough)
             z, film = z[smooth], film[smooth]
-        total = total + (z[..., :2, :2] - z[..., :2, internal] @ np.linalg.solve(film, z[..., internal, :2])).sum(
-            axis=0
-        )
+        reduced = z[..., :2, :2] - z[..., :2, internal] @ np.linalg.solve(film, z[..., internal, :2])
+        total = total + reduced.sum(axis=0)
     return np.asarray(total, dtype=np.complex128)
 
 
@@ -247,10 +244,9 @@ def _impedances(
     z = np.array([p.stiffness for p in pads])[:, None] + 1j * s * np.array([p.damping for p in pads])[:, None]
     if more is not None:
         z = z + more
-    mass, damping, stiffness = (
-        np.array([table[inner, inner] for table in tables])[:, None]
-        for tables in zip(*((p.pad_mass, p.pad_damping, p.pad_stiffness) for p in pads), strict=True)
-    )
+    mass = np.array([p.pad_mass[inner, inner] for p in pads])[:, None]
+    damping = np.array([p.pad_damping[inner, inner] for p in pads])[:, None]
+    stiffness = np.array([p.pad_stiffness[inner, inner] for p in pads])[:, None]
     return z, z[..., internal, internal] - s**2 * mass + 1j * s * damping + stiffness
 
 
@@ -350,14 +346,9 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
         pad = pad_matrices(setup, film)
         if pad is None or not pad.friction[0]:
             continue
-        s = omega[:, None, None]
-        z = pad.stiffness + 1j * s * pad.damping
-        internal = slice(0, 1) if math.isinf(pad.pad_stiffness[1, 1]) else slice(0, 2)
-        pad_impedance = -(s**2) * pad.pad_mass + 1j * s * pad.pad_damping + pad.pad_stiffness
-        film_part = np.asarray(
-            z[:, 2:, 2:][:, internal, internal] + pad_impedance[:, internal, internal], dtype=np.complex128
-        )
-        free = np.abs(broken_loose(pad, z, film_part, setup.vibration)) < pad.friction[0]
+        internal = slice(2, 3 if math.isinf(pad.pad_stiffness[1, 1]) else 4)
+        z, film_part = _impedances([pad], omega, internal, None)
+        free = np.abs(broken_loose(pad, z[0], film_part[0], setup.vibration)) < pad.friction[0]
         (loose if free.any() else held).append(film.number)
     names = []
     if held:

@@ -1,1 +1,0 @@
-"""Dynamic coefficients: the pads' matrices and their reduction at the excitation frequency."""
