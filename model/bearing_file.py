@@ -115,7 +115,9 @@ def parse_bearing(text: str, name: str) -> Bearing:
     except ValueError as error:
         raise BearingError(f"{name}: not valid TOML: {error}. Mend that line.") from error
     sections = {key: _section(data, key, name) for key in _KEYS}
-    _check_schema(sections[""], name)
+    schema = sections[""].get("schema", "tpjb-bearing/1")
+    if schema != "tpjb-bearing/1":
+        raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
     values = {key: _read_section(section, key, name) for key, section in sections.items()}
     pads = _pads(values, name)
     pivot = values["pivot"]
@@ -152,21 +154,13 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
             raise BearingError(f"{name}: section [{key}] is missing. Add it; see the bundled rocker.toml.")
         if not isinstance(section, dict):
             raise BearingError(f"{name}, {key}: must be a table, got {section!r}. Write it as [{key}].")
-    keys = set(_KEYS[key]) | {k[len(key) + 1 if key else 0 :].split(".")[0] for k in _KEYS if _is_child(k, key)}
+    inside = f"{key}." if key else ""
+    tables = [child.removeprefix(inside) for child in _KEYS if child and child.startswith(inside)]
+    keys = set(_KEYS[key]) | {child.split(".")[0] for child in tables}
     for unknown in set(section) - keys:
         place = f"[{key}] {unknown}" if key else f"[{unknown}]" if isinstance(section[unknown], dict) else unknown
         raise BearingError(f"{name}, {place}: unknown key. {hint(unknown, sorted(keys), 'Known keys:')}")
     return section
-
-
-def _is_child(candidate: str, key: str) -> bool:
-    return bool(candidate) and (candidate.startswith(key + ".") if key else True)
-
-
-def _check_schema(top: dict[str, Any], name: str) -> None:
-    schema = top.get("schema", "tpjb-bearing/1")
-    if schema != "tpjb-bearing/1":
-        raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
 
 
 def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any]:

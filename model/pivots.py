@@ -225,7 +225,10 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
         return (law,) * n
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
-            raise BearingError(f"pivots: {str(choice)!r} is not known. {_other_choice(str(choice))}")
+            advice = hint(str(choice), NAMED_LAWS, "Use one of")
+            if not advice.startswith("Did"):
+                advice = "Use rigid, kirk, kirk-secant or a pivots.toml."
+            raise BearingError(f"pivots: {str(choice)!r} is not known. {advice}")
         return load_pivots(choice, n)
     if isinstance(choice, (int, float)) and not isinstance(choice, bool):
         if not (math.isfinite(choice) and choice > 0):
@@ -237,11 +240,6 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     if len(laws) != n or not all(isinstance(law, PivotLaw) for law in laws):
         raise BearingError(f"pivots: need one pivot law per pad ({n}), got {len(laws)} entries.")
     return laws
-
-
-def _other_choice(name: str) -> str:
-    advice = hint(name, NAMED_LAWS, "Use one of")
-    return advice if advice.startswith("Did") else "Use rigid, kirk, kirk-secant or a pivots.toml."
 
 
 def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ...]:

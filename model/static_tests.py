@@ -57,21 +57,16 @@ class PolygonSides:
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:
     """Predict a cold clearance sweep with a push load [N]."""
     inverse = np.linalg.inv(setup.instruments.displacement_map(0.0).real)
-    rows = []
+    distances, angles = [], []
     for pad, law in zip(setup.bearing.pads, setup.pivots, strict=True):
         towards = np.array([math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)])
         normal = inverse.T @ towards
         size = float(np.hypot(*normal))
         deflection = law.deflection(push_load) + float(towards @ setup.structure @ towards) * push_load
-        rows.append(
-            (
-                pad.assembled_clearance / size,
-                (pad.assembled_clearance + deflection) / size,
-                math.atan2(normal[1], normal[0]),
-            )
-        )
-    table = np.array(rows)
-    return PolygonSides(table[:, 0], table[:, 1], table[:, 2])
+        distances.append((pad.assembled_clearance / size, (pad.assembled_clearance + deflection) / size))
+        angles.append(math.atan2(normal[1], normal[0]))
+    clearance, pushed = np.array(distances).T
+    return PolygonSides(clearance, pushed, np.array(angles))
 
 
 def sweep(

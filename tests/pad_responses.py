@@ -64,7 +64,7 @@ class PadResponse(PadSolid):
         mesh = sector_mesh(self.geometry, self.density)
         along, across = (Line(line.breaks, 1).tabulate(line.nodes) for line in (mesh.theta, mesh.z))
         face = np.asarray(along @ coarse @ across.T).reshape(-1, 1)
-        return mesh, conduct(mesh, self.geometry.back_convection, face).temperature[..., 0]
+        return mesh, conduct(mesh, self.geometry.back_convection, face)[0][..., 0]
 
     def _on_grid(self, values: ArrayLike) -> FloatArray:
         return np.asarray(values, dtype=float).reshape(self.film_theta.size, self.film_z.size)

@@ -43,14 +43,9 @@ def resting_film(
     entering, exponent = float(oil.viscosity(inlet)), oil.viscosity_exponent
     rise = entering * along if exponent == 0.0 else np.log1p(exponent * entering * along) / exponent
     viscosity = oil.viscosity(inlet + rise)
-    length = film_length(grid)
+    length = float(grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)  # the grid may hold one half
     shear = viscosity * surface_speed**2 / thickness * share
     power = float((0.5 * (shear[1:] + shear[:-1])).sum()) * grid.dx * length
     flow = 0.5 * density * surface_speed * float(thickness[0]) * length
     reynolds = float((oil.density(inlet + rise) * surface_speed * thickness / viscosity).max())
     return RestingFilm(power, flow, inlet + float(rise[-1]), reynolds)
-
-
-def film_length(grid: FilmGrid) -> float:
-    """Axial length of a film [m]; its grid may hold one half of it."""
-    return float(grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -102,15 +103,13 @@ class ElasticSector:
         mesh = self.mesh
         n_r, n_z = mesh.r.n_nodes, mesh.z.n_nodes
         lame, shear = self._lame()
-        out = {(a, b): np.zeros((3, n_r * n_z, 3, n_r * n_z)) for a in (0, 1) for b in (0, 1)}
-        pairs = [
-            (a, b, lame + (2.0 * shear if i == j else 0.0))
-            for i, strain_i in enumerate(_NORMAL)
-            for j, strain_j in enumerate(_NORMAL)
-            for a in strain_i
-            for b in strain_j
-        ]
-        pairs += [(a, b, shear) for strain in _SHEAR for a in strain for b in strain]
+        out = {orders: np.zeros((3, n_r * n_z, 3, n_r * n_z)) for orders in product((0, 1), (0, 1))}
+        pairs = []
+        for strain_i, strain_j in product(_NORMAL, _NORMAL):
+            modulus = lame + 2.0 * shear if strain_i is strain_j else lame
+            pairs += [(a, b, modulus) for a, b in product(strain_i, strain_j)]
+        for strain in _SHEAR:
+            pairs += [(a, b, shear) for a, b in product(strain, strain)]
         radius = mesh.r.gauss[0]
         for a, b, modulus in pairs:
             weight = a.sign * b.sign * modulus * radius ** (1 - a.inverse_r - b.inverse_r)
@@ -180,25 +179,15 @@ class ElasticSector:
             yield flat
 
 
-@dataclass(frozen=True, eq=False)
-class HeatSolution:
-    """What temperatures of the film face do to the half pad."""
-
-    #: (n_theta, n_r, n_z, n_columns): Temperature rise at the nodes [K], one field for every given one.
-    temperature: FloatArray
-    #: (n_surface, n_columns): Heat that enters the pad at the nodes of the film face, weighted by their basis
-    #: functions [W].
-    heat: FloatArray
-
-
-def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> HeatSolution:
+def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = True) -> tuple[FloatArray, FloatArray]:
     """Solve the conduction problem for many temperature fields of the film face at once.
 
     The film face takes the film's temperature (the film is adiabatic towards it in the baseline, so it has one); every
     other face loses heat to oil at the supply temperature through the film coefficient `back_convection`. All
     temperatures are rises above supply.
 
-    `face` (n_surface, n_columns) [K].
+    `face` (n_surface, n_columns) [K]; gives the temperature rise at the nodes (n_theta, n_r, n_z, n_columns) [K], and
+    the heat that enters at the nodes of the film face, weighted by their basis functions, (n_surface, n_columns) [W].
     """
     theta, n_r, n_z = mesh.theta, mesh.r.n_nodes, mesh.z.n_nodes
     at_face = np.arange(n_r * n_z) < n_z
@@ -231,7 +220,7 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
                 heat[j] += block @ field[i]
     if not even:
         heat[:, 0] = 0.0
-    return HeatSolution(field.reshape(theta.n_nodes, n_r, n_z, -1), heat.reshape(mesh.n_surface, -1))
+    return field.reshape(theta.n_nodes, n_r, n_z, -1), heat.reshape(mesh.n_surface, -1)
 
 
 def _conduction_rows(mesh: SectorMesh, convection: float) -> Iterator[BlockRow]:
@@ -327,9 +316,8 @@ def _solve(
     shape = (theta.n_nodes, mesh.r.n_nodes, z.n_nodes, len(convections), n_temperatures)
     field, flux = np.empty(shape), np.empty((len(convections), mesh.n_surface, n_temperatures))
     for k, convection in enumerate(convections):
-        solution = conduct(mesh, convection, spread, even)
-        field[:, :, :, k] = solution.temperature
-        flux[k] = _flux(mesh, solution.heat) / geometry.inner_radius
+        field[:, :, :, k], heat = conduct(mesh, convection, spread, even)
+        flux[k] = _flux(mesh, heat) / geometry.inner_radius
     body = ElasticSector.held_at(mesh, mesh.held(geometry.face), even)
     compliance, expansion = body.surface_response(field.reshape(*shape[:3], -1))
     return {
