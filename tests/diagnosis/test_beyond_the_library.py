@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import json
-import math
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from model.bearing_file import load_bearing
 from model.effects import Effect, known_effects, load_effects
-from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from model.setup import Mesh
+from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.observations.observe import Layout
-from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
-BEARING = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
-HZ = 2 * math.pi
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "probe_rotation", *TERMS}
 SETTINGS = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)
+OTHER_LOADS = (2500.0, 3750.0, 7500.0, 8750.0)
 ROTATED = Effect("probe_rotation", angle=0.12)
 CROSS = Effect("parallel_stiffness", xx=0.0, xy=8e6, yx=-8e6, yy=0.0)
 
@@ -33,28 +27,23 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def setup():
-    bearing = load_bearing(BEARING)
-    return Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(40, 4))
+    return rocker_setup(Mesh(40, 4))
 
 
 @pytest.fixture(scope="module")
 def planned(setup):
-    sweep = dynamic([5000.0], [HZ * f for f in (15.0, 25.0, 35.0, 45.0)], HZ * 22, -math.pi / 2, 5)
-    loads = dynamic([2500.0, 3750.0, 7500.0, 8750.0], [HZ * 25.0], HZ * 22, -math.pi / 2, 5)
-    layout = Layout((*sweep, *loads), around(5000.0, 5, HZ * 22), dry(range(1, 6)), 200.0)
-    return planned_observations(setup, layout)
+    return planned_observations(setup, whole_layout(OTHER_LOADS))
 
 
-def measured(planned, value, seed=11):
-    noise = np.sqrt(np.diag(planned.covariance)) * np.random.default_rng(seed).standard_normal(len(planned))
-    return replace(planned, value=value + noise)
+def told_of(planned, value, setup):
+    return json.loads(diagnose(noisy(planned, value, 11), setup, SETTINGS).verdict.to_json())
 
 
 @pytest.fixture(scope="module")
 def mixed(setup, planned):
     """Probes that stand askew, and a cross-coupled stiffness that no effect of the library makes."""
     forward = Forward(setup, planned.layout, planned.elements)
-    return diagnose(measured(planned, forward((ROTATED, CROSS))), setup, SETTINGS).verdict
+    return diagnose(noisy(planned, forward((ROTATED, CROSS)), 11), setup, SETTINGS).verdict
 
 
 def test_an_effect_beside_something_unknown_is_partly_explained(mixed):
@@ -88,26 +77,23 @@ def test_the_effects_file_holds_the_effects_and_the_other_one_the_terms_too(mixe
 def test_growth_that_follows_the_load_is_told_as_a_drift(setup, planned):
     forward = Forward(setup, planned.layout, planned.elements)
     value = forward((Effect("thermal_growth", clearance_change=10e-6 * 5000.0 / 8750.0),))
-    for load in (2500.0, 3750.0, 7500.0, 8750.0):
+    for load in OTHER_LOADS:
         mine = np.array([e.family in {"h", "temperature"} and e.place("load") == load for e in planned.elements])
         grown = forward((Effect("thermal_growth", clearance_change=10e-6 * load / 8750.0),))
         value = np.where(mine, grown, value)
-    told = json.loads(diagnose(measured(planned, value), setup, SETTINGS).verdict.to_json())
+    told = told_of(planned, value, setup)
     assert told["verdict"] in {"partly-explained", "unexplained"}
     (drift,) = told["drift"]
     assert set(drift) == {"effect", "parameter", "over", "from", "to", "words"}
-    assert (drift["effect"], drift["parameter"], drift["over"]) == (
-        "thermal_growth",
-        "clearance_change",
-        "static_load",
-    )
+    named = (drift["effect"], drift["parameter"], drift["over"])
+    assert named == ("thermal_growth", "clearance_change", "static_load")
     assert drift["to"] > 2.0 * drift["from"] > 0.0
 
 
 def test_a_pad_that_stands_off_and_is_no_effect_is_told_by_its_clearance(setup, planned):
     forward = Forward(setup, planned.layout, planned.elements)
     value = forward((Effect("pad_offset", pad=3, radial_offset=-20e-6),))
-    told = json.loads(diagnose(measured(planned, value), setup, SETTINGS).verdict.to_json())
+    told = told_of(planned, value, setup)
     assert told["verdict"] in {"partly-explained", "unexplained"}
     pads = [one for one in told["behaves_like"] if one["kind"] == "clearance by pad"]
     assert any("pad #3" in one["words"] for one in pads)

@@ -1,20 +1,14 @@
 """What one amplitude does over its whole range, and fits that start far from the answer."""
 
-import math
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from model.bearing_file import load_bearing
 from model.effects import Effect
-from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from model.setup import Mesh
+from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.diagnose import pose
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.observations.observe import Layout
-from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.diagnosis.search.amplitude_path import path_through
 from tpjb_ident.diagnosis.search.fit import InitialFit
 from tpjb_ident.diagnosis.search.minimise import fit
@@ -22,7 +16,6 @@ from tpjb_ident.diagnosis.search.search import baseline_fit
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
-SPEED = 2 * math.pi * 22
 
 
 def path(function):
@@ -77,16 +70,12 @@ def test_neutral_slope_is_a_parabolas():
 @pytest.mark.parametrize("start", [1e-6, 5e-6, 1.9e-5])
 def test_a_fit_finds_its_way_past_pads_that_come_out_of_contact(start):
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
-    bearing = load_bearing(Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml")
-    setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(48, 4), accuracy=1e-5)
-    loads = dynamic(np.arange(2500.0, 8751.0, 1250.0), [2 * math.pi * 25], SPEED, -math.pi / 2, 5)
-    lines = dynamic([5000.0], [2 * math.pi * f for f in (10.0, 20.0, 30.0, 40.0, 50.0)], SPEED, -math.pi / 2, 5)
-    layout = Layout((*loads, *lines), around(5000.0, 5, SPEED), dry(range(1, 6)), 200.0)
+    setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
+    layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0))
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)
     hidden = forward.fresh()([Effect("thermal_growth", clearance_change=1.1e-5)])
-    noise = np.sqrt(np.diag(planned.covariance)) * np.random.default_rng(7).standard_normal(len(planned))
-    problem = pose(replace(planned, value=hidden + noise), forward, DiagnoseSettings(workers=1))
+    problem = pose(noisy(planned, hidden, 7), forward, DiagnoseSettings(workers=1))
     growth = next(c for c in problem.pool if c.name == "thermal_growth")
     nothing = baseline_fit(problem)
     slope = (forward.fresh()([growth.effect(1e-7)]) - problem.base) / 1e-7

@@ -1,36 +1,28 @@
 """Tests that could follow: the other sense of rotation, hot polygon, hotter oil, and trials of next tests."""
 
-import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from model.bearing_file import load_bearing
 from model.effects import Effect
-from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from tests.diagnosis.rocker_case import LINE, SPEED, points, rocker_setup
 from tpjb_ident.diagnosis.next_test import Design, designs, mirrored, reversible
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.planned import dynamic
 
-BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
-SPEED = 2 * math.pi * 22
-LINE = 2 * math.pi * 25
 #: Without thermometers thin oil and warm oil are alike.
 ALIKE = ("oil_viscosity", "supply_temperature")
 
 
 @pytest.fixture(scope="module")
 def setup():
-    bearing = load_bearing(BEARINGS / "rocker.toml")
-    return Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(24, 4), accuracy=1e-5)
+    return rocker_setup(accuracy=1e-5)
 
 
 @pytest.fixture(scope="module")
 def found(setup):
-    return designs(setup, Layout(dynamic([3000.0, 5000.0, 7000.0], [LINE], SPEED, -math.pi / 2, 5)))
+    return designs(setup, Layout(points([3000.0, 5000.0, 7000.0], 5)))
 
 
 def by_words(found, words):
@@ -53,7 +45,7 @@ def test_a_mirror_seen_in_a_mirror_is_the_thing_itself(setup):
 
 def test_the_other_sense_of_rotation_swaps_what_is_left_and_right(setup, found):
     reverse = by_words(found, "turning the other way")
-    straight = Design("as it was", Layout(dynamic([3000.0, 5000.0, 7000.0], [LINE], SPEED, -math.pi / 2, 0)))
+    straight = Design("as it was", Layout(points([3000.0, 5000.0, 7000.0])))
     names = [e.observable for e in reverse.planned(setup).elements]
     h = np.array([n[0] in "kc" for n in names])
     five = predicted(reverse, setup, Effect("soft_pivot", pad=5, stiffness_factor=0.5))[h]

@@ -1,15 +1,13 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from model.bearing_file import load_bearing
 from model.effects import Effect, known_effects, load_effects
-from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from model.setup import Mesh
+from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
@@ -19,14 +17,11 @@ from tpjb_ident.diagnosis.observations.folds import folds, held_out
 from tpjb_ident.diagnosis.observations.gap import gap, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
-from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
+from tpjb_ident.diagnosis.planned import dynamic, planned_observations
 from tpjb_ident.diagnosis.search.selection import Selection
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.remainder import localise
 
-BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
-SPEED = 2 * math.pi * 22
-MESH = Mesh(40, 4)
 #: A part of the library, so that a test takes seconds.
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "oil_viscosity", "probe_gain", "channel_delay"}
 
@@ -38,16 +33,12 @@ def few() -> DiagnoseSettings:
 
 @pytest.fixture(scope="module")
 def setup():
-    bearing = load_bearing(BEARINGS / "rocker.toml")
-    return Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH)
+    return rocker_setup(Mesh(40, 4))
 
 
 @pytest.fixture(scope="module")
 def layout():
-    lines = [2 * math.pi * f for f in (15.0, 25.0, 35.0, 45.0)]
-    sweep = dynamic([5000.0], lines, SPEED, -math.pi / 2, 5)
-    loads = dynamic([2500.0, 7500.0, 8750.0], lines[1:2], SPEED, -math.pi / 2, 5)
-    return Layout((*sweep, *loads), around(5000.0, 5, SPEED), dry(range(1, 6)), 200.0)
+    return whole_layout((2500.0, 7500.0, 8750.0))
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +48,8 @@ def observations(setup, layout):
 
 def campaign(observations, setup, effects, seed):
     """A noisy campaign with hidden effects, from a film mesh of its own."""
-    rng = np.random.default_rng(seed)
     finer = Forward(setup.change(mesh=Mesh(48, 4)), observations.layout, observations.elements)
-    noise = np.sqrt(np.diag(observations.covariance)) * rng.standard_normal(len(observations))
-    return replace(observations, value=finer(effects) + noise)
+    return noisy(observations, finer(effects), seed)
 
 
 def test_candidates_spell_out_pads_and_directions(setup):

@@ -1,14 +1,11 @@
 """Next tests: checks of single parameters, effects that a test does not see, two tests together."""
 
 import math
-from pathlib import Path
 
 import pytest
 
-from model.bearing_file import load_bearing
 from model.effects import Effect, kind_of
-from model.pivots import pivot_laws
-from model.setup import Mesh, Setup
+from tests.diagnosis.rocker_case import SPEED, rocker_setup
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.next_test import (
     CHECKS,
@@ -27,14 +24,10 @@ from tpjb_ident.diagnosis.next_test import (
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.planned import dynamic
 
-BEARINGS = Path(__file__).parents[2] / "model" / "bearings"
-SPEED = 2 * math.pi * 22
-
 
 @pytest.fixture(scope="module")
 def setup():
-    bearing = load_bearing(BEARINGS / "rocker.toml")
-    return Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(24, 4))
+    return rocker_setup()
 
 
 def by_effect(name):

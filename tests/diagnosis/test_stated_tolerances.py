@@ -1,19 +1,15 @@
 """What may be off is stated: in the bearing file, on the command line, by default; each with its source."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from model.bearing_file import load_bearing
-from model.pivots import pivot_laws
-from model.setup import Setup
+from tests.diagnosis.rocker_case import ROCKER, rocker_setup
 from tpjb_ident.diagnosis.forward.nuisance import Shift, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
 from tpjb_ident.errors import BadInputError
-
-ROCKER = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
 
 
 def bearing_with(lines: str):
@@ -38,16 +34,15 @@ def test_a_tolerance_that_cannot_be_is_refused(name, value, said):
 
 
 def test_a_tolerance_of_nothing_leaves_its_nuisance_out():
-    bearing = load_bearing(ROCKER)
-    setup = Setup(bearing, pivot_laws("kirk", bearing))
+    setup = rocker_setup()
     some = {n.name for n in nuisances((), setup, Tolerances())}
     less = {n.name for n in nuisances((), setup, Tolerances().states({"film_heat": 0.0}, "command line"))}
     assert some - less == {"film_heat"}
 
 
 def test_nuisances_change_what_they_say():
-    bearing = load_bearing(ROCKER)
-    setup = Setup(bearing, pivot_laws("kirk", bearing))
+    setup = rocker_setup()
+    bearing = setup.bearing
     known = nuisances((), setup, Tolerances())
     size = tuple(
         2.0 if n.name in {"viscosity", "clearance_scatter"} and n.place in {"", "pad 3"} else 0.0 for n in known

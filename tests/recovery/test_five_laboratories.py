@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from rigdata.campaign import load_campaign
-from tests.good_campaigns import rocker_rig, written
+from tests.good_campaigns import rocker_rig
 from tests.rigs.laboratories import LABORATORIES, MOST_LINES, through
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    return load_campaign(written(tmp_path_factory.mktemp("laboratories") / "campaign.h5", rocker_rig(3)))
+def campaign(campaign_of):
+    return load_campaign(campaign_of(rocker_rig(3)))
 
 
 @pytest.mark.parametrize("laboratory", LABORATORIES, ids=lambda one: one.write.__name__)

@@ -6,25 +6,28 @@ import pytest
 
 from rigdata.problem import Problem
 from rigdata.virtual_rig import Fault, Noise
-from tests.good_campaigns import RUN, stiff_rig, written
+from tests.good_campaigns import RUN, stiff_rig
 from tpjb_ident.check.campaign import check_campaign
 
 pytestmark = pytest.mark.slow
 
 
-def check(folder, *faults: Fault, seed: int = 1, noise: Noise | None = None, layout: str = "hdf5") -> list[Problem]:
-    path = written(folder / ("c.h5" if layout == "hdf5" else "c"), stiff_rig(seed, *faults, noise=noise), layout)
-    return check_campaign(path)
+@pytest.fixture
+def check(campaign_of):
+    def problems(*faults: Fault, seed: int = 1, noise: Noise | None = None, layout: str = "hdf5") -> list[Problem]:
+        return check_campaign(campaign_of(stiff_rig(seed, *faults, noise=noise), layout))
+
+    return problems
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_good_campaigns_raise_no_alarm(tmp_path, seed):
-    assert check(tmp_path, seed=seed) == []
+def test_good_campaigns_raise_no_alarm(check, seed):
+    assert check(seed=seed) == []
 
 
 @pytest.mark.parametrize("factor", [0.3, 3.0])
-def test_quiet_and_noisy_campaigns_raise_no_alarm(tmp_path, factor):
-    found = check(tmp_path, noise=Noise.like_samples().scaled(factor))
+def test_quiet_and_noisy_campaigns_raise_no_alarm(check, factor):
+    found = check(noise=Noise.like_samples().scaled(factor))
     assert [p for p in found if p.severity != "note"] == []
 
 
@@ -99,9 +102,9 @@ ONE_RUN = {
 
 
 @pytest.mark.parametrize("name", ONE_RUN)
-def test_fault_in_one_run(tmp_path, name):
+def test_fault_in_one_run(check, name):
     fault, severity, place, says = ONE_RUN[name]
-    found = check(tmp_path, fault)
+    found = check(fault)
     hits = [p for p in found if p.severity == severity and p.place.startswith(place) and says in p.what]
     assert [p.run for p in hits] == [fault.run], [str(p) for p in found]
     # Nothing is said of other runs.
@@ -109,8 +112,8 @@ def test_fault_in_one_run(tmp_path, name):
 
 
 @pytest.mark.parametrize(("run", "named"), [("p-2-up", 3), ("p-4-up", 1), ("p-1-up", 5)])
-def test_a_wrong_pad_number_is_named_at_its_run(tmp_path, run, named):
-    found = check(tmp_path, Fault("wrong_pad", run, value=float(named)))
+def test_a_wrong_pad_number_is_named_at_its_run(check, run, named):
+    found = check(Fault("wrong_pad", run, value=float(named)))
     assert [(p.run, p.severity, p.place) for p in found] == [(run, "error", "pad")], [str(p) for p in found]
     assert f"it is pad {run[2]}" in found[0].what
 
@@ -131,16 +134,16 @@ ALL_RUNS = {
 
 
 @pytest.mark.parametrize("name", ALL_RUNS)
-def test_fault_in_all_runs_is_told_once_for_the_campaign(tmp_path, name):
+def test_fault_in_all_runs_is_told_once_for_the_campaign(check, name):
     fault, says = ALL_RUNS[name]
-    found = check(tmp_path, fault)
+    found = check(fault)
     assert any(p.run is None and says in p.what for p in found), [str(p) for p in found]
 
 
 CSV_ONLY = {
     "time gap": (Fault("time_gap", RUN, start=0.5, length=0.2), "warning", "about 200 samples lost"),
     "jitter": (Fault("time_jitter", RUN), "warning", "jitters"),
-    "column twice": (Fault("duplicate_column", RUN, "X1A"), "error", "'X1A' stands in columns 2, 14"),
+    "column twice": (Fault("duplicate_column", RUN, "X1A"), "error", "'X1A' is in columns 2, 14"),
     "last line cut": (Fault("truncated_line", RUN), "warning", "cut off"),
     "file missing": (Fault("missing_file", RUN), "error", "not there"),
     "file empty": (Fault("empty_file", RUN), "error", "no samples"),
@@ -148,8 +151,8 @@ CSV_ONLY = {
 
 
 @pytest.mark.parametrize("name", CSV_ONLY)
-def test_fault_in_a_csv_file(tmp_path, name):
+def test_fault_in_a_csv_file(check, name):
     fault, severity, says = CSV_ONLY[name]
-    found = check(tmp_path, fault, layout="csv-german")
+    found = check(fault, layout="csv-german")
     assert [p.run for p in found if p.severity == severity and says in p.what] == [RUN], [str(p) for p in found]
     assert {p.run for p in found} == {RUN}

@@ -11,7 +11,7 @@ import rigdata
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise
 from rigdata.virtual_rig.truth import load_vector
-from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
+from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
@@ -29,11 +29,11 @@ def found(path) -> list[tuple[str | None, str]]:
     ("channel", "gain", "least"),
     [("X1A", 1.03, 3), ("X1A", 1.05, 3), ("X1B", 0.95, 2), ("L1H", 1.05, 3), ("L1V", 0.97, 3)],
 )
-def test_small_gains_are_named_at_their_run_and_channel(tmp_path, channel, gain, least):
+def test_small_gains_are_named_at_their_run_and_channel(campaign_of, channel, gain, least):
     places = []
     for seed in (71, 72, 73):
         fault = Fault("scaled", RUN, channel, value=gain)
-        path = written(tmp_path / f"{seed}.h5", stiff_rig(seed, fault, plan=SHORT))
+        path = campaign_of(stiff_rig(seed, fault, plan=SHORT))
         told = check_campaign(path)
         assert {p.run for p in told} <= {RUN}
         places += [p for p in told if p.place == f"channel {channel}" or f"{channel} read" in p.what]
@@ -42,7 +42,7 @@ def test_small_gains_are_named_at_their_run_and_channel(tmp_path, channel, gain,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(81, 85))
-def test_runs_that_each_have_a_temperature_of_their_own_are_not_blamed(tmp_path, seed):
+def test_runs_that_each_have_a_temperature_of_their_own_are_not_blamed(campaign_of, seed):
     """Stiffness scatters by 1 %, damping by 2 %, positions by 0.5 um from run to run."""
 
     def warm(point: OperatingPoint) -> float:
@@ -56,16 +56,16 @@ def test_runs_that_each_have_a_temperature_of_their_own_are_not_blamed(tmp_path,
         return np.linalg.solve(STIFFNESS, load_vector(point)) + 0.5e-6 * warm(point) * np.array([0.6, 0.8])
 
     plan = replace(SHORT, directions=directions((4, 6, 8)[seed % 3]))
-    assert found(written(tmp_path / "c.h5", stiff_rig(seed, plan=plan, stiffness=stiffness, position=position))) == []
+    assert found(campaign_of(stiff_rig(seed, plan=plan, stiffness=stiffness, position=position))) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "says"), [(None, None), (("X1A", 1.05), "X1A reads 5"), (("L1V", 0.95), "L1V reads")]
 )
-def test_identify_names_the_run_and_the_channel(tmp_path, fault, says):
+def test_identify_names_the_run_and_the_channel(campaign_of, fault, says):
     faults = () if fault is None else (Fault("scaled", RUN, fault[0], value=fault[1]),)
-    path = written(tmp_path / "c.h5", stiff_rig(4, *faults, plan=SHORT))
+    path = campaign_of(stiff_rig(4, *faults, plan=SHORT))
     (point,) = identify(rigdata.load_campaign(path), IdentifySettings(methods=())).points
     told = [c.detail for c in point.quality if c == "run-gain-off"]
     if says is None:
@@ -74,8 +74,8 @@ def test_identify_names_the_run_and_the_channel(tmp_path, fault, says):
         assert [f"{RUN}: {says}" in text for text in told] == [True]
 
 
-def test_identify_says_nothing_of_gains_where_channels_are_not_in_pairs(tmp_path):
-    path = written(tmp_path / "c.h5", stiff_rig(4, Fault("scaled", RUN, "X1A", value=1.05), plan=SHORT))
+def test_identify_says_nothing_of_gains_where_channels_are_not_in_pairs(campaign_of):
+    path = campaign_of(stiff_rig(4, Fault("scaled", RUN, "X1A", value=1.05), plan=SHORT))
     campaign = rigdata.load_campaign(path)
     channels = {n: replace(c, axis=0.1) if n == "L1H" else c for n, c in campaign.channels.items()}
     from tpjb_ident.dynamic.results.gains import channel_pairs

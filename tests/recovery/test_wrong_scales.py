@@ -11,7 +11,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault
 from tests.command_line import tpjb
-from tests.good_campaigns import SMALL_PLAN, rocker_rig, written
+from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.clearance.measure import measure_run
 from tpjb_ident.clearance.polygon import gain_ratio
 from tpjb_ident.dynamic.identify import identify
@@ -26,8 +26,9 @@ def gain(channel, value):
     return Fault("scaled", "*", channel, value=value)
 
 
-def campaign(tmp_path, *faults, plan=SMALL_PLAN, seed=3):
-    return load_campaign(written(tmp_path / "c.h5", rocker_rig(seed, *faults, plan=plan)))
+@pytest.fixture
+def campaign(campaign_of):
+    return lambda *faults, plan=SMALL_PLAN: load_campaign(campaign_of(rocker_rig(3, *faults, plan=plan)))
 
 
 @pytest.mark.slow
@@ -41,17 +42,17 @@ def campaign(tmp_path, *faults, plan=SMALL_PLAN, seed=3):
         ((gain("X1*", 7.0),), False, "would move the shaft by more than"),
     ],
 )
-def test_probes_ten_times_off_make_every_point_doubtful(tmp_path, faults, sweep, says):
+def test_probes_ten_times_off_make_every_point_doubtful(campaign, faults, sweep, says):
     plan = SMALL_PLAN if sweep else replace(SMALL_PLAN, clearance=())
-    source = campaign(tmp_path, *faults, plan=replace(plan, dry=(), locus=()))
+    source = campaign(*faults, plan=replace(plan, dry=(), locus=()))
     found = identify(source, IdentifySettings(methods=(), method="ols", clearance=CLEARANCE))
     (told,) = (c for c in found.points[0].quality if c == "probes-contradict-clearance")
     assert says in told.detail
 
 
 @pytest.mark.slow
-def test_good_probes_are_not_doubted(tmp_path):
-    source = campaign(tmp_path)
+def test_good_probes_are_not_doubted(campaign, tmp_path):
+    source = campaign()
     found = identify(source, IdentifySettings(methods=(), method="ols", clearance=CLEARANCE))
     assert "probes-contradict-clearance" not in found.points[0].quality
     polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
@@ -64,8 +65,8 @@ def test_good_probes_are_not_doubted(tmp_path):
     ("channel", "value", "says"),
     [("X1A", 1.1, "X1A read 9"), ("X1B", 1.03, "X1A read 2.9 % (se 0."), ("X1A", 0.95, "less")],
 )
-def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, value, says):
-    source = campaign(tmp_path, gain(channel, value), plan=SWEEP)
+def test_unequal_gains_show_in_the_angles_of_the_polygon(campaign, tmp_path, channel, value, says):
+    source = campaign(gain(channel, value), plan=SWEEP)
     polygon = measure_run(source.of_kind("clearance")[0], ANGLES)
     (told,) = (s.sentence() for s in polygon.status if s == "probe-gains-differ")
     assert says in told
@@ -76,16 +77,16 @@ def test_unequal_gains_show_in_the_angles_of_the_polygon(tmp_path, channel, valu
 
 
 @pytest.mark.slow
-def test_the_pivot_command_says_that_its_probes_disagree(tmp_path):
-    source = campaign(tmp_path, gain("X1A", 1.1), plan=replace(SMALL_PLAN, dynamic=(), locus=()))
+def test_the_pivot_command_says_that_its_probes_disagree(campaign, tmp_path):
+    source = campaign(gain("X1A", 1.1), plan=replace(SMALL_PLAN, dynamic=(), locus=()))
     out = tpjb("pivot", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 0, out.output
     assert "the sides stand as if X1A read 9" in out.output.replace("\n", " ")
 
 
 @pytest.mark.slow
-def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(tmp_path):
-    source = campaign(tmp_path, gain("X1*", 0.1), plan=SWEEP)
+def test_a_clearance_of_a_tenth_of_the_drawing_s_is_an_error_of_the_check(campaign, tmp_path):
+    source = campaign(gain("X1*", 0.1), plan=SWEEP)
     out = tpjb("check", source.path, "--out", tmp_path / "o")
     assert out.exit_code == 2
     assert "the bearing file says 80 µm" in " ".join(out.output.split())
@@ -104,8 +105,8 @@ def test_gains_are_found_from_turned_normals(axes):
 
 
 @pytest.mark.slow
-def test_the_condition_reaches_the_table(tmp_path):
-    path = written(tmp_path / "c.h5", rocker_rig(3, gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=())))
-    out = tpjb("identify", path, "--out", tmp_path / "out")
+def test_the_condition_reaches_the_table(campaign, tmp_path):
+    source = campaign(gain("X1*", 10.0), plan=replace(SMALL_PLAN, dry=(), locus=()))
+    out = tpjb("identify", source.path, "--out", tmp_path / "out")
     assert out.exit_code == 3
     assert pd.read_csv(tmp_path / "out" / "coefficients.csv")["quality"].str.contains("probes-contradict").all()
