@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,10 +22,6 @@ SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 
 def run(bearing: Bearing, load: float = 5000.0, direction: float = DOWN, **more: object) -> Prediction:
     return predict(bearing, load, direction, SPEED, mesh=(24, 4), **more)
-
-
-def pads(bearing: Bearing, **changes: object) -> Bearing:
-    return bearing.with_pads(tuple(replace(p, **changes) for p in bearing.pads))
 
 
 CASES = {

@@ -15,6 +15,7 @@ from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
+from tests.rigs.bearings import changed_pads
 
 SPEED = 2 * math.pi * 22.0
 DOWN = -math.pi / 2
@@ -53,9 +54,7 @@ def dense(p: Prediction, omega: float) -> np.ndarray:
 @pytest.mark.parametrize("hz", [5.0, 25.0, 120.0])
 @pytest.mark.parametrize("offset", [0.5, 0.6])
 def test_reduction_is_the_dense_solution(rocker, hz, offset):
-    heavy = rocker.with_pads(
-        tuple(replace(p, pivot_offset=offset, mass=5.0, moment_of_inertia=2e-2) for p in rocker.pads)
-    )
+    heavy = changed_pads(rocker, pivot_offset=offset, mass=5.0, moment_of_inertia=2e-2)
     effects = [Effect("pivot_damping", damping=4e5), Effect("pivot_rotation", rotational_stiffness=3e4)]
     p = predict(heavy, 5000.0, -1.2, SPEED, 2 * math.pi * hz, effects=effects)
     expected = dense(p, 2 * math.pi * hz)
@@ -64,8 +63,7 @@ def test_reduction_is_the_dense_solution(rocker, hz, offset):
 
 def test_coupling_of_an_offset_mass_lowers_what_moves_together(rocker):
     # kinetic energy 1/2 m (eta' - b t')^2 + 1/2 (I - m b^2) t'^2 with tilt and b counter-clockwise, eta outward
-    pads = tuple(replace(p, pivot_offset=0.6) for p in rocker.pads)
-    p = predict(rocker.with_pads(pads), 5000.0, DOWN, SPEED)
+    p = predict(changed_pads(rocker, pivot_offset=0.6), 5000.0, DOWN, SPEED)
     film = p.equilibrium.films[0]
     b = mass_centre_offset(p.setup, film)
     assert b < 0.0  # the pivot stands behind the middle, so that the centre is upstream (clockwise)
@@ -88,7 +86,7 @@ def test_rigid_pivots_leave_out_the_radial_motion(rocker):
 
 
 def test_massless_pads_lose_nothing_below_50_hz(rocker):
-    light = rocker.with_pads(tuple(replace(p, mass=0.0, moment_of_inertia=0.0) for p in rocker.pads))
+    light = changed_pads(rocker, mass=0.0, moment_of_inertia=0.0)
     excitation = 2 * math.pi * np.array([10.0, 50.0])
     p, q = (predict(b, 5000.0, DOWN, SPEED, excitation) for b in (rocker, light))
     np.testing.assert_allclose(p.kyy, q.kyy, rtol=2e-3)
@@ -96,7 +94,7 @@ def test_massless_pads_lose_nothing_below_50_hz(rocker):
 
 def test_frequency_zero_and_infinity(rocker):
     # pads follow quasi-statically at 0, stand still at high frequency (heavy inertia): then h is the film's own
-    heavy = rocker.with_pads(tuple(replace(p, mass=1e9, moment_of_inertia=1e9) for p in rocker.pads))
+    heavy = changed_pads(rocker, mass=1e9, moment_of_inertia=1e9)
     p = predict(heavy, 5000.0, DOWN, SPEED, 100.0)
     film = sum(m.stiffness[:2, :2] + 100j * m.damping[:2, :2] for m in p.pad_matrices)
     np.testing.assert_allclose(p.h, film, atol=1e-3 * np.abs(film).max())

@@ -28,6 +28,7 @@ from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve
+from tests.rigs.bearings import changed_pads
 
 SPEED, OMEGA, LOAD, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, 5000.0, -math.pi / 2
 NAMES = {
@@ -117,10 +118,6 @@ def test_pivot_flexibility_and_soft_pivot(rocker):
     one = run(rocker, Effect("soft_pivot", pad=1, stiffness_factor=0.4))
     expected = [law.deflection(w) / f for law, w, f in zip(laws, one.pad_load, (0.4, 1, 1, 1, 1), strict=True)]
     np.testing.assert_allclose(one.deflection, expected, rtol=1e-5)
-
-
-def changed_pads(bearing: Bearing, **changes: object) -> Bearing:
-    return bearing.with_pads(tuple(replace(p, **changes) for p in bearing.pads))
 
 
 def test_geometry_effects_are_other_bearings(rocker):

@@ -9,7 +9,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
+from model.film.cavitation import solve_flooded_film
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
+from model.film.models import FilmSolver
 from model.film.reynolds import FilmForces, solve_film
 
 MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
@@ -22,13 +24,14 @@ def solve(
     arc: tuple[float, float] = (-0.5, 0.5),
     sharp: bool = False,
     symmetric: bool = True,
+    solver: FilmSolver = solve_film,
 ) -> tuple[FilmGrid, FilmWork, FilmForces]:
     """Solve one isoviscous film; `wedge` is (a, b) over the clearance."""
     grid = film_grid(*arc, RADIUS, length, shape, symmetric)
     work = film_work(grid, 40.0)
     work.viscosity[:] = MU
     work.density[:] = RHO
-    forces = solve_film(grid, work, (CLEARANCE, wedge[0] * CLEARANCE, wedge[1] * CLEARANCE), SPEED, sharp)
+    forces = solver(grid, work, (CLEARANCE, wedge[0] * CLEARANCE, wedge[1] * CLEARANCE), SPEED, sharp)
     assert forces.steps > 0
     return grid, work, forces
 
@@ -206,10 +209,14 @@ def test_forces_and_coefficients_converge_with_second_order(wedge):
     assert (order[1:] > 1.3).all(), order
 
 
-def test_half_width_is_the_mirrored_whole():
-    half, whole = solve((60, 4), (0.6, 0.3), sharp=True)[2], solve((60, 8), (0.6, 0.3), sharp=True, symmetric=False)[2]
+@pytest.mark.parametrize(
+    ("solver", "wedge", "share"), [(solve_film, (0.6, 0.3), 1e-10), (solve_flooded_film, (-1.0, 0.1), 1e-9)]
+)
+def test_half_width_is_the_mirrored_whole(solver, wedge, share):
+    half = solve((60, 4), wedge, sharp=True, solver=solver)[2]
+    whole = solve((60, 8), wedge, sharp=True, symmetric=False, solver=solver)[2]
     for got, want in zip(half[:3], whole[:3], strict=True):
-        np.testing.assert_allclose(got, want, rtol=1e-10, atol=1e-10 * np.abs(want).max())
+        np.testing.assert_allclose(got, want, rtol=share, atol=share * np.abs(want).max())
 
 
 def test_film_scales_as_reynolds_equation_says():
@@ -232,12 +239,13 @@ def test_active_set_settles_on_fine_meshes():
     assert work.ruptured[:, 0].mean() == pytest.approx(coarse.ruptured[:, 0].mean(), abs=0.02)
 
 
-def test_touching_film_is_reported():
+@pytest.mark.parametrize("solver", [solve_film, solve_flooded_film])
+def test_touching_film_is_reported(solver):
     grid = film_grid(-0.5, 0.5, RADIUS, 0.07, (40, 4), True)
     work = film_work(grid, 40.0)
     work.viscosity[:] = MU
     work.density[:] = RHO
-    forces = solve_film(grid, work, (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
+    forces = solver(grid, work, (CLEARANCE, 1.2 * CLEARANCE, 0.0), SPEED, False)
     assert forces.steps == -1
     assert forces.min_film < 0.0
 

@@ -15,6 +15,7 @@ from model.film.resting import resting_film
 from model.predict import predict
 from model.setup import Mesh
 from model.statics.pad_flow import side_flow, striation, through_flow
+from tests.rigs.bearings import changed_pads
 
 SPEED, LOAD, DOWN = 2 * math.pi * 22.0, 5000.0, -math.pi / 2
 
@@ -29,9 +30,8 @@ def test_what_enters_a_full_film_leaves_it(rocker):
 
 def test_streaks_carry_what_the_rupture_line_lets_pass(rocker):
     # pads pressed hard downstream of their pivots rupture there: what the balance leaves is what the streaks hold
-    pads = tuple(replace(pad, pivot_offset=0.35) for pad in rocker.pads)
     for mesh, tolerance in ((Mesh(80, 6), 0.03), (Mesh(320, 12), 0.015)):
-        p = predict(rocker.with_pads(pads), 8000.0, DOWN, SPEED, mesh=mesh, effects=[
+        p = predict(changed_pads(rocker, pivot_offset=0.35), 8000.0, DOWN, SPEED, mesh=mesh, effects=[
             Effect("pivot_rotation", rotational_stiffness=1e6)])  # fmt: skip
         films = [f for f in p.equilibrium.films if f.forces is not None and f.work.ruptured[-2].any()]
         films = [f for f in films if not f.work.ruptured[1].any()]  # nothing made up at the inlet
@@ -143,5 +143,5 @@ def test_pads_in_each_others_way_are_named(rocker):
     assert "interference: no clearance at pads 1" in status(assembled_clearance=-2e-6)
     assert "pads 5 and 1 overlap" in status(arc=math.radians(110.0))
     even = math.radians(72.0)
-    ring = rocker.with_pads(tuple(replace(pad, arc=even) for pad in rocker.pads))
+    ring = changed_pads(rocker, arc=even)
     assert "pads 1 and 2 touch" in predict(ring, LOAD, DOWN, SPEED).status

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
 from model.statics.heat_paths import minimal_residual
+from tests.rigs.bearings import changed_pads
 
 SPEED = 2 * math.pi * 22
 
@@ -56,7 +56,7 @@ def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
 
 
 def test_heat_that_pads_take_is_what_their_solid_says(rocker):
-    cooled = rocker.with_pads(tuple(replace(p, back_convection=3000.0) for p in rocker.pads))
+    cooled = changed_pads(rocker, back_convection=3000.0)
     p = run(cooled, Options(conduction=True), thermal="tehd")
     film = p.equilibrium.films[0]
     assert film.deformation is not None
@@ -77,8 +77,9 @@ def test_heat_that_pads_take_is_what_their_solid_says(rocker):
 def test_conduction_cools_and_a_pad_that_conducts_more_cools_more(rocker):
     hot = [run(rocker, thermal="tehd").max_temperature]
     for convection in (0.0, 500.0):
-        pads = tuple(replace(p, back_convection=convection) for p in rocker.pads)
-        hot.append(run(rocker.with_pads(pads), Options(conduction=True), thermal="tehd").max_temperature)
+        cooled = changed_pads(rocker, back_convection=convection)
+        p = run(cooled, Options(conduction=True), thermal="tehd")
+        hot.append(p.max_temperature)
     assert hot[0] > hot[1] > hot[2]
 
 

@@ -14,13 +14,10 @@ from model.effects import Effect
 from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
+from tests.rigs.bearings import changed_pads
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 COARSE = (24, 4)
-
-
-def pads(bearing: Bearing, **changes: object) -> Bearing:
-    return bearing.with_pads(tuple(replace(p, **changes) for p in bearing.pads))
 
 
 def oil(bearing: Bearing, **changes: object) -> Bearing:
@@ -95,15 +92,15 @@ EXTREMES = {
     "soft pivots": lambda b: (b, 5000.0, {"pivots": 1e6}),
     "no pivots": lambda b: (b, 5000.0, {"pivots": 1e-3}),
     "hard pivots": lambda b: (b, 5000.0, {"pivots": 1e300}),
-    "narrow": lambda b: (pads(b, pad_clearance=2e-9, assembled_clearance=1e-9), 5000.0, {}),
-    "wide": lambda b: (pads(b, pad_clearance=2e-2, assembled_clearance=1e-2), 5000.0, {}),
-    "no preload": lambda b: (pads(b, assembled_clearance=130e-6), 5000.0, {}),
-    "negative preload": lambda b: (pads(b, assembled_clearance=260e-6), 5000.0, {}),
-    "interference": lambda b: (pads(b, assembled_clearance=-30e-6), 5000.0, {}),
-    "slivers": lambda b: (pads(b, arc=2e-3), 5000.0, {}),
-    "pivot at the leading edge": lambda b: (pads(b, pivot_offset=0.01), 5000.0, {}),
-    "pivot at the trailing edge": lambda b: (pads(b, pivot_offset=0.99), 5000.0, {}),
-    "pivot ahead of the middle": lambda b: (pads(b, pivot_offset=0.4), 5000.0, {}),
+    "narrow": lambda b: (changed_pads(b, pad_clearance=2e-9, assembled_clearance=1e-9), 5000.0, {}),
+    "wide": lambda b: (changed_pads(b, pad_clearance=2e-2, assembled_clearance=1e-2), 5000.0, {}),
+    "no preload": lambda b: (changed_pads(b, assembled_clearance=130e-6), 5000.0, {}),
+    "negative preload": lambda b: (changed_pads(b, assembled_clearance=260e-6), 5000.0, {}),
+    "interference": lambda b: (changed_pads(b, assembled_clearance=-30e-6), 5000.0, {}),
+    "slivers": lambda b: (changed_pads(b, arc=2e-3), 5000.0, {}),
+    "pivot at the leading edge": lambda b: (changed_pads(b, pivot_offset=0.01), 5000.0, {}),
+    "pivot at the trailing edge": lambda b: (changed_pads(b, pivot_offset=0.99), 5000.0, {}),
+    "pivot ahead of the middle": lambda b: (changed_pads(b, pivot_offset=0.4), 5000.0, {}),
     "water": lambda b: (oil(b, viscosity_40=1e-6), 5000.0, {}),
     "honey": lambda b: (oil(b, viscosity_40=1e3), 5000.0, {}),
     "steep oil": lambda b: (oil(b, viscosity_exponent=50.0), 5000.0, {}),
@@ -114,12 +111,12 @@ EXTREMES = {
     "two pads": lambda b: (b.with_pads(b.pads[:2]), 5000.0, {}),
     "all oil carried over": lambda b: (b, 5000.0, {"effects": [Effect("hot_oil_carryover", fraction=0.98)]}),
     "film lost beside a journal that takes heat": lambda b: (
-        pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
+        changed_pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
         5000.0,
         {"options": Options(isothermal_journal=True)},
     ),
     "film lost beside pads that take heat": lambda b: (
-        pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
+        changed_pads(b, pad_clearance=2e-9, assembled_clearance=1e-9),
         1e5,
         {"options": Options(conduction=True)},
     ),

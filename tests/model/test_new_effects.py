@@ -19,6 +19,7 @@ from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
+from tests.rigs.bearings import changed_pads
 from tests.rigs.random_bearings import draw
 from tests.studies.random_bearings import fault, rolling
 
@@ -138,9 +139,8 @@ def test_heat_loss_acts_through_the_coupled_paths_alike(rocker):
 @pytest.mark.slow
 def test_pad_conduction_is_the_heat_paths_that_are_there(rocker):
     p = run(rocker, Effect("pad_conduction", back_convection=80.0))
-    pads = tuple(replace(pad, back_convection=80.0) for pad in rocker.pads)
     options = Options(conduction=True, isothermal_journal=True)
-    same = predict(rocker.with_pads(pads), LOAD, DOWN, SPEED, OMEGA, options=options)
+    same = predict(changed_pads(rocker, back_convection=80.0), LOAD, DOWN, SPEED, OMEGA, options=options)
     np.testing.assert_allclose(p.h, same.h, rtol=1e-10)
     assert p.max_temperature < run(rocker).max_temperature - 1.0
 

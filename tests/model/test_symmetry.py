@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from model.effects import Effect
 from model.predict import predict
+from tests.rigs.bearings import changed_pads
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
 EXCITATION = 2 * math.pi * np.array([10.0, 25.0, 50.0])
@@ -20,7 +20,7 @@ MIRRORED_PADS = [0, 4, 3, 2, 1]
 @pytest.mark.parametrize("aside", [0.2, 0.9, 2.0])
 def test_mirrored_load_mirrors_the_bearing(rocker, thermal, aside):
     # a pad's inertia resists its tilt: then the shaft's rotation tells left from right, by 0.1 % at 25 Hz
-    light = rocker.with_pads(tuple(replace(p, mass=1e-9, moment_of_inertia=1e-12) for p in rocker.pads))
+    light = changed_pads(rocker, mass=1e-9, moment_of_inertia=1e-12)
     left, right = (
         predict(light, 5000.0, DOWN + side * aside, SPEED, EXCITATION, thermal=thermal, mesh=(40, 4))
         for side in (-1, 1)
