@@ -54,7 +54,7 @@ def refused(run: rigdata.Run, *says: str, channel: str = "X1A") -> None:
 
 
 PREAMBLE = "HBM catman; Prüfstand\r\nDatum: 14.03.2019; 09:41\r\n\r\nKanäle;3;X1A\r\n"
-UNITS = "s;µm;µm\r\n"
+WITH_PREAMBLE = PREAMBLE + table().replace("\r\n", "\r\ns;µm;µm\r\n", 1)
 
 
 @pytest.mark.slow
@@ -69,24 +69,7 @@ def test_delimiters_decimals_line_ends(tmp_path, delimiter, decimal, end):
 
 @pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"])
 def test_encodings_are_detected(tmp_path, encoding):
-    body = table()
-    text = PREAMBLE + body.replace("\r\n", "\r\n" + UNITS, 1)
-    expect_good(make(tmp_path, text.encode(encoding)))
-
-
-def test_dialect_given_by_the_manifest(tmp_path):
-    text = PREAMBLE + table().replace("\r\n", "\r\n" + UNITS, 1)
-    csv = '[csv]\ndelimiter = ";"\ndecimal = ","\nencoding = "cp1252"\nheader_line = 5\nunits_line = 6\n'
-    expect_good(make(tmp_path, text.encode("cp1252"), csv))
-
-
-def test_a_stated_encoding_that_needs_a_byte_order_mark_is_named_where_there_is_none(tmp_path):
-    run = make(tmp_path, table().encode("utf-16-le"), '[csv]\nencoding = "utf-16"\n')
-    refused(run, "cannot be read (UTF-16 stream does not start with BOM)")
-
-
-def test_byte_order_mark_wins_over_a_wrong_encoding(tmp_path):
-    expect_good(make(tmp_path, table().encode("utf-8-sig"), '[csv]\nencoding = "cp1252"\n'))
+    expect_good(make(tmp_path, WITH_PREAMBLE.encode(encoding)))
 
 
 QUOTED = "\n".join(",".join(f'"{v:.4f}"'.replace(".", ",") for v in row) for row in ROWS)
@@ -119,6 +102,20 @@ ALIGNED = "\n".join("".join(f"{v:9.3f}" for v in row) for row in ROWS)
 )
 def test_spellings_that_real_exports_have(tmp_path, text):
     expect_good(make(tmp_path, text))
+
+
+DIALECT = 'delimiter = ";"\ndecimal = ","\nencoding = "cp1252"\nheader_line = 5\nunits_line = 6'
+
+
+@pytest.mark.parametrize(
+    ("text", "csv"),
+    [
+        pytest.param(WITH_PREAMBLE.encode("cp1252"), DIALECT, id="dialect given by the manifest"),
+        pytest.param(table().encode("utf-8-sig"), 'encoding = "cp1252"', id="byte order mark against the manifest"),
+    ],
+)
+def test_what_the_manifest_says_of_the_dialect(tmp_path, text, csv):
+    expect_good(make(tmp_path, text, f"[csv]\n{csv}\n"))
 
 
 @pytest.mark.parametrize("mark", [m for m in MISSING if m not in {"*", "?"}])
@@ -165,19 +162,14 @@ def test_missing_times_are_filled_in(tmp_path):
     assert make(tmp_path, "\r\n".join(lines)).record("X1A").time[3] == pytest.approx(1.5)
 
 
-def test_truncated_last_line_is_left_out_with_a_warning(tmp_path):
-    run = make(tmp_path, table().rstrip()[:-12])
+@pytest.mark.parametrize(("lost", "place"), [(12, "line 31"), (2, "last line")])  # two: inside the last number
+def test_truncated_last_line_is_left_out_with_a_warning(tmp_path, lost, place):
+    run = make(tmp_path, table().rstrip()[:-lost])
     assert run.length == len(ROWS) - 1
     (problem,) = run.reader.problems()
     assert problem.severity == "warning"
     assert "cut off" in problem.what
-    assert "line 31" in problem.place
-
-
-def test_last_line_cut_inside_its_last_number(tmp_path):
-    run = make(tmp_path, table().rstrip()[:-2])
-    assert run.length == len(ROWS) - 1
-    assert "cut off" in run.reader.problems()[0].what
+    assert place in problem.place
 
 
 def with_line(number: int, old: str, new: str, text: str) -> str:
@@ -215,26 +207,26 @@ def test_missing_channel_names_the_nearest_column(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("csv", "says"),
+    ("encoding", "csv", "says"),
     [
-        ('[csv]\ndelimiter = ","\n', ["delimiter ','", "';' finds 3", "leave it out"]),
-        ('[csv]\ndecimal = "."\n', ["decimal is '.'", "'0,0000'"]),
-        ("[csv]\nheader_line = 3\n", ["line 3", "names are in line 1"]),
-        ("[csv]\nheader_line = 300\n", ["header_line is 300", "names are in line 1"]),
+        ("utf-8", 'delimiter = ","', ["delimiter ','", "';' finds 3", "leave it out"]),
+        ("utf-8", 'decimal = "."', ["decimal is '.'", "'0,0000'"]),
+        ("utf-8", "header_line = 3", ["line 3", "names are in line 1"]),
+        ("utf-8", "header_line = 300", ["header_line is 300", "names are in line 1"]),
+        ("utf-16-le", 'encoding = "utf-16"', ["cannot be read (UTF-16 stream does not start with BOM)"]),
     ],
 )
-def test_a_manifest_that_contradicts_the_file(tmp_path, csv, says):
-    refused(make(tmp_path, table(), csv), *says)
+def test_a_manifest_that_contradicts_the_file(tmp_path, encoding, csv, says):
+    refused(make(tmp_path, table().encode(encoding), f"[csv]\n{csv}\n"), *says)
 
 
-@pytest.mark.parametrize("data", [b"", b"\r\n\r\n", b"Zeit;X1A;X1B\r\n", b"Zeit;X1A;X1B\r\ns;um;um\r\n", b"\0" * 5000])
-def test_empty_files(tmp_path, data):
+EMPTY = [b"", b"\r\n\r\n", b"Zeit;X1A;X1B\r\n", b"Zeit;X1A;X1B\r\ns;um;um\r\n", b"\0" * 5000]
+ENDLESS = [b"7" * 3_000_000, table().encode() + b"1;" + b"7" * 9_000_000]
+
+
+@pytest.mark.parametrize("data", EMPTY + ENDLESS, ids=lambda data: f"{len(data)} bytes")
+def test_empty_files_and_lines_of_megabytes_are_refused(tmp_path, data):
     refused(make(tmp_path, data))
-
-
-def test_a_line_of_megabytes_is_refused(tmp_path):
-    refused(make(tmp_path, b"7" * 3_000_000))
-    refused(make(tmp_path, table().encode() + b"1;" + b"7" * 9_000_000))
 
 
 def test_vanished_file_and_directory_in_its_place(tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 
+import pytest
+
 from tpjb_ident.watch.landing import NewFiles
 
 
@@ -49,10 +51,12 @@ def test_one_that_grows_is_waited_for_from_its_last_change_on(tmp_path):
     assert list(watch.look([path])[0]) == [path]
 
 
-def test_one_that_was_finished_long_ago_is_not_waited_for(tmp_path):
+@pytest.mark.parametrize(("text", "landed"), [("1", True), ("", False)], ids=["finished long ago", "only opened"])
+def test_an_old_file_is_not_waited_for_unless_it_is_empty(tmp_path, text, landed):
     watch, clock = landings()
-    path = touched(tmp_path / "a.csv", "1", clock.now - 3600.0)
-    assert list(watch.look([path])[0]) == [path]
+    path = touched(tmp_path / "a.csv", text, clock.now - 3600.0)
+    whole, waiting = watch.look([path])
+    assert (list(whole), waiting) == (([path], []) if landed else ([], [path]))
 
 
 def test_a_clock_that_is_ahead_on_the_share_makes_nobody_wait_for_ever(tmp_path):
@@ -61,12 +65,6 @@ def test_a_clock_that_is_ahead_on_the_share_makes_nobody_wait_for_ever(tmp_path)
     assert watch.look([path])[1] == [path]
     clock.now += 5.1
     assert list(watch.look([path])[0]) == [path]
-
-
-def test_an_empty_file_is_one_that_a_logger_has_opened(tmp_path):
-    watch, clock = landings()
-    path = touched(tmp_path / "a.csv", "", clock.now - 3600.0)
-    assert watch.look([path]) == ({}, [path])
 
 
 def test_no_file_and_a_folder_of_its_name_are_neither(tmp_path):
