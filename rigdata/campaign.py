@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import os
 import stat
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -72,8 +73,8 @@ class Campaign:
     mains: float | None = None
 
     def __str__(self) -> str:
-        kinds = {k: sum(r.kind == k for r in self.runs) for k in dict.fromkeys(r.kind for r in self.runs)}
-        listed = ", ".join(f"{n} {k}" for k, n in kinds.items())
+        counts = Counter(run.kind for run in self.runs)
+        listed = ", ".join(f"{count} {kind}" for kind, count in counts.items())
         return f"campaign {self.id}: {len(self.runs)} runs ({listed}), {len(self.channels)} channels"
 
     def __repr__(self) -> str:
@@ -172,7 +173,7 @@ def load_campaign(path: str | Path) -> Campaign:
 
 
 def _kind_of(source: Path) -> str:
-    """Tell what `given` is: "folder", "manifest" or "hdf5"; refuse what is none of these."""
+    """Whether `source` is a "folder", a "manifest" or "hdf5"; refuse what is none of these."""
     if source.is_dir():
         if (source / MANIFEST_NAME).exists():
             return "folder"
@@ -196,9 +197,8 @@ def _read_text(path: Path, file: str, limit: int) -> str:
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except OSError as error:
-        raise refuse(
-            file, "", f"cannot be read ({error.strerror or error})", "Check the path and its rights"
-        ) from error
+        message = f"cannot be read ({error.strerror or error})"
+        raise refuse(file, "", message, "Check the path and its rights") from error
     if len(data) > limit:
         raise refuse(file, "", f"is larger than {limit >> 20} MB", "Is it the right file?")
     try:

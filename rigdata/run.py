@@ -233,14 +233,14 @@ class Run:
         stop : int or None, optional
             Sample after the last; default the end.
         """
-        for channel in self.channels.values():
-            if channel.quantity == "speed":
-                return self.record(channel.name, start, stop)
-        for channel in self.channels.values():
-            if channel.quantity == "keyphasor":
-                pulses = self.record(channel.name, start, stop)
-                return replace(pulses, quantity="speed", values=speed_from_pulses(pulses.values, pulses.time))
-        return None
+        tachometers = [c.name for c in self.channels.values() if c.quantity == "speed"]
+        keyphasors = [c.name for c in self.channels.values() if c.quantity == "keyphasor"]
+        if tachometers:
+            return self.record(tachometers[0], start, stop)
+        if not keyphasors:
+            return None
+        pulses = self.record(keyphasors[0], start, stop)
+        return replace(pulses, quantity="speed", values=speed_from_pulses(pulses.values, pulses.time))
 
 
 class _FileRows:
@@ -258,12 +258,13 @@ class _FileRows:
         channels = {q: self._run._vector_channels(q) for q in self._quantities}
         names = [c.name for c in (*itertools.chain(*channels.values()), *self._tachometers)]
         readings = dict(zip(names, reader.read(names, start, stop), strict=True)) if names else {}
-        rows = {q: vector_rows(used, [readings[c.name] for c in used]) for q, used in channels.items()}
-        time = None if self._counted else reader.time(start, stop)
+        rows = {}
+        for quantity, sensors in channels.items():
+            rows[quantity] = vector_rows(sensors, [readings[sensor.name] for sensor in sensors])
         speed = None
         for tachometer in self._tachometers:
             speed = tachometer.to_si(readings[tachometer.name])
-        return Rows(rows, time, speed)
+        return Rows(rows, None if self._counted else reader.time(start, stop), speed)
 
 
 def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:

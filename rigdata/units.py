@@ -93,10 +93,6 @@ class Unit:
     def __pow__(self, power: int) -> Unit:
         return Unit(self.factor**power, tuple((n, p * power) for n, p in self.powers))
 
-    def same_dimension(self, other: Unit) -> bool:
-        """Whether both measure the same thing."""
-        return self.powers == other.powers
-
 
 #: Units that campaigns and bearings use all the time, as factors of SI base units. pint has them all, bit for bit
 #: (tests/rigdata/test_units.py); to import it would make `predict` of a bearing take 1.2 times as long.
@@ -223,9 +219,9 @@ def unit_factor(unit: str, dimension: str) -> float:
     """SI value of one `unit`, a multiple without offset (``degC`` counts as a kelvin step)."""
     parsed = parse_unit(unit, dimension)
     # The radian of a speed is asked for: "22 1/s" is caught above as revolutions.
-    is_usable = parsed.same_dimension(parse_unit(SI_UNITS[dimension]))
+    is_usable = parsed.powers == parse_unit(SI_UNITS[dimension]).powers
     if dimension == "rotational stiffness":  # a moment per tilt, the radian left out
-        is_usable = is_usable or parsed.same_dimension(parse_unit("N*m"))
+        is_usable = is_usable or parsed.powers == parse_unit("N*m").powers
     elif dimension == "angle":  # a slope: 0.2 mm/m
         is_usable = is_usable or ("/" in unit and not parsed.powers)
     if not is_usable:
@@ -322,20 +318,15 @@ def temperature_offset(unit: str) -> float:
 
 def is_signal(unit: str) -> bool:
     """Whether `unit` is what a data logger sees (V, mA, mV/V), not an engineering unit."""
-    parsed = parse_unit(unit)
-    if is_bridge_ratio(unit):
-        return True
-    return any(parsed.same_dimension(parse_unit(u)) for u in ("V", "A"))
+    powers = parse_unit(unit).powers
+    return is_bridge_ratio(unit) or powers in (parse_unit("V").powers, parse_unit("A").powers)
 
 
 def is_bridge_ratio(unit: str) -> bool:
     """Whether `unit` is volts per volt, as a strain-gauge bridge gives."""
-    numerator, slash, denominator = unit.partition("/")
-    if not slash:
-        return False
-    volt = parse_unit("V")
+    numerator, _, denominator = unit.partition("/")
     try:
-        return parse_unit(numerator).same_dimension(volt) and parse_unit(denominator).same_dimension(volt)
+        return parse_unit(numerator).powers == parse_unit(denominator).powers == parse_unit("V").powers
     except UnitError:
         return False
 
@@ -344,12 +335,12 @@ def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
     """SI value of the quantity per one `signal_unit` of reading."""
     number, unit = split_quantity(value, dimension)
     parsed, signal = parse_unit(unit, dimension), parse_unit(signal_unit)
-    target = parse_unit(SI_UNITS[dimension])
+    quotient = signal * parse_unit(SI_UNITS[dimension]) ** -1
     if number <= 0 or number * parsed.factor == 0:  # the second: too small for a float
         raise UnitError(f"{_short(value)} must be above zero; a falling reading is polarity = -1")
-    if parsed.same_dimension(signal * target**-1):
+    if parsed.powers == quotient.powers:
         return _finite(signal.factor / (number * parsed.factor))
-    if parsed.same_dimension(target * signal**-1):
+    if parsed.powers == (quotient**-1).powers:
         return _finite(number * parsed.factor * signal.factor)
     example = f"{signal_unit}/{_example(dimension)}"
     raise UnitError(f"{_short(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}")

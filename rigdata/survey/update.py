@@ -30,11 +30,12 @@ def _known_channels(text: str) -> dict[str, ChannelGuess]:
         tables = tomllib.loads(text).get("channels", {})
     except tomllib.TOMLDecodeError as error:
         raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
-    return {
-        str(name): ChannelGuess(_text(t, "quantity"), _text(t, "unit"), _text(t, "axis"), "as the manifest says")
-        for name, t in tables.items()
-        if isinstance(t, dict)
-    }
+    guesses = {}
+    for name, table in tables.items():
+        if isinstance(table, dict):
+            quantity, unit, axis = (_text(table, key) for key in ("quantity", "unit", "axis"))
+            guesses[str(name)] = ChannelGuess(quantity, unit, axis, "as the manifest says")
+    return guesses
 
 
 def column_names(text: str) -> tuple[str, ...]:

@@ -116,6 +116,7 @@ class Instruments:
         gravity = (0.0, 0.0) if rng is None else tuple(rng.normal(0.0, 1.5, 2))
         pt100 = (0.0,) * n_pads if rng is None else tuple(rng.normal(0.0, 0.2, n_pads))
         quarter = radians(90.0)
+        thermometers = [Sensor.thermometer(f"T{i + 1}", i + 1).with_error(offset=zero) for i, zero in enumerate(pt100)]
         return cls(
             (
                 Sensor.probe("X1A", radians(45.0), gaps[0]),
@@ -124,7 +125,7 @@ class Instruments:
                 Sensor.load_cell("L1V", quarter),
                 Sensor.accelerometer("A1H", 0.0).with_error(offset=gravity[0]),
                 Sensor.accelerometer("A1V", quarter).with_error(offset=gravity[1]),
-                *(Sensor.thermometer(f"T{pad + 1}", pad + 1).with_error(offset=pt100[pad]) for pad in range(n_pads)),
+                *thermometers,
                 Sensor.tachometer("K1"),
             )
         )

@@ -167,14 +167,14 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
     orders = np.arange(1, len(runout) + 1)
     steady = replace(position_point, excitation=0.0)
-    lines = tuple(
-        answer(frequency, force, truth.h(replace(stiffness_point, excitation=frequency)), instruments)
-        for frequency, force in forces
-    )
+    lines = []
+    for frequency, force in forces:
+        h = truth.h(replace(stiffness_point, excitation=frequency))
+        lines.append(answer(frequency, force, h, instruments))
     motion = SteadyMotion(
         position=truth.centre(steady),
         load=load_vector(actual),
-        lines=lines,
+        lines=tuple(lines),
         temperature=truth.temperatures(steady),
         speed=actual.shaft_speed,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
@@ -233,20 +233,17 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
 
 
 def _facts(actual: OperatingPoint, motion: SteadyMotion) -> dict[str, object]:
+    lines = []
+    for line in motion.lines:
+        phasors = {"oil_force_N": _parts(line.oil_force), "displacement_m": _parts(line.displacement)}
+        lines.append({"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **phasors})
     return {
         "static_load_N": actual.static_load,
         "static_load_direction_deg": actual.static_load_direction_deg,
         "shaft_speed_Hz": actual.shaft_speed_hz,
         "x_m": float(motion.position[0]),
         "y_m": float(motion.position[1]),
-        "lines": [
-            {
-                "frequency_Hz": round(line.frequency / (2 * np.pi), 9),
-                "oil_force_N": _parts(line.oil_force),
-                "displacement_m": _parts(line.displacement),
-            }
-            for line in motion.lines
-        ],
+        "lines": lines,
     }
 
 
@@ -403,11 +400,8 @@ def _sides(truth: RigTruth) -> list[int]:
                 pads.remove(k)
                 removed = True
                 break
-    spans = [
-        (truth.pivot_angles[pads[(i + 1) % len(pads)]] - truth.pivot_angles[k]) % (2 * np.pi)
-        for i, k in enumerate(pads)
-    ]
-    if max(spans) >= np.pi - 1e-6:
+    angles = np.array([truth.pivot_angles[k] for k in pads])
+    if np.max((np.roll(angles, -1) - angles) % (2 * np.pi)) >= np.pi - 1e-6:
         raise VirtualRigError("the pads leave half the circle open: the shaft would fall out of the bearing")
     return pads
 

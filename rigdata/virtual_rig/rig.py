@@ -42,10 +42,8 @@ class VirtualRig:
     def __post_init__(self) -> None:
         pads = {s.pad for s in self.instruments.of("temperature")}
         if any(p is None or not 1 <= p <= len(self.truth.pivot_angles) for p in pads):
-            raise VirtualRigError(
-                f"temperature sensors are in pads {sorted(map(str, pads))}, but the bearing has pads 1 to "
-                f"{len(self.truth.pivot_angles)}"
-            )
+            listed, count = sorted(map(str, pads)), len(self.truth.pivot_angles)
+            raise VirtualRigError(f"temperature sensors are in pads {listed}, but the bearing has pads 1 to {count}")
         if self.faults:
             check_faults(self.faults, [r.id for r in self.runs()], [s.name for s in self.instruments.sensors])
 
@@ -78,7 +76,7 @@ class VirtualRig:
         if not self.faults:
             return ()
         members = [run.id for run in self.runs() if run.record == record]
-        return tuple(replace(f, run="*") for f in self.faults if any(f.affects(member) for member in members))
+        return tuple(replace(fault, run="*") for fault in self.faults if any(map(fault.affects, members)))
 
     def _recorded(self, run: PlannedRun) -> SimulatedRun:
         """Simulate a run, or the one whose record was copied in its place."""

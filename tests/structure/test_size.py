@@ -17,7 +17,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (111.9, 13_500),
     "model": (91.7, 12_000),
-    "rigdata": (64.0, 8_950),
+    "rigdata": (62.0, 8_700),
     "diagnosis": (43.7, 5_320),
     "cli": (24.8, 3_520),
     "report": (27.0, 3_560),

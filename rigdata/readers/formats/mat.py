@@ -165,7 +165,11 @@ def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple
     names: list[str] = []
     units: list[str] = []
     level = name.rpartition(".")[0]
-    lists = {_last_part(key).lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
+    lists = {}
+    for key, cells in texts.items():
+        prefix, _, last = key.rpartition(".")
+        if prefix == level:
+            lists[last.lower()] = cells
     for key, cells in lists.items():
         if not names and _NAMES.search(key) and len(cells) in value.shape:
             names = cells

@@ -90,19 +90,20 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:
-    place = f"root attribute {name}"
+    place, remedy = f"root attribute {name}", "Store it as one UTF-8 string"
+    no_text = refuse(file, place, "is not a text, or far too long", remedy)
     stored = handle.attrs.get_id(name)
     if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != TEXT:
-        raise refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+        raise no_text
     value = handle.attrs[name]
     value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
     if isinstance(value, bytes):
         try:
             value = value.decode("utf-8")
         except UnicodeDecodeError as error:
-            raise refuse(file, place, "is not UTF-8 text", "Store it as one UTF-8 string") from error
+            raise refuse(file, place, "is not UTF-8 text", remedy) from error
     if not isinstance(value, str) or len(value) > _MAX_TEXT:
-        raise refuse(file, place, "is not a text, or far too long", "Store it as one UTF-8 string")
+        raise no_text
     return value
 
 

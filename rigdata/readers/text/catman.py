@@ -28,8 +28,7 @@ def has_several_clocks(path: Path) -> bool:
 
 def time_column(path: Path) -> str:
     """Name of the first time column of a text file; "" without one."""
-    names = (_short(name) for name in find_head(path).names)
-    return next(filter(is_time, names), "")
+    return next(filter(is_time, map(_short, find_head(path).names)), "")
 
 
 def read_series(path: Path) -> list[Series]:
