@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import H, complex_normal
+from tests.dynamic.phasor_cases import H, complex_normal, noisy_means, windows
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
 from tpjb_ident.dynamic.estimators.robust_constants import (
     bisquare_weight,
@@ -60,18 +60,9 @@ def test_trimming_weight_is_symmetric_about_the_middle():
     assert weight[2] + weight[4] == pytest.approx(1.0)
 
 
-def means_of(seed: int, noise: np.ndarray, g: int = 6, count: float = 50.0) -> Repeats:
-    """Means of g directions with noise of covariance `noise` on one window's (X, Y, Fx, Fy)."""
-    rng = np.random.default_rng(seed)
-    D = complex_normal(rng, g, 2)
-    z = np.concatenate([D, D @ H.T], axis=1)
-    z = z + complex_normal(rng, g, 4) @ np.linalg.cholesky(noise).T / np.sqrt(count)
-    return Repeats(DirectionMeans(z[:, :2], z[:, 2:], np.full(g, count)), noise, count * g - g, np.ones(int(count * g)))
-
-
 def test_without_noise_on_displacements_errors_in_variables_are_least_squares():
     noise = np.diag([1e-14, 1e-14, 1e-2, 1e-2]).astype(complex)
-    given = means_of(2, noise)
+    given = noisy_means(2, noise)
     plain = np.linalg.lstsq(given.means.D, given.means.F, rcond=None)[0].T
     np.testing.assert_allclose(eiv_fit(given).h, plain, rtol=0, atol=1e-9)
 
@@ -79,7 +70,7 @@ def test_without_noise_on_displacements_errors_in_variables_are_least_squares():
 def test_exchanging_cause_and_effect_inverts_h():
     mix = complex_normal(np.random.default_rng(4), 4, 4)
     noise = 1e-3 * (mix @ mix.conj().T + np.eye(4))
-    given = means_of(5, noise)
+    given = noisy_means(5, noise)
     back = [2, 3, 0, 1]
     turned = dataclasses.replace(
         given,
@@ -98,16 +89,9 @@ def test_attenuation_is_noise_over_noise_and_signal():
     np.testing.assert_allclose(eiv_fit(given).attenuation, power / (1 + power), rtol=1e-6)
 
 
-def windows(seed: int, noise: np.ndarray, g: int = 6, n: int = 300):
-    rng = np.random.default_rng(seed)
-    D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
-    z = np.concatenate([D, D @ H.T], axis=1) + complex_normal(rng, g * n, 4) @ np.linalg.cholesky(noise).T
-    return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), n)), z
-
-
 def test_pooled_noise_of_repeats_is_that_of_the_draws():
     noise = 1e-3 * np.array([[1, 0.4, 0, 0], [0.4, 1, 0, 0], [0, 0, 2, 0.5j], [0, 0, -0.5j, 1]], dtype=complex)
-    table, _ = windows(7, noise)
+    table = windows(7, n=300, noise=noise)
     state = repeats(table, np.ones(len(table)))
     assert state is not None
     size = np.sqrt(np.diag(state.noise).real)

@@ -9,7 +9,7 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.record import VectorRows
-from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
+from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points
 from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.records.extraction import extract
@@ -41,10 +41,8 @@ def true_vector(point) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    path = tmp_path_factory.mktemp("rig") / "campaign.h5"
-    write_campaign(path, rig([(3500.0, 25.0), (5000.0, 30.0), (5000.0, 50.0)], seed=11))
-    return load_campaign(path)
+def campaign(campaign_of):
+    return load_campaign(campaign_of(rig([(3500.0, 25.0), (5000.0, 30.0), (5000.0, 50.0)], seed=11)))
 
 
 @pytest.fixture(scope="module")
@@ -161,13 +159,10 @@ def test_a_campaign_without_dynamic_runs_is_refused(campaign):
         identify(replace(campaign, runs=()))
 
 
-def test_excitation_off_its_set_point_is_found(tmp_path):
-    points = operating_points([(5000.0, 25.0)])
-    path = tmp_path / "c.h5"
-    base = rig([(5000.0, 25.0)], seed=2, noise=replace(Noise.like_samples(), glitches=Noise.none().glitches))
-    write_campaign(path, base)
-    run = load_campaign(path).of_kind("dynamic")[0]
-    wrong = replace(run, point=replace(points[0], excitation=2 * np.pi * 25.06))
+def test_excitation_off_its_set_point_is_found(campaign_of):
+    calm = replace(Noise.like_samples(), glitches=Noise.none().glitches)
+    run = load_campaign(campaign_of(rig([(5000.0, 25.0)], seed=2, noise=calm))).of_kind("dynamic")[0]
+    wrong = replace(run, point=replace(run.point, excitation=2 * np.pi * 25.06))
     phasors = run_phasors(wrong, 30.0)
     assert "excitation off set point" in phasors.conditions
     assert phasors.lines.excitation[0].frequency == pytest.approx(25.0, abs=0.01)
@@ -175,9 +170,8 @@ def test_excitation_off_its_set_point_is_found(tmp_path):
 
 
 @pytest.mark.slow
-def test_several_excitation_lines_in_one_record_are_told_apart(tmp_path):
-    path = tmp_path / "c.h5"
-    write_campaign(path, rig([(5000.0, f) for f in (15.0, 25.0, 36.0)], seed=3, joint_frequencies=True))
+def test_several_excitation_lines_in_one_record_are_told_apart(campaign_of):
+    path = campaign_of(rig([(5000.0, f) for f in (15.0, 25.0, 36.0)], seed=3, joint_frequencies=True))
     found = identify(load_campaign(path), IdentifySettings(methods=()))
     for p in found.points:
         np.testing.assert_allclose(p.stiffness.vector[[0, 3, 4, 7]], true_vector(p.point)[[0, 3, 4, 7]], rtol=0.015)
@@ -303,8 +297,7 @@ def test_memory_does_not_grow_with_the_record():
 
 
 @pytest.mark.slow
-def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(tmp_path):
+def test_cells_ten_times_off_in_all_runs_make_every_point_doubtful(campaign_of):
     wrong = replace(rig([(3500.0, 25.0)], seed=12), faults=(Fault("scaled", "*", "L1*", value=0.1),))
-    write_campaign(tmp_path / "c.h5", wrong)
-    [point] = identify(load_campaign(tmp_path / "c.h5"), IdentifySettings(methods=())).points
+    [point] = identify(load_campaign(campaign_of(wrong)), IdentifySettings(methods=())).points
     assert "cells-contradict-set-points" in point.quality

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Timing, write_campaign
+from rigdata.virtual_rig import Timing
 from tests.dynamic.test_identify import rig
 from tests.rigs.held_run import HeldRun
 from tpjb_ident.dynamic.records.extraction import extract
@@ -22,10 +22,9 @@ FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    path = tmp_path_factory.mktemp("rig") / "c.h5"
+def run(campaign_of):
     timing = Timing(dynamic_rate=5000.0, dynamic_seconds=8.0)
-    write_campaign(path, rig([(5000.0, 25.0)], seed=4, timing=timing, directions=(0.3,)))
+    path = campaign_of(rig([(5000.0, 25.0)], seed=4, timing=timing, directions=(0.3,)))
     return load_campaign(path).of_kind("dynamic")[0]
 
 

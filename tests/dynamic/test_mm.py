@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import f as fisher_f
 
-from tests.dynamic.phasor_cases import H, complex_normal
+from tests.dynamic.phasor_cases import H, complex_normal, rejected
 from tpjb_ident.dynamic.estimators import least_trimmed
 from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, windows_used_again
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, robust_start
@@ -213,10 +213,6 @@ def directions(seed, sizes, noise=SCATTER, discord=0.0):
         parts.append(np.concatenate([D[k], F[k]]) + e - e.mean(axis=0))
     z = np.concatenate(parts)
     return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(len(sizes)), sizes))
-
-
-def rejected(table, direction=3):
-    return np.where(table.direction == direction, 0.0, 1.0)
 
 
 @pytest.mark.parametrize("sizes", [(12,) * 7, (12, 12, 12, 6, 12, 12, 12), (8, 8, 8, 24, 8, 24, 10)])

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.dynamic.phasor_cases import H, complex_normal
-from tests.dynamic.test_mm import rejected
+from tests.dynamic.phasor_cases import NOISE, H, complex_normal, hermitian, noisy_means, rejected, windows
 from tpjb_ident.dynamic.estimators.errors_in_variables import (
     LOCKED,
-    Repeats,
     aligned,
     eiv_fit,
     repeats,
@@ -38,11 +36,6 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     spread_of,
     with_repeats,
 )
-
-
-def hermitian(rng, n):
-    root = complex_normal(rng, n, n)
-    return root @ root.conj().T + 0.3 * np.eye(n)
 
 
 def balanced_scores(g):
@@ -187,19 +180,6 @@ def test_the_size_of_an_effect_is_unbiased():
     np.testing.assert_allclose(np.mean(found, axis=0), effect, atol=0.12 * np.abs(effect).max())
 
 
-def noisy_means(seed, noise, effect=0.0, g=8, count=None):
-    rng = np.random.default_rng(seed)
-    count = np.full(g, 20.0) if count is None else count
-    D = complex_normal(rng, g, 2)
-    F = D @ H.T + effect * np.linalg.norm(D, axis=1)[:, None] * complex_normal(rng, g, 2)
-    z = np.concatenate([D, F], axis=1)
-    z = z + complex_normal(rng, g, 4) @ np.linalg.cholesky(noise).T / np.sqrt(count)[:, None]
-    return Repeats(DirectionMeans(z[:, :2], z[:, 2:], count), noise, float(count.sum() - g), np.ones(int(count.sum())))
-
-
-NOISE = 1e-3 * hermitian(np.random.default_rng(20), 4)
-
-
 @pytest.mark.parametrize("effect", [0.0, 0.5])
 def test_errors_in_variables_follow_any_linear_change_of_axes(effect):
     """D -> A D and F -> B F with their noise: H -> B H A^-1, its covariance with it, chi-square as it was."""
@@ -267,13 +247,6 @@ def test_known_differences_of_directions_widen_the_interval_only():
     assert calm.chi_square < 1.2
     assert np.trace(wide.covariance) > 1.02 * np.trace(calm.covariance)
     assert (wide.dof <= calm.dof).all()
-
-
-def windows(seed, g=6, n=40, noise=NOISE):
-    rng = np.random.default_rng(seed)
-    D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
-    z = np.concatenate([D, D @ H.T], axis=1) + complex_normal(rng, g * n, 4) @ np.linalg.cholesky(noise).T
-    return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), n))
 
 
 def test_windows_far_from_their_direction_are_left_out_of_means_and_noise():

@@ -72,9 +72,6 @@ def test_angles_of_a_known_disturbance_are_found_among_many_minima():
         disturbed = np.linalg.solve(h, force.T).T + np.exp(2j * np.pi * rng.random((6, 2))) @ patterns
         problem = MainsEquations(disturbed, force, patterns, 1e-3 * np.linalg.norm(force, axis=1))
         best = problem.solve()[0]
-        x = best.x + 1e-7
-        slope = (problem.residual(x + 1e-6) - problem.residual(x - 1e-6)) / 2e-6
-        np.testing.assert_allclose(problem.jacobian(x).sum(axis=1), slope, rtol=1e-4, atol=1e-3)
         close.append(np.linalg.norm(problem.entries(best.x) - truth) / np.linalg.norm(truth))
         naive = np.linalg.lstsq(disturbed, force, rcond=None)[0].T
         plain.append(np.linalg.norm(naive - h) / np.linalg.norm(h))
