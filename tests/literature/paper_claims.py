@@ -42,19 +42,7 @@ SOFTER = {"rocker": (0.38, 0.45, 0.35, 0.40, 0.30), "spherical": (0.2,) * 5}
 
 
 class Claim(NamedTuple):
-    """One row.
-
-    Attributes
-    ----------
-    number : int
-        As in the list of claims.
-    says : str
-        The paper.
-    gives : str
-        This model, numbers first.
-    verdict : str
-        ``"yes"``, ``"in part"``, ``"no"`` or ``"not of the model"``.
-    """
+    """One row: what the paper says, what this model gives, numbers first; yes, in part, no or not of the model."""
 
     number: int
     says: str

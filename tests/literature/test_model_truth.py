@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.pivots import ScaledPivot, pivot_laws
 from model.predict import Mesh, predict
@@ -39,11 +40,14 @@ def truth(name: str) -> dict:
     return json.loads((TRUTH / f"{name}.json").read_text(encoding="utf-8"))
 
 
+def softer(bearing: Bearing) -> tuple[ScaledPivot, ...]:
+    return tuple(ScaledPivot(law, f) for law, f in zip(pivot_laws("kirk", bearing), SOFTER, strict=True))
+
+
 def solve(name: str, key: str, point: dict, mesh: Mesh | None = None) -> Prediction:
     bearing = load_bearing(BEARINGS / truth(name)["bearing"])
-    laws = pivot_laws("kirk", bearing)
-    if key == "points" and truth(name)["pivots"] == "custom":
-        laws = tuple(ScaledPivot(law, f) for law, f in zip(laws, SOFTER, strict=True))
+    custom = key == "points" and truth(name)["pivots"] == "custom"
+    laws = softer(bearing) if custom else pivot_laws("kirk", bearing)
     hz = 2 * math.pi
     return predict(
         bearing,
@@ -87,7 +91,7 @@ def test_refined_mesh_stays(name, key):
 def test_locus():
     data = truth("rocker-measured-pivots")
     bearing = load_bearing(BEARINGS / data["bearing"])
-    laws = tuple(ScaledPivot(law, f) for law, f in zip(pivot_laws("kirk", bearing), SOFTER, strict=True))
+    laws = softer(bearing)
     assert len(data["locus"]) == 20
     for row in data["locus"]:
         direction = math.radians(row["static_load_direction_deg"])
@@ -98,7 +102,7 @@ def test_locus():
 def test_pivot_curves():
     data = truth("rocker-measured-pivots")
     bearing = load_bearing(BEARINGS / data["bearing"])
-    laws = [ScaledPivot(law, f) for law, f in zip(pivot_laws("kirk", bearing), SOFTER, strict=True)]
+    laws = softer(bearing)
     for curve in data["pivot_curves"]:
         law = laws[curve["pad"] - 1]
         delta = [law.deflection(w) for w in curve["force_N"]]
