@@ -20,13 +20,11 @@ SEED = 61
 @pytest.mark.parametrize(
     ("case", "rmse"),
     [
-        (Case(), 1.0),
-        (Case("lev", 0.3), 1.0),
         (Case("forcesys", 0.4), 1.1),
-        pytest.param(Case("force", 0.3), 1.0, marks=pytest.mark.slow),
-        pytest.param(Case("forcesys", 0.3), 1.0, marks=pytest.mark.slow),
-        pytest.param(Case("lev", 0.4), 1.1, marks=pytest.mark.slow),
-        pytest.param(Case("gain", 0.2), 1.1, marks=pytest.mark.slow),
+        (Case("force", 0.3), 1.0),
+        (Case("forcesys", 0.3), 1.0),
+        (Case("lev", 0.4), 1.1),
+        (Case("gain", 0.2), 1.1),
     ],
     ids=lambda value: value.name if isinstance(value, Case) else str(value),
 )
@@ -47,6 +45,7 @@ def test_default_method_stands_every_fault(case: Case, rmse: float):
 def test_targets_with_400_replicates(case: Case, rmse: float, bias: float):
     result = score(case, "mm-eiv", 400, SEED)
     assert result.rmse <= rmse
+    assert result.worst < 4 * rmse
     assert np.abs(result.bias).max() <= bias
     assert 93 <= result.coverage <= 98
 
