@@ -171,7 +171,7 @@ def test_other_schema_not_toml_too_large_and_no_file(text, tmp_path):
         load_bearing(latin)
 
 
-@pytest.mark.parametrize("value", ["0x" + "f" * 5000, "[[0x" + "f" * 5000 + "]]", "9" * 5000, str(2**64)])
+@pytest.mark.parametrize("value", ["0x" + "f" * 5000, "[[0x" + "f" * 5000 + "]]", "9" * 5000])
 @pytest.mark.parametrize("key", ["kind", "pivot_angles", "diameter", "nobody_knows"])
 def test_whole_numbers_of_thousands_of_digits_are_named(text, key, value):
     sections = {"kind": "pivot", "pivot_angles": "pads", "diameter": "journal"}
