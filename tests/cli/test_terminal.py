@@ -12,6 +12,7 @@ from tests.command_line import tpjb
 from tpjb_ident.cli.common import terminal
 from tpjb_ident.cli.common.identification import cross_coupling_matters, with_half
 from tpjb_ident.cli.common.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
+from tpjb_ident.columns import Column, words
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]
 FLAGS = "large-amplitude; mains-on-excitation-line; methods-disagree"
@@ -96,13 +97,13 @@ def test_a_verdict_leads_to_a_command():
 def test_a_long_table_ends_with_the_file_that_has_all_of_it(capsys, file):
     rows = [[f"row {i}", str(i)] for i in range(MOST_ROWS + 25)]
     terminal = Terminal()
-    terminal.show("points", ["name", "value"], rows, file=file)
+    terminal.show("points", [*words("name"), Column("value")], rows, file=file)
     printed = capsys.readouterr().out
     assert ("row 64" in printed) is (file == "")
     assert ("25 more rows: coefficients.csv has all 65" in printed) is (file != "")
     assert f"row {MOST_ROWS - 1}" in printed
     assert terminal.tables[-1]["rows"] == rows  # --json repeats every row
-    terminal.show("points", ["name", "value"], rows[:MOST_ROWS], file="coefficients.csv")
+    terminal.show("points", [*words("name"), Column("value")], rows[:MOST_ROWS], file="coefficients.csv")
     assert "more rows" not in capsys.readouterr().out
 
 

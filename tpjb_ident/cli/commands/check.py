@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, campaign_place, command
 from tpjb_ident.cli.common.options import DEMO, CampaignPath
+from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted
 
@@ -22,6 +23,18 @@ KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
 #: From as many problems of one sort on they are counted, not listed.
 ALIKE = 4
 SEVERITIES = ("error", "warning", "note")
+
+
+def span(*values: float) -> str:
+    """Range of finite values."""
+    finite = [v for v in values if math.isfinite(v)]
+    if not finite:
+        return "-"
+    low, high = min(finite), max(finite)
+    return f"{low:g}" if low == high else f"{low:g}..{high:g}"
+
+
+RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
 
 
 @command(f"tpjb check {DEMO}", f"tpjb check {DEMO} --json > findings.json")
@@ -126,13 +139,13 @@ def _show_coverage(c: Command, campaign: Campaign) -> None:
             places = len({(p.static_load, p.static_load_direction, p.shaft_speed, p.excitation) for p in points})
         ranges = [
             [_rate(run) for run in runs],
-            [p.static_load / 1e3 for p in points],
+            [p.static_load for p in points],
             [p.static_load_direction_deg for p in points],
             [p.shaft_speed_hz for p in points],
             [p.excitation_hz for p in points if p.excitation],
         ]
-        rows.append([kind, str(len(runs)), str(places), *map(_range, ranges)])
-    columns = ["kind", "runs", "points, pads", "rate Hz", "load kN", "direction deg", "speed Hz", "excitation Hz"]
+        rows.append([kind, str(len(runs)), str(places), *ranges])
+    columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
     c.show(f"{campaign.id}: what it covers", columns, rows)
 
 
@@ -144,11 +157,3 @@ def _rate(run: Run) -> float:
         return run.sample_rate
     except RigDataError:
         return math.nan
-
-
-def _range(values: Sequence[float]) -> str:
-    finite = [v for v in values if math.isfinite(v)]
-    if not finite:
-        return "-"
-    low, high = min(finite), max(finite)
-    return f"{low:g}" if low == high else f"{low:g}..{high:g}"

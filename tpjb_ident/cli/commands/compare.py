@@ -24,6 +24,7 @@ from tpjb_ident.cli.common.options import (
     named,
     refuse_unknown,
 )
+from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def show_comparison(c: Command, result: Comparison, following: str = "") -> None
     c.print(conclusion)
     if following:
         c.next(following)
-    columns = ["pivots", "kxx", "kyy", "cxx", "cyy"]
+    columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy"]
     c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, list(medians.values()))
     for line in more:
         c.print(line)
@@ -157,6 +158,6 @@ def refuse_comparison(result: Comparison) -> None:
     bad = []
     for variant in result.variants:
         points = [p for p in variant.points if not p.prediction.converged]
-        bad += [f"{variant.name}, {p.point.static_load / 1e3:g} kN" for p in points]
+        bad += [f"{variant.name}, {amount(p.point.static_load, 'load')}" for p in points]
     if bad:
         raise NotTrustedError(f"the model did not converge at {len(bad)} points ({'; '.join(bad[:5])}).")

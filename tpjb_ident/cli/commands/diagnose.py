@@ -23,6 +23,7 @@ from tpjb_ident.cli.common.options import (
     WorkerCount,
     named,
 )
+from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
@@ -158,5 +159,5 @@ def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: s
     for line in more:
         c.print(line)
     if verdict.effects:
-        columns = ["effect", "parameter", "value"]
-        c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict), words=(0, 1))
+        columns = [*words("effect", "parameter"), "value"]
+        c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict))

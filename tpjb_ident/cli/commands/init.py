@@ -12,6 +12,7 @@ import typer
 
 import model
 from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
@@ -151,11 +152,12 @@ def _bearing_file(folder: Path) -> str | None:
 def _show_survey(c: Command, guesses: Survey, name: str) -> None:
     """Print what the channels and the files may be."""
     channels = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in guesses.channels.items()]
-    c.show(f"{name}: channels, guessed", ["channel", "quantity", "unit", "axis", "why"], channels, words=range(5))
+    c.show(f"{name}: channels, guessed", words("channel", "quantity", "unit", "axis", "why"), channels)
     runs = []
     for rate, run in zip(guesses.rates, guesses.runs[:MOST_RECORDS], strict=False):
         lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3]) or "-"
-        runs.append([run.file, run.kind or "?", f"{rate:g}" if rate > 0 else "?", lines, run.why])
-    c.show(f"{name}: records, guessed", ["file", "kind", "rate Hz", "lines Hz", "why"], runs, words=(0, 1, 3, 4))
+        runs.append([run.file, run.kind or "?", rate if rate > 0 else "?", lines, run.why])
+    columns = [*words("file", "kind"), "rate {frequency}", *words("lines Hz", "why")]
+    c.show(f"{name}: records, guessed", columns, runs)
     if len(guesses.runs) > len(runs):
         c.print(f"... and {len(guesses.runs) - len(runs)} more records")

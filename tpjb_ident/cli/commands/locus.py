@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
+from tpjb_ident.columns import UNITS, Column, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
@@ -104,9 +105,10 @@ def _show(c: Command, static: StaticTests, bearing: Bearing, name: str, refused:
         rows = []
         for k, pad in enumerate(bearing.pads):
             measured = (polygon.clearance[k], 1.96 * polygon.clearance_se[k], polygon.clearance_pushed[k])
-            drawn = f"{1e6 * pad.assembled_clearance:.1f}"
-            rows.append([f"#{k + 1}", drawn, *(f"{1e6 * value:.2f}" for value in measured)])
-        c.show(f"{name}: clearance, µm", ["pad", "drawing", "measured", "± (95 %)", "pushed"], rows)
+            rows.append([f"#{k + 1}", pad.assembled_clearance, *measured])
+        columns = [*words("pad"), Column("drawing", ".1f", quantity="length")]
+        columns += [Column(title, ".2f", quantity="length") for title in ("measured", "± (95 %)", "pushed")]
+        c.show(f"{name}: clearance, {UNITS['length'][0]}", columns, rows)
     printed: tuple[str, ...] = ()
     if static.locus is not None:
         c.print(f"locus: {static.locus}")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
+from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
 
@@ -61,15 +62,17 @@ def _show_curves(c: Command, curves: Sequence[PivotCurve], name: str, formula: C
     """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula."""
     rows = []
     for curve in curves:
-        cells = [f"#{curve.pad}"]
+        cells: list[Any] = [f"#{curve.pad}"]
         for load in (0.5 * curve.valid_to, curve.valid_to):
             stiffness = float(curve.stiffness(load))
             low, high = (float(v) for v in curve.stiffness_band(load))
-            cells += [f"{load / 1e3:.2f}", f"{stiffness / 1e6:.0f}", f"{low / 1e6:.0f}..{high / 1e6:.0f}"]
+            cells += [load, stiffness, (low, high)]
         if formula is not None:  # at full load
             percent = 0.01 * formula(curve.pad, curve.valid_to)[1]
             cells.append(f"{stiffness / percent:.0f} ({low / percent:.0f}..{high / percent:.0f})")
         rows.append([*cells, curve.law.name])
+    pad, law = words("pad", "law")
+    band = Column("95 %", "{:.0f}..{:.0f}".format, quantity="stiffness")
+    at_load = [Column("load {load}", ".2f"), Column("{stiffness}", ".0f"), band]
     kirk = ["of Kirk, %"] if formula is not None else []
-    columns = ["pad", *2 * ["load kN", "MN/m", "95 %"], *kirk, "law"]
-    c.show(f"{name}: tangent stiffness of the pivots", columns, rows, words=(0, len(columns) - 1))
+    c.show(f"{name}: tangent stiffness of the pivots", [pad, *2 * at_load, *kirk, law], rows)

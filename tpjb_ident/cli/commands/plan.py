@@ -11,6 +11,7 @@ import typer
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice
 from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Speeds
+from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import signed
 from tpjb_ident.runtime.tables import write_text
 
@@ -105,8 +106,9 @@ def _show(c: Command, result: CampaignPlan) -> None:
     for row, candidate in zip(result.to_frame().to_dict("records"), result.candidates, strict=True):
         size = _detected_from(float(row["seen_from"]), candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
-        rows.append([label_in_words(row["effect"]), f"{row['typical_size_sigma']:.1f}", size, like])
-    c.show("What this campaign could tell", ["effect", "sigma", "seen from", "like"], rows, words=(0, 3))
+        rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])
+    columns = [*words("effect"), Column("sigma", ".1f"), "seen from", *words("like")]
+    c.show("What this campaign could tell", columns, rows)
     c.print("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
     blind = ", ".join(label_in_words(name) for name in result.below_floor)
     c.print(f"Below the floor at a size that would not surprise: {blind or 'nothing'}.")

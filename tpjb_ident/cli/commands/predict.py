@@ -22,11 +22,10 @@ from tpjb_ident.cli.common.options import (
     refuse_unknown,
 )
 from tpjb_ident.cli.common.quantities import parse_value
+from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from model.options import Options
 
 #: Name on the command line: what it does.
@@ -48,8 +47,19 @@ HousingTemperature = Annotated[
     str | None,
     typer.Option(help='With growth: mean temperature of the housing, "48 degC" [default: the oil supply\'s].'),
 ]
-#: Rows of the printed table.
+#: Rows of the printed table, and its columns by those of prediction.csv.
 MOST_ROWS = 20
+COLUMNS: dict[str, Column | str] = {
+    "static_load_N": Column("load {load}", words=True),
+    "static_load_direction_deg": "dir {angle}",
+    "shaft_speed_Hz": "speed {frequency}",
+    "excitation_Hz": "exc. {frequency}",
+    "kxx_N_per_m": Column("kxx {stiffness}", ".1f"),
+    "kyy_N_per_m": Column("kyy {stiffness}", ".1f"),
+    "cxx_Ns_per_m": Column("cxx {damping}", ".1f"),
+    "cyy_Ns_per_m": Column("cyy {damping}", ".1f"),
+    "min_film_m": Column("h_min {length}", ".1f"),
+}
 
 
 @command(
@@ -92,7 +102,9 @@ def predict(
         with c.progress("predicting") as show:
             frame = prediction_frame(predict_points(drawing, points, settings, show))
         c.table("prediction", frame)
-    _show_predictions(c, frame, drawing.name)
+    c.show(drawing.name, list(COLUMNS.values()), frame.head(MOST_ROWS)[list(COLUMNS)].itertuples(index=False))
+    if len(frame) > MOST_ROWS:
+        c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")
     c.print(f"Results: {c.target}")
     bad = int((~frame["converged"]).sum())
     if bad:
@@ -135,19 +147,3 @@ def parse_physics(names: str | None, housing: str | None) -> Options:
         perturbed_bending="perturbed-bending" in chosen,
         axial_tilt="axial-tilt" in chosen,
     )
-
-
-def _show_predictions(c: Command, frame: pd.DataFrame, name: str) -> None:
-    """Print the direct coefficients of the first rows."""
-    rows = []
-    for r in frame.head(MOST_ROWS).to_dict("records"):
-        speeds = [f"{r['shaft_speed_Hz']:g}", f"{r['excitation_Hz']:g}"]
-        stiffness = [f"{r[column] / 1e6:.1f}" for column in ("kxx_N_per_m", "kyy_N_per_m")]
-        damping = [f"{r[column] / 1e3:.1f}" for column in ("cxx_Ns_per_m", "cyy_Ns_per_m")]
-        place = [f"{r['static_load_N'] / 1e3:g}", f"{r['static_load_direction_deg']:g}", *speeds]
-        rows.append([*place, *stiffness, *damping, f"{r['min_film_m'] * 1e6:.1f}"])
-    columns = ["load kN", "dir deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m",
-               "h_min µm"]  # fmt: skip
-    c.show(name, columns, rows)
-    if len(frame) > MOST_ROWS:
-        c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")

@@ -13,6 +13,7 @@ import typer
 
 from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
 from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.provenance import sha256
 
@@ -94,13 +95,18 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
     rows = []
     for run in campaign.runs[:MOST_RUNS]:
         p = run.point
-        load = f"{p.static_load / 1e3:g}" if p.static_load else "-"
-        excitation = f"{p.excitation_hz:g}" if p.excitation else "-"
         pad = "" if run.pad is None else f"#{run.pad}"
-        place = [load, f"{p.static_load_direction_deg:g}", f"{p.shaft_speed_hz:g}", excitation]
+        place = [p.static_load or None, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or None]
         rows.append([run.id, run.kind, *place, pad])
-    columns = ["run", "kind", "load kN", "direction deg", "speed Hz", "exc. Hz", "pad"]
-    c.show("runs", columns, rows, words=(0, 1))
+    columns = [
+        *words("run", "kind"),
+        "load {load}",
+        "direction {angle}",
+        "speed {frequency}",
+        "exc. {frequency}",
+        "pad",
+    ]
+    c.show("runs", columns, rows)
     if len(campaign.runs) > len(rows):
         c.print(f"... and {len(campaign.runs) - len(rows)} more runs")
 
@@ -140,17 +146,17 @@ def _show_channels(c: Command, title: str, series: list[Series], looks: dict[str
     rows, spectra = [], []
     for s in series:
         look = looks[s.name]
-        rate = f"{s.rate:g}" if s.rate > 0 else "?"
-        figures = [f"{look.mean:.4g}", f"{look.deviation:.3g}", f"{look.low:.4g}", f"{look.high:.4g}"]
         lines = ", ".join(f"{line.frequency:.4g}" for line in look.lines)
         flag = "dead" if look.flat else f"{look.missing} missing" if look.missing else ""
-        rows.append([s.name, s.unit, f"{look.count}", rate, *figures, lines, flag])
+        samples = [str(look.count), s.rate if s.rate > 0 else "?"]
+        rows.append([s.name, s.unit, *samples, look.mean, look.deviation, look.low, look.high, lines, flag])
         if len(look.amplitude) > 4:
-            spectra.append([s.name, sparkline(look.amplitude[4:].tolist()), f"{look.frequency[-1]:g}"])
-    columns = ["channel", "unit", "samples", "rate Hz", "mean", "std", "min", "max", "lines Hz", ""]
-    c.show(title, columns, rows, words=(0, 1, 8, 9))
+            spectra.append([s.name, sparkline(look.amplitude[4:].tolist()), look.frequency[-1]])
+    figures = [Column("mean", ".4g"), Column("std", ".3g"), Column("min", ".4g"), Column("max", ".4g")]
+    columns = [*words("channel", "unit"), "samples", "rate {frequency}", *figures, *words("lines Hz", "")]
+    c.show(title, columns, rows)
     if spectra:
-        c.show("spectra, 3 decades", ["channel", "from 0", "to Hz"], spectra, words=(0, 1))
+        c.show("spectra, 3 decades", [*words("channel", "from 0"), "to {frequency}"], spectra)
 
 
 def _row(series: Series, look: Look) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.command import Command, campaign_place, command, refuse_special
+from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of
 from tpjb_ident.runtime.provenance import sha256, versions
@@ -41,10 +42,9 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    differing = [
-        f["file"] for f in files if f["state"] == "differs" or (f["role"], f["state"]) == ("result", "missing")
-    ]
-    if differing:
+    changed = [f for f in files if f["state"] == "differs" or (f["role"], f["state"]) == ("result", "missing")]
+    if changed:
+        differing = [f["file"] for f in changed]
         more = f" and {len(differing) - 5} more" if len(differing) > 5 else ""
         raise NotTrustedError(
             f"{results}: not as it was computed: {', '.join(differing[:5])}{more}. Run the command again."
@@ -79,7 +79,10 @@ def _files(results: Path, name: str, entry: dict[str, Any], given: Sequence[Path
     for file in outputs_of(entry):
         yield {"command": name, "role": "result", "file": file, "state": _state([results], file, hashes[file])}
     places = given or [results / place for place in _texts(entry.get("inputs_at")).values()]
-    folders = dict.fromkeys(folder for place in places for folder in _folders(place))
+    folders: list[Path] = []
+    for place in places:
+        inner = campaign_place(place)
+        folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
     for file, recorded_hash in _texts(entry.get("inputs_sha256")).items():
         if recorded_hash != "missing":  # it was not there then either
             yield {"command": name, "role": "input", "file": file, "state": _state(folders, file, recorded_hash)}
@@ -87,14 +90,6 @@ def _files(results: Path, name: str, entry: dict[str, Any], given: Sequence[Path
 
 def _texts(entry: Any) -> dict[str, str]:
     return {k: v for k, v in entry.items() if isinstance(v, str)} if isinstance(entry, dict) else {}
-
-
-def _folders(place: Path) -> list[Path]:
-    """Folders in which files named by a record may be, for one path that a command was given."""
-    if not place.is_dir():
-        return [place.parent]
-    inner = campaign_place(place)
-    return [inner if inner.is_dir() else inner.parent, place]
 
 
 def _state(folders: Iterable[Path], name: str, recorded_hash: str) -> str:
@@ -119,12 +114,13 @@ def _show(c: Command, results: Path, entries: dict[str, dict[str, Any]], files: 
     """Print counts per command, what differs by name, and which versions are others now."""
     rows = []
     for name, entry in entries.items():
-        cells = []
+        row = [name, str(entry.get("finished", ""))]
         for role in ("result", "input"):
             states = [f["state"] for f in files if (f["command"], f["role"]) == (name, role)]
-            cells.append(f"{states.count('same')} of {len(states)}")
-        rows.append([name, str(entry.get("finished", "")), *cells])
-    c.show(f"{results}: unchanged files", ["command", "finished", "results", "inputs"], rows, words=(0, 1))
+            row.append(f"{states.count('same')} of {len(states)}")
+        rows.append(row)
+    columns = [*words("command", "finished"), "results", "inputs"]
+    c.show(f"{results}: unchanged files", columns, rows)
     for f in files:
         if f["state"] != "same":
             c.print(f"{f['command']}: {f['role']} {f['file']} {STATES[f['state']]}")

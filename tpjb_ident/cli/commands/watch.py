@@ -11,6 +11,7 @@ import typer
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.options import BearingOption
 from tpjb_ident.cli.common.quantities import parse_amount
+from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 
@@ -160,7 +161,7 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
 
         coverage = coverage_table(snapshot)
         title = f"{snapshot.campaign.id}: {len(snapshot.new)} records have landed"
-        c.show(title, coverage.columns, coverage.rows)
+        c.show(title, [Column(name, words=not name) for name in coverage.columns], coverage.rows)
     else:
         status = {s.run.id: s for s in snapshot.states}
         latest = {p.point: run for p in snapshot.measured.points for run in snapshot.new if run in p.runs}

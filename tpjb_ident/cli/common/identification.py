@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command
 from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.columns import UNITS, Column, amount, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
     from rigdata.arrays import FloatArray
     from rigdata.campaign import Campaign
-    from rigdata.operating_point import OperatingPoint
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -23,8 +22,28 @@ CROSS_COUPLED = 0.1
 #: Lines of h that are shown per operating point; all are in the table on disk.
 MOST_LINES = 5
 LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-POINT = ["load kN", "dir. deg", "speed Hz", "exc. Hz"]
-DIRECT = ["kxx MN/m", "kyy MN/m", "cxx kNs/m", "cyy kNs/m"]
+
+
+def with_half(value: float, half: float) -> str:
+    """A number with half its interval, or that there is none."""
+    if not math.isfinite(value):
+        return "no answer"
+    if not math.isfinite(half) or half <= 0:
+        return f"{value:.4g} ±?"
+    digits = max(0, -math.floor(math.log10(half))) if half < 10 else 0
+    return f"{value:.{min(digits, 3)}f} ±{half:.{min(digits, 3)}f}"
+
+
+LOAD = Column("load {load}")
+POINT: tuple[Column | str, ...] = (LOAD, "dir. {angle}", "speed {frequency}", "exc. {frequency}")
+#: Entries of (kxx, kxy, kyx, kyy, cxx, .. cyy).
+DIRECT, CROSS = (0, 3, 4, 7), (1, 2, 5, 6)
+COEFFICIENTS = [
+    *(Column(f"k{entry} {{stiffness}}", with_half) for entry in ("xx", "xy", "yx", "yy")),
+    *(Column(f"c{entry} {{damping}}", with_half) for entry in ("xx", "xy", "yx", "yy")),
+]
+MASSES = [Column(f"m{entry} {{mass}}", with_half) for entry in ("xx", "yy")]
+MODEL, VERDICT = words("model", "verdict")
 
 
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
@@ -84,11 +103,11 @@ def refuse_untrusted(result: Identification) -> None:
         serious = sentences(untrusted(band.quality))
         if not band.points and (serious or not band.lines):
             why = "; ".join(serious) or "no line stands clear of the noise"
-            bad.append(f"{_load(band.point)} kN, {band.kind}: {why}")
+            bad.append(f"{amount(band.point.static_load, 'load')}, {band.kind}: {why}")
     for p in result.points:
         serious = sentences(untrusted(p.quality))
         if serious or not np.isfinite(p.stiffness.h).all():
-            bad.append(f"{_load(p.point)} kN, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
+            bad.append(f"{amount(p.point.static_load, 'load')}, {p.point.excitation_hz:g} Hz: {'; '.join(serious)}")
     lost = sentences(untrusted(result.conditions))
     if lost and not bad:
         raise NotTrustedError("; ".join(lost))
@@ -129,45 +148,27 @@ def _trust(bad: int) -> str:
     return f"{bad} NOT to be trusted" if bad else "all to be trusted"
 
 
-def _load(point: OperatingPoint) -> str:
-    return f"{point.static_load / 1e3:g}"
-
-
 def _show_coefficients(c: Command, result: Identification, letters: dict[str, str]) -> None:
     """Print K and C of every point with half the width of their intervals, its flags by their letters."""
     import numpy as np
 
-    direct, coupled = [], []
+    direct, cross = [], []
     for p in result.points:
-        values = np.concatenate([p.stiffness.k.ravel() / 1e6, p.stiffness.c.ravel() / 1e3])
-        halves = p.stiffness.half_width() / np.repeat([1e6, 1e3 * p.stiffness.omega], 4)
-        cells = [with_half(value, half) for value, half in zip(values, halves, strict=True)]
-        place = [
-            _load(p.point),
-            f"{p.point.static_load_direction_deg:g}",
-            f"{p.point.shaft_speed_hz:g}",
-            f"{p.point.excitation_hz:g}",
-        ]
+        values = np.concatenate([p.stiffness.k.ravel(), p.stiffness.c.ravel()])
+        halves = p.stiffness.half_width() / np.repeat([1.0, p.stiffness.omega], 4)
+        cells = list(zip(values, halves, strict=True))
+        point = p.point
+        place = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
         flags = "".join(letters[str(q)] for q in p.quality)
-        direct.append([*place, cells[0], cells[3], cells[4], cells[7], f"{100 * p.outlier_fraction:.0f}", flags])
+        direct.append([*place, *(cells[i] for i in DIRECT), p.outlier_fraction, flags])
         if cross_coupling_matters(values, halves):
-            coupled.append([*place, cells[1], cells[2], cells[5], cells[6]])
+            cross.append([*place, *(cells[i] for i in CROSS)])
     title = f"{result.campaign}: {result.method}, 95 % intervals"
-    c.show(title, [*POINT, *DIRECT, "out %", "flags"], direct, words=(9,), file="coefficients.csv")
-    if coupled:
-        columns = [*POINT, "kxy MN/m", "kyx MN/m", "cxy kNs/m", "cyx kNs/m"]
+    columns = [*POINT, *(COEFFICIENTS[i] for i in DIRECT), Column("out {share}", ".0f"), *words("flags")]
+    c.show(title, columns, direct, file="coefficients.csv")
+    if cross:
         title = "cross-coupled, where they are more than a tenth of the direct ones"
-        c.show(title, columns, coupled, words=(), file="coefficients.csv")
-
-
-def with_half(value: float, half: float) -> str:
-    """A number with half its interval, or that there is none."""
-    if not math.isfinite(value):
-        return "no answer"
-    if not math.isfinite(half) or half <= 0:
-        return f"{value:.4g} ±?"
-    digits = max(0, -math.floor(math.log10(half))) if half < 10 else 0
-    return f"{value:.{min(digits, 3)}f} ±{half:.{min(digits, 3)}f}"
+        c.show(title, [*POINT, *(COEFFICIENTS[i] for i in CROSS)], cross, file="coefficients.csv")
 
 
 def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
@@ -183,21 +184,22 @@ def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
 
 def _show_frequency_fits(c: Command, result: Identification) -> None:
     """Print which model over frequency the data of every load support."""
-    rows, refusing = [], []
+    rows, rejecting = [], []
     for group in result.frequency_fits():
-        load = _load(group.points[0].point)
+        load = group.points[0].point.static_load
         if group.supported not in group.fits:
-            refusing.append(load)
+            rejecting.append(f"{load / 1e3:g}")
         for name, fit in group.fits.items():
-            figures = [f"{fit.chi_square:.1f}", str(fit.dof), f"{fit.probability:.2g}", f"{100 * fit.misfit:.1f}"]
-            rows.append([load, name, *figures, _verdict(name == group.supported, fit.refused)])
+            verdict = _verdict(name == group.supported, fit.refused)
+            rows.append([load, name, fit.chi_square, fit.dof, fit.probability, fit.misfit, verdict])
     if rows:
-        columns = ["load kN", "model", "chi-square", "dof", "probability", "misfit %", "verdict"]
-        c.show("over frequency", columns, rows, words=(1, 6), file="frequency_fits.csv")
-    if refusing:
-        more = f" and {len(refusing) - 6} more loads" if len(refusing) > 6 else ""
+        figures = [Column("chi-square", ".1f"), Column("dof", ".0f"), Column("probability", ".2g")]
+        columns = [LOAD, MODEL, *figures, Column("misfit {share}", ".1f"), VERDICT]
+        c.show("over frequency", columns, rows, file="frequency_fits.csv")
+    if rejecting:
+        more = f" and {len(rejecting) - 6} more loads" if len(rejecting) > 6 else ""
         c.print(
-            f"note: at {', '.join(refusing[:6])} kN{more} the data refuse K-C and K-C-M; use the coefficients of each "
+            f"note: at {', '.join(rejecting[:6])} kN{more} the data refuse K-C and K-C-M; use the coefficients of each "
             "excitation frequency"
         )
 
@@ -211,35 +213,31 @@ def _show_bands(c: Command, result: Identification) -> None:
     bad = sum(bool(untrusted(band.quality)) for band in result.bands)
     n = len(result.bands)
     c.print(f"{result.campaign}: {n} operating point{'s' if n > 1 else ''} excited over a band, {_trust(bad)}.")
-    _show_band_models(c, result)
-    rows = []
+    models, lines, rejecting = [], [], []
     for band in result.bands:
-        half = band.half_width() / 1e6
+        load = band.point.static_load
+        for name, model in band.models.items():
+            pairs = [*zip(model.parameters, model.half_width(), strict=False), *4 * [None]]
+            cells = [pairs[i] for i in (*DIRECT, 8, 11)]
+            models.append([load, name, *cells, _verdict(name == band.supported, model.refused)])
+        if band.models and band.supported == "raw H":
+            rejecting.append(f"{load / 1e3:g}")
+        half = band.half_width()
         step = max(1, (len(band.lines) - 1) // (MOST_LINES - 1))
         for k in range(0, len(band.lines), step)[:MOST_LINES]:
             line = band.lines[k]
-            h = line.stiffness.vector / 1e6
-            cells = [with_half(h[i], half[k, i]) for i in (0, 3, 4, 7)]
-            place = [_load(band.point), band.kind, f"{line.frequency:.4g}"]
-            rows.append([*place, *cells, f"{min(line.coherence):.3f}", line.method])
-    columns = ["load kN", "excitation", "Hz", "Re hxx", "Re hyy", "Im hxx", "Im hyy", "coh.", "method"]
-    if rows:
-        c.show("dynamic stiffness over the band, MN/m", columns, rows, words=(1, 8), file="frf.csv")
-    refusing = [_load(band.point) for band in result.bands if band.models and band.supported == "raw H"]
-    if refusing:
-        loads = ", ".join(refusing[:6])
-        c.print(f"note: at {loads} kN the lines refuse K-C and K-C-M; use h over frequency (frf.csv)")
-
-
-def _show_band_models(c: Command, result: Identification) -> None:
-    scales: Sequence[tuple[int, float]] = ((0, 1e6), (3, 1e6), (4, 1e3), (7, 1e3), (8, 1.0), (11, 1.0))
-    rows = []
-    for band in result.bands:
-        for name, model in band.models.items():
-            half = model.half_width()
-            cells = [with_half(model.parameters[i] / s, half[i] / s) if i < len(half) else "-" for i, s in scales]
-            verdict = _verdict(name == band.supported, model.refused)
-            rows.append([_load(band.point), name, *cells, verdict])
-    if rows:
-        columns = ["load kN", "model", *DIRECT, "mxx kg", "myy kg", "verdict"]
-        c.show("models over the band, 95 % intervals", columns, rows, words=(1, 8), file="frf_models.csv")
+            cells = [(line.stiffness.vector[i], half[k, i]) for i in DIRECT]
+            lines.append([load, band.kind, line.frequency, *cells, min(line.coherence), line.method])
+    if models:
+        columns = [LOAD, MODEL, *(COEFFICIENTS[i] for i in DIRECT), *MASSES, VERDICT]
+        c.show("models over the band, 95 % intervals", columns, models, file="frf_models.csv")
+    if lines:
+        entries = ("Re hxx", "Re hyy", "Im hxx", "Im hyy")
+        parts = [Column(entry, with_half, quantity="stiffness") for entry in entries]
+        excitation, method = words("excitation", "method")
+        columns = [LOAD, excitation, Column("{frequency}", ".4g"), *parts, Column("coh.", ".3f"), method]
+        c.show(f"dynamic stiffness over the band, {UNITS['stiffness'][0]}", columns, lines, file="frf.csv")
+    if rejecting:
+        c.print(
+            f"note: at {', '.join(rejecting[:6])} kN the lines refuse K-C and K-C-M; use h over frequency (frf.csv)"
+        )

@@ -25,12 +25,9 @@ def one_of(*names: str) -> Callable[[str], list[str]]:
     return complete
 
 
-CampaignPath = Annotated[
-    Path, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
-]
-MaybeCampaign = Annotated[
-    Path | None, typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
-]
+_CAMPAIGN = typer.Argument(metavar="CAMPAIGN", help="Campaign: a folder with campaign.toml, or one HDF5 file.")
+CampaignPath = Annotated[Path, _CAMPAIGN]
+MaybeCampaign = Annotated[Path | None, _CAMPAIGN]
 Coefficients = Annotated[
     Path | None,
     typer.Option("--coefficients", metavar="TABLE.csv", help="Instead of a campaign: K, C as in coefficients.csv."),

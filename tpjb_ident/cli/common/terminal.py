@@ -7,13 +7,15 @@ import os
 import shutil
 import textwrap
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.columns import Column
 from tpjb_ident.runtime.tables import printable, readable
 
 if TYPE_CHECKING:
     from rich.console import Console
+
 
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
@@ -79,22 +81,28 @@ class Terminal:
     def show(
         self,
         title: str,
-        columns: Sequence[str],
-        rows: Sequence[Sequence[str]],
-        words: Collection[int] = (0,),
+        titles: Sequence[Column | str],
+        rows: Iterable[Sequence[Any]],
         file: str = "",
     ) -> None:
         """Print a table that fits the terminal, its columns of words to the left; of a long one the `file` with all."""
-        self.tables.append({"title": title, "columns": list(columns), "rows": [list(row) for row in rows]})
+        columns = [Column(title) if isinstance(title, str) else title for title in titles]
+        headings = [column.heading for column in columns]
+        texts = []
+        for row in rows:
+            cells = [column.cell(value) for column, value in zip(columns, row, strict=True)]
+            texts.append(cells)
+        self.tables.append({"title": title, "columns": headings, "rows": texts})
         if self._silent:
             return
-        head = rows[:MOST_ROWS] if file else rows
-        cells = [[readable(cell) for cell in row] for row in head]
-        lines = table_lines([readable(column) for column in columns], cells, words, _width())
+        head = texts[:MOST_ROWS] if file else texts
+        shown = [[readable(cell) for cell in row] for row in head]
+        words = [i for i, column in enumerate(columns) if column.words]
+        lines = table_lines([readable(heading) for heading in headings], shown, words, _width())
         for line in ("", printable(title), *lines, ""):
             _console().print(line, markup=False)
-        if len(head) < len(rows):
-            _console().print(f"{len(rows) - len(head)} more rows: {file} has all {len(rows)}", markup=False)
+        if len(head) < len(texts):
+            _console().print(f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}", markup=False)
 
     @contextlib.contextmanager
     def progress(self, activity: str) -> Iterator[Progress]:
