@@ -124,8 +124,7 @@ class Comparison(Presented):
 
     Examples
     --------
-    >>> settings = ti.CompareSettings(variants=("kirk",), thermal="isothermal")
-    >>> comparison = ti.compare_campaign(demo, rocker, settings)
+    >>> comparison = ti.compare_campaign(demo, rocker, ti.CompareSettings(variants=("kirk",), thermal="isothermal"))
     >>> comparison.to_dataframe()[["kyy_N_per_m", "kyy_N_per_m_predicted"]].shape
     (7, 2)
     """
@@ -189,8 +188,7 @@ def compare_campaign(
     Parameters
     ----------
     campaign : Campaign
-    bearing : Bearing
-        As drawn.
+    bearing : Bearing, as drawn
     settings : CompareSettings, optional
     progress : callable, optional
         Called as progress(text, done, total).
@@ -215,7 +213,7 @@ def compare_campaign(
 
     settings = settings or CompareSettings()
     _check(campaign, settings)
-    report = progress or _no_progress
+    report = progress or (lambda text, done, total: None)
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = settings.identify or IdentifySettings()
     chosen = replace(chosen, clearance=chosen.clearance or least)
@@ -226,10 +224,6 @@ def compare_campaign(
     if side is None or not all(set(points) <= predicted.keys() for predicted in side.predicted.values()):
         side = model_side(campaign, bearing, settings, points, report)
     return _joined(campaign, bearing, settings, identification, side)
-
-
-def _no_progress(text: str, done: int, total: int) -> None:
-    pass
 
 
 @dataclass(frozen=True)
@@ -251,7 +245,7 @@ def model_side(
     """Measure the static tests and predict points (default: all that the manifest names) and locus."""
     from tpjb_ident.compare.static_tests import measure_static
 
-    report = progress or _no_progress
+    report = progress or (lambda text, done, total: None)
     if points is None:
         points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
     report("fitting pivot curves, clearance and locus", 0, 1)

@@ -104,13 +104,16 @@ def identify(
         with all_runs(sines, settings.phasors, tell, workers, store) as finished:
             identification = assemble(sines, finished, settings, tell, workers)
     identification = identification if bands is None else _with_bands(identification, bands)
+    return _with_zero_uncertainty(identification, campaign)
+
+
+def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -> Identification:
+    """Positions of the shaft are as uncertain as the probes' stated zeros."""
     zero = zero_uncertainty(campaign.channels.values(), "displacement")
     if not zero.any():
         return identification
-    return replace(
-        identification,
-        points=tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points),
-    )
+    points = tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points)
+    return replace(identification, points=points)
 
 
 def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:
