@@ -55,20 +55,20 @@ class RunResponse:
 
 def response_of(observation: Observation, mass: float) -> RunResponse | None:
     """Take the phasors of a run; None where it does not show them, or its force is in doubt already."""
-    where = observation.pick("displacement")
+    probes = observation.pick("displacement")
     force = oil_force(observation, mass)
     if (
-        len(where) != 2
+        len(probes) != 2
         or force is None
         or observation.lines is None
         or "force" in observation.report.doubts
         or not excited(observation)
     ):
         return None
-    readings = observation.lines.phasor[where]
-    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * observation.lines.floor[where]):
+    readings = observation.lines.phasor[probes]
+    if not np.all(np.isfinite(readings)) or not np.any(np.abs(readings) > 8 * observation.lines.floor[probes]):
         return None
-    return RunResponse(observation, force, readings, tuple(observation.channels[i] for i in where))
+    return RunResponse(observation, force, readings, tuple(observation.channels[i] for i in probes))
 
 
 def _solve_stiffness(responses: Sequence[RunResponse]) -> ComplexArray | None:
@@ -112,10 +112,10 @@ def check_agreement(
         allowed = max(_OUTLIER, 6 * float(np.median(misfits)))
         outliers = {i for i, misfit in enumerate(misfits) if misfit > allowed}
     outliers |= _apart(group, outliers)
-    others = [i for i in range(len(group)) if i not in outliers]
-    common = _solve_stiffness([group[i] for i in others]) if outliers and len(others) > 1 else None
+    consistent = [i for i in range(len(group)) if i not in outliers]
+    common = _solve_stiffness([group[i] for i in consistent]) if outliers and len(consistent) > 1 else None
     for i in sorted(outliers):
-        gain = None if readings is None else gain_of_run(readings, i, others)
+        gain = None if readings is None else gain_of_run(readings, i, consistent)
         hint = "" if gain is None or gain.chance > _CHANCE else _as_if(group[0].names[gain.channels[0]], gain.gain)
         _tell(group[i], stiffness if common is None else common, hint)
     return outliers
@@ -123,39 +123,39 @@ def check_agreement(
 
 def _apart(group: Sequence[RunResponse], known: set[int]) -> set[int]:
     """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
-    apart: set[int] = set(known)
-    while len(apart) + 1 <= _MOST * len(group):
-        remaining = [i for i in range(len(group)) if i not in apart]
+    outliers: set[int] = set(known)
+    while len(outliers) + 1 <= _MOST * len(group):
+        remaining = [i for i in range(len(group)) if i not in outliers]
         if len(remaining) < _MIN_RUNS:
             break
         tried = [(_distance(group[i], [group[j] for j in remaining if j != i]), i) for i in remaining]
         (ratio, misfit), worst = max(tried)
         if ratio < 1.0 or misfit < _LEAST:
             break
-        apart.add(worst)
-    return apart
+        outliers.add(worst)
+    return outliers
 
 
-def _distance(one: RunResponse, others: Sequence[RunResponse]) -> tuple[float, float]:
+def _distance(response: RunResponse, remaining: Sequence[RunResponse]) -> tuple[float, float]:
     """How far a run is from the others' matrix: over what chance allows, and as a share of its force.
 
     With s^2 the others' variance per equation and d the run's displacement, its residual r has the variance
     s^2 (1 + d* (sum of d d*)^-1 d); |r|^2 over it follows an F distribution.
     """
-    stiffness = _solve_stiffness(others)
-    spare = 2 * (2 * len(others) - 4)
+    stiffness = _solve_stiffness(remaining)
+    spare = 2 * (2 * len(remaining) - 4)
     if stiffness is None or spare < 4:
         return 0.0, 0.0
     from scipy.special import fdtri
 
-    scales = np.array([np.linalg.norm(a.displacement) for a in others])
-    unit = np.stack([a.displacement for a in others]) / scales[:, None]
-    rest = np.stack([a.force - stiffness @ a.displacement for a in others]) / scales[:, None]
+    scales = np.array([np.linalg.norm(a.displacement) for a in remaining])
+    unit = np.stack([a.displacement for a in remaining]) / scales[:, None]
+    rest = np.stack([a.force - stiffness @ a.displacement for a in remaining]) / scales[:, None]
     variance = float(np.sum(np.abs(rest) ** 2)) / spare
-    size = float(np.linalg.norm(one.displacement))
-    residual = float(np.linalg.norm(one.force - stiffness @ one.displacement)) / size
-    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage(unit, one.displacement / size)))
-    return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(one, stiffness)
+    size = float(np.linalg.norm(response.displacement))
+    residual = float(np.linalg.norm(response.force - stiffness @ response.displacement)) / size
+    ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage(unit, response.displacement / size)))
+    return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(response, stiffness)
 
 
 def _as_if(name: str, gain: float) -> str:

@@ -50,12 +50,12 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         campaign = as_campaign(campaign, "check_campaign: campaign")
     except RigDataError as error:
         return _sorted(error.problems)
-    seen: list[Observation] = []
+    observations: list[Observation] = []
     for count, run in enumerate(campaign.runs, start=1):
-        seen.append(observe(run))
+        observations.append(observe(run))
         if progress is not None:
             progress(count, len(campaign.runs))
-    findings: list[Finding] = [f for observation in judged(campaign, seen) for f in observation.report.found]
+    findings: list[Finding] = [f for observation in judged(campaign, observations) for f in observation.report.found]
     merged = merge(findings, campaign.path.name, campaign.runs)
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
@@ -98,22 +98,22 @@ def _spread_doubts(observations: Sequence[Observation]) -> None:
 def _check_duplicates(observations: Sequence[Observation]) -> None:
     first: dict[str, Observation] = {}
     for observation in observations:
-        other = first.setdefault(observation.digest, observation) if observation.digest else observation
-        if other.run.id == observation.run.id:  # itself, or another excitation in its record
+        earlier = first.setdefault(observation.digest, observation) if observation.digest else observation
+        if earlier.run.id == observation.run.id:  # itself, or another excitation in its record
             continue
-        if _shared_record(observation.run, other.run):
-            text = f"shares its record with run {other.run.id}, at another excitation frequency"
+        if _shared_record(observation.run, earlier.run):
+            text = f"shares its record with run {earlier.run.id}, at another excitation frequency"
             observation.report.say("shared", "note", "", text, "Nothing, if both lines were excited at once")
             continue
-        text = f"holds the very samples of run {other.run.id} ({other.run.file})"
+        text = f"holds the very samples of run {earlier.run.id} ({earlier.run.file})"
         cure = "One of the two is a copy: find the right file, or delete the run"
         observation.report.say("duplicate", "error", "", text, cure)
 
 
-def _shared_record(one: Run, other: Run) -> bool:
+def _shared_record(first: Run, second: Run) -> bool:
     """Whether one record excited at several frequencies serves both runs."""
-    same = replace(one.point, excitation=other.point.excitation) == other.point
-    return one.kind == other.kind == "dynamic" and same and one.point != other.point
+    same = replace(first.point, excitation=second.point.excitation) == second.point
+    return first.kind == second.kind == "dynamic" and same and first.point != second.point
 
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:
@@ -124,16 +124,16 @@ def _leftovers(campaign: Campaign) -> list[Problem]:
     """Note records without a run: forgotten in the manifest, or left from another campaign."""
     if campaign.path.is_dir():
         names = _files(campaign)
-        where, what = campaign.path.name, "file"
+        place, noun = campaign.path.name, "file"
     else:
         names = _groups(campaign)
-        where, what = f"{campaign.path.name}:/runs", "group"
+        place, noun = f"{campaign.path.name}:/runs", "group"
     if not names:
         return []
     more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
     listed = ", ".join(ascii(n)[1:-1][:60] for n in names[:_LISTED])
-    text = f"no run names the {what}{'' if len(names) == 1 else 's'} {listed}{more}"
-    return [Problem("note", where, "", text, "Add them to the manifest, or nothing if they are not wanted")]
+    text = f"no run names the {noun}{'' if len(names) == 1 else 's'} {listed}{more}"
+    return [Problem("note", place, "", text, "Add them to the manifest, or nothing if they are not wanted")]
 
 
 def _files(campaign: Campaign) -> list[str]:

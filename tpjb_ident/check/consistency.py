@@ -43,13 +43,13 @@ def check_load_ratios(runs: Sequence[Observation]) -> None:
     """Mean force over set point of every dynamic and locus run against that of all others."""
     shown: list[tuple[Observation, complex]] = []
     for observation in runs:
-        stated = observation.run.point.static_load
-        if observation.run.kind not in {"dynamic", "locus"} or observation.lines is None or not stated > 0:
+        nominal = observation.run.point.static_load
+        if observation.run.kind not in {"dynamic", "locus"} or observation.lines is None or not nominal > 0:
             continue
         mean = plane_vector(observation, "force", observation.lines.mean)
         if mean is not None:
             turn = complex(np.exp(1j * observation.run.point.static_load_direction))
-            shown.append((observation, complex(mean[0], mean[1]) / (stated * turn)))
+            shown.append((observation, complex(mean[0], mean[1]) / (nominal * turn)))
     if len(shown) < _MIN_RUNS:
         return
     ratios = np.array([r for _, r in shown])
@@ -72,21 +72,21 @@ def check_housing(runs: Sequence[Observation]) -> None:
     """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
     groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
     for observation in runs:
-        where = observation.pick("acceleration")
+        accelerometers = observation.pick("acceleration")
         if (
             observation.lines is None
-            or len(where) != 2
+            or len(accelerometers) != 2
             or "force" in observation.report.doubts
             or not excited(observation)
         ):
             continue
         force = plane_vector(observation, "force", observation.lines.phasor)
-        readings = observation.lines.phasor[where]
+        readings = observation.lines.phasor[accelerometers]
         if force is None or not np.all(np.isfinite(readings)):
             continue
-        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(observation.lines.floor[where]):
+        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(observation.lines.floor[accelerometers]):
             continue
-        names = tuple(observation.channels[i].name for i in where)
+        names = tuple(observation.channels[i].name for i in accelerometers)
         key = (round(observation.run.point.excitation_hz, 6), names)
         groups.setdefault(key, []).append((observation, force, np.asarray(readings)))
     for (_, names), group in groups.items():

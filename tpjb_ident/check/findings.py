@@ -80,18 +80,18 @@ class Verdicts:
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     """Sort the findings of runs of one kind."""
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
-    found = Verdicts()
+    result = Verdicts()
     for report in reports:
-        found.gains.update(report.gains)
+        result.gains.update(report.gains)
         for finding in report.found:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
     alike = len({report.run.id for report in reports})
     for (_, severity), concerned in groups.items():
         for run, problem in concerned.items():
             if severity == "warning":
-                found.doubtful.setdefault(run, []).append(problem)
+                result.doubtful.setdefault(run, []).append(problem)
             elif severity == "error" and _is_shared(len(concerned), alike):
-                found.shared.setdefault(run, []).append(problem)
+                result.shared.setdefault(run, []).append(problem)
             elif severity == "error":
-                found.unusable.setdefault(run, problem)
-    return found
+                result.unusable.setdefault(run, problem)
+    return result

@@ -117,42 +117,44 @@ class Evidence:
         # the t distribution of infinite freedom is the normal one, which stdtr takes as a large number
         return float(2 * stdtr(min(self.freedom, 1e9), -abs(self.part) * np.sqrt(self.information)))
 
-    def joined(self, other: Evidence) -> Evidence:
+    def joined(self, second: Evidence) -> Evidence:
         """Weighted mean of two independent estimates."""
-        information = self.information + other.information
+        information = self.information + second.information
         if information <= 0:
             return self
-        mine, its = self.information / information, other.information / information
-        return Evidence(mine * self.part + its * other.part, information, mine**4 * self.doubt + its**4 * other.doubt)
+        mine, share = self.information / information, second.information / information
+        return Evidence(
+            mine * self.part + share * second.part, information, mine**4 * self.doubt + share**4 * second.doubt
+        )
 
 
 def dynamic_difference(
-    readings: PointReadings, one: int, others: Sequence[int], stiffness: ComplexArray
+    readings: PointReadings, run: int, agreeing: Sequence[int], stiffness: ComplexArray
 ) -> Difference | None:
-    """Force of run `one` minus H of the `others` times its displacement: Re X, Re Y, Im X, Im Y [N].
+    """Force of `run` minus H of the `agreeing` runs times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     H is their `common_stiffness`; None where they leave no scatter.
 
     `stiffness` (2, 2) [N/m].
     """
-    spare = 2 * (2 * len(others) - 4)
+    spare = 2 * (2 * len(agreeing) - 4)
     if spare < 4:
         return None
     displacement, force = readings.displacement, readings.force
-    sizes = np.linalg.norm(displacement[list(others)], axis=1)[:, None]
-    unit = displacement[list(others)] / sizes
-    scatter = (force[list(others)] - displacement[list(others)] @ stiffness.T) / sizes
-    own, size = displacement[one], float(np.linalg.norm(displacement[one]))
-    each = float(np.sum(np.abs(scatter) ** 2)) / spare
-    noise_error = _noise_error(readings, others, stiffness)
-    if spare >= _TELLING and 0 < each <= _NO_MORE * noise_error:
+    sizes = np.linalg.norm(displacement[list(agreeing)], axis=1)[:, None]
+    unit = displacement[list(agreeing)] / sizes
+    scatter = (force[list(agreeing)] - displacement[list(agreeing)] @ stiffness.T) / sizes
+    run_displacement, size = displacement[run], float(np.linalg.norm(displacement[run]))
+    noise = float(np.sum(np.abs(scatter) ** 2)) / spare
+    noise_error = _noise_error(readings, agreeing, stiffness)
+    if spare >= _TELLING and 0 < noise <= _NO_MORE * noise_error:
         # the runs differ by no more than their records' noise lets them, which is known from many lines
-        each, spare = max(each, noise_error), spare + _LINES_TELL * len(others)
-    variance = each * size**2 * (1 + leverage(unit, own / size))
-    variance += (_LEAST_PHASOR * float(np.linalg.norm(force[one]))) ** 2
-    changes = _bearing_changes(stiffness, own)
-    honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, others, stiffness)) @ changes.T
-    return Difference(_stacked(force[one] - stiffness @ own), variance * np.eye(4), honest, spare)
+        noise, spare = max(noise, noise_error), spare + _LINES_TELL * len(agreeing)
+    variance = noise * size**2 * (1 + leverage(unit, run_displacement / size))
+    variance += (_LEAST_PHASOR * float(np.linalg.norm(force[run]))) ** 2
+    changes = _bearing_changes(stiffness, run_displacement)
+    honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, agreeing, stiffness)) @ changes.T
+    return Difference(_stacked(force[run] - stiffness @ run_displacement), variance * np.eye(4), honest, spare)
 
 
 def _bearing_changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
@@ -179,8 +181,8 @@ def _noise_error(readings: PointReadings, runs: Sequence[int], stiffness: Comple
     by_probes = np.sum(np.abs(stiffness @ readings.probe_plane) ** 2, axis=0)
     by_cells = np.sum(readings.cell_plane**2, axis=0)
     sizes = np.linalg.norm(readings.displacement[rows], axis=1)
-    each = (square[:, :2] @ by_probes + square[:, 2:] @ by_cells) / 2 / sizes**2
-    return float(np.mean(each)) if np.all(np.isfinite(each)) else 0.0
+    error = (square[:, :2] @ by_probes + square[:, 2:] @ by_cells) / 2 / sizes**2
+    return float(np.mean(error)) if np.all(np.isfinite(error)) else 0.0
 
 
 def common_stiffness(readings: PointReadings, runs: Sequence[int]) -> ComplexArray | None:
@@ -209,49 +211,49 @@ def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
 
 
 def static_difference(
-    readings: PointReadings, one: int, others: Sequence[int], stiffness: ComplexArray
+    readings: PointReadings, run: int, agreeing: Sequence[int], stiffness: ComplexArray
 ) -> Difference | None:
-    """Mean readings of run `one` minus those of the `others`: probe, probe [m], cell, cell [N].
+    """Mean readings of `run` minus those of the `agreeing` runs: probe, probe [m], cell, cell [N].
 
     A load that misses its set point shows in the cells and, over the stiffness, in the probes; what positions wander by
     besides is their scatter. None where the stiffness cannot carry a load.
 
     `stiffness` (2, 2) [N/m].
     """
-    if len(others) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
+    if len(agreeing) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
         return None
     compliance = np.linalg.inv(stiffness.real)
-    rows = list(others)
+    rows = list(agreeing)
     loads, places = readings.cell_means @ readings.cell_plane.T, readings.probe_means @ readings.probe_plane.T
     misses = loads[rows] - loads[rows].mean(axis=0)
     wander = places[rows] - places[rows].mean(axis=0) - misses @ compliance.T
-    spare = 2 * (len(others) - 1)
+    spare = 2 * (len(agreeing) - 1)
     size = float(np.linalg.norm(loads[rows].mean(axis=0)))
     to_probes, to_cells = np.linalg.inv(readings.probe_plane), np.linalg.inv(readings.cell_plane)
     by_load = np.vstack([to_probes @ compliance, to_cells])
     by_place = np.vstack([to_probes, np.zeros((2, 2))])
-    more = 1 + 1 / len(others)
+    more = 1 + 1 / len(agreeing)
     load_variance, place_variance = (float(np.sum(x**2)) / spare for x in (misses, wander))
     noise = more * (load_variance * by_load @ by_load.T + place_variance * by_place @ by_place.T)
     least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
     honest = (HONEST * size) ** 2 * by_load @ by_load.T + least
     residual = np.concatenate(
         [
-            readings.probe_means[one] - readings.probe_means[rows].mean(axis=0),
-            readings.cell_means[one] - readings.cell_means[rows].mean(axis=0),
+            readings.probe_means[run] - readings.probe_means[rows].mean(axis=0),
+            readings.cell_means[run] - readings.cell_means[rows].mean(axis=0),
         ]
     )
     return Difference(residual, noise, honest, spare)
 
 
-def dynamic_pattern(readings: PointReadings, one: int, channel: int, stiffness: ComplexArray) -> FloatArray:
+def dynamic_pattern(readings: PointReadings, run: int, channel: int, stiffness: ComplexArray) -> FloatArray:
     """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`.
 
     `stiffness` (2, 2) [N/m].
     """
     if channel < 2:
-        return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[one, channel])
-    return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[one, channel - 2])
+        return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[run, channel])
+    return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[run, channel - 2])
 
 
 def lever_slack(lever: float, part: float) -> float:

@@ -54,23 +54,23 @@ def fit_lines(
 ) -> RecordLines:
     """Fit mean, drift and lines to every column; `time` (n,), `values` (n, m)."""
     span = max(float(time[-1] - time[0]), 1e-300)
-    kept: list[float] = []
+    distinct: list[float] = []
     for frequency in frequencies:
-        if frequency > 0 and all(abs(frequency - f) * span > 0.8 for f in kept):
-            kept.append(frequency)
-    growing = [f for f in inexact if f in kept[1:] and all(abs(f - k) * span > _PARTED for k in kept if k != f)]
-    design = line_design(time - time[0], np.array(kept), 1, np.array(growing))
+        if frequency > 0 and all(abs(frequency - f) * span > 0.8 for f in distinct):
+            distinct.append(frequency)
+    growing = [f for f in inexact if f in distinct[1:] and all(abs(f - k) * span > _PARTED for k in distinct if k != f)]
+    design = line_design(time - time[0], np.array(distinct), 1, np.array(growing))
     coefficients, used = _robust(design, values)
     residual = np.where(used, values - design @ coefficients, 0.0)
     counts = np.count_nonzero(used, axis=0)
-    known = np.where(counts > 0, 1.0, np.nan)
-    scatter = np.sqrt(np.sum(residual**2, axis=0) / np.maximum(counts, 1)) * known
-    mean = coefficients[2 * len(kept)]
-    if not kept:
+    defined = np.where(counts > 0, 1.0, np.nan)
+    scatter = np.sqrt(np.sum(residual**2, axis=0) / np.maximum(counts, 1)) * defined
+    mean = coefficients[2 * len(distinct)]
+    if not distinct:
         missing = np.full(values.shape[1], np.nan)
         return RecordLines(mean, missing + 0j, missing, scatter)
-    phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * kept[0] * time[0])
-    floor = _floor(time, residual, kept[0], span) * len(time) / np.maximum(counts, 1) * known
+    phasor = (coefficients[0] + 1j * coefficients[1]) * np.exp(-2j * math.pi * distinct[0] * time[0])
+    floor = _floor(time, residual, distinct[0], span) * len(time) / np.maximum(counts, 1) * defined
     return RecordLines(mean, phasor, floor, scatter)
 
 
@@ -82,8 +82,8 @@ def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArr
     """
     complete = np.isfinite(values).all(axis=0)
     coefficients, used = np.zeros((design.shape[1], values.shape[1])), np.isfinite(values)
-    right = design.T @ np.where(used, values, 0.0)
-    coefficients = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True) @ right
+    moment = design.T @ np.where(used, values, 0.0)
+    coefficients = np.linalg.pinv(design.T @ design, rcond=1e-12, hermitian=True) @ moment
     size = np.abs(values - design @ coefficients)
     # a few thousand samples tell the scale
     scale = 1.4826 * np.median(size[:: max(1, len(size) // _SCALED)], axis=0)
@@ -94,17 +94,19 @@ def _robust(design: FloatArray, values: FloatArray) -> tuple[FloatArray, BoolArr
     return coefficients, used
 
 
-def _floor(time: FloatArray, rest: FloatArray, frequency: float, span: float) -> FloatArray:
+def _floor(time: FloatArray, residual: FloatArray, frequency: float, span: float) -> FloatArray:
     """Median amplitude of what is left, at frequencies around the wanted one, per column."""
     line, half = (np.exp(2j * math.pi * f * (time - time[0])) for f in (frequency, 0.5 / span))
-    step, beside = half * half, half
+    step, offset = half * half, half
     waves = []
     for halves in range(3, 17, 2):  # 2.5, 3.5, .. of a line's width beside it
-        beside = beside * step
+        offset = offset * step
         if halves in _BESIDE:
-            waves += [line * beside] + ([line * beside.conj()] if frequency > 0.5 * halves / span else [])
-    both = np.array(waves)
-    return np.asarray(np.median(np.hypot(both.real @ rest, both.imag @ rest), axis=0) * 2.0 / len(time))
+            waves += [line * offset] + ([line * offset.conj()] if frequency > 0.5 * halves / span else [])
+    waves_array = np.array(waves)
+    return np.asarray(
+        np.median(np.hypot(waves_array.real @ residual, waves_array.imag @ residual), axis=0) * 2.0 / len(time)
+    )
 
 
 def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[float]) -> float:
@@ -148,15 +150,15 @@ def band_lines(
     for line in disturbing:
         free &= np.abs(frequency - line * np.maximum(np.round(frequency / line), 1)) > _CLEAR_OF * frequency[1]
     inside = np.flatnonzero(free & (frequency >= run.band[0]) & (frequency <= run.band[1]))
-    beyond = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
-    if len(inside) < BAND_LINES or beyond.sum() < BAND_LINES:
+    above = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
+    if len(inside) < BAND_LINES or above.sum() < BAND_LINES:
         return none
     power = np.sum(np.abs(spectrum[:, list(force)]) ** 2, axis=1)
     chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, BAND_LINES)]
-    return np.asarray(spectrum[chosen]), np.median(np.abs(spectrum[beyond]), axis=0)
+    return np.asarray(spectrum[chosen]), np.median(np.abs(spectrum[above]), axis=0)
 
 
-def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines: Sequence[float]) -> float:
+def turning_frequency(time: FloatArray, values: FloatArray, nominal: float, lines: Sequence[float]) -> float:
     """Frequency of the 1X line [Hz], from the peak of a Hann spectrum summed over the channels.
 
     `time` (n,), `values` (n, m).
@@ -164,15 +166,15 @@ def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines
     count = min(len(time), _LONGEST)
     span = float(time[count - 1] - time[0])
     finite = np.isfinite(values[:count]).all(axis=0)
-    if stated <= 0 or count < 64 or span <= 0 or not finite.any() or stated * span < _APART:
-        return stated
+    if nominal <= 0 or count < 64 or span <= 0 or not finite.any() or nominal * span < _APART:
+        return nominal
     padded = 4 * count
     step = (count - 1) / span / padded
-    reach = max(_WITHIN * stated, 2.0 / span)
-    reach = min([reach, *(abs(line - stated) - _APART / span for line in lines)])
-    low, high = int(np.ceil((stated - reach) / step)), int((stated + reach) / step)
+    reach = max(_WITHIN * nominal, 2.0 / span)
+    reach = min([reach, *(abs(line - nominal) - _APART / span for line in lines)])
+    low, high = int(np.ceil((nominal - reach) / step)), int((nominal + reach) / step)
     if reach <= 0 or low < 1 or high - low < 4:
-        return stated
+        return nominal
     columns = values[:count, finite]
     spectrum = np.abs(np.fft.rfft((columns - columns.mean(axis=0)) * np.hanning(count)[:, None], padded, axis=0))
     wide = slice(max(1, low - 40), min(high + 40, len(spectrum)))
@@ -180,6 +182,6 @@ def turning_frequency(time: FloatArray, values: FloatArray, stated: float, lines
     power = np.mean((spectrum / np.maximum(level, 1e-300)) ** 2, axis=1)
     peak = low + int(np.argmax(power[low : high + 1]))
     if not low < peak < high or power[peak] < _CLEAR**2:
-        return stated
+        return nominal
     before, top, after = np.log(power[peak - 1 : peak + 2])
     return float((peak + 0.5 * (before - after) / (before - 2 * top + after)) * step)

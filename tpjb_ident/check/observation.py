@@ -138,8 +138,8 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
             if start == 0:
                 first[name] = channels[name].to_si(block)
     first = {n: v for n, v in first.items() if n in channels}
-    whole = "".join(digests[n].hexdigest() for n in first if n in digests)
-    return statistics, first, hashlib.sha256(whole.encode()).hexdigest() if whole else ""
+    digest_text = "".join(digests[n].hexdigest() for n in first if n in digests)
+    return statistics, first, hashlib.sha256(digest_text.encode()).hexdigest() if digest_text else ""
 
 
 def _read_block(
@@ -167,8 +167,8 @@ def _milder(problem: Problem) -> Problem:
     return replace(problem, severity="warning" if problem.severity == "error" else problem.severity)
 
 
-def _is_dead(seen: ChannelStatistics) -> bool:
-    return seen.values == 0 or seen.constant
+def _is_dead(statistics: ChannelStatistics) -> bool:
+    return statistics.values == 0 or statistics.constant
 
 
 def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None) -> bool:
@@ -197,9 +197,9 @@ def _lines(
 ) -> RecordLines:
     excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
     probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
-    others = [excitation, *(f for f in driven if f != excitation), 50.0, 2 * excitation]
-    speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in others if f > 0])
-    return fit_lines(time, values, [excitation, speed, 2 * speed, *others[1:]], [speed, 2 * speed])
+    candidates = [excitation, *(f for f in driven if f != excitation), 50.0, 2 * excitation]
+    speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in candidates if f > 0])
+    return fit_lines(time, values, [excitation, speed, 2 * speed, *candidates[1:]], [speed, 2 * speed])
 
 
 def _spread(values: FloatArray) -> FloatArray:
@@ -215,10 +215,10 @@ def _spread(values: FloatArray) -> FloatArray:
 def _other_line(
     run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, driven: Sequence[float]
 ) -> float:
-    where = [i for i, c in enumerate(channels) if c.quantity == "force"]
-    if run.kind != "dynamic" or not where:
+    cells = [i for i, c in enumerate(channels) if c.quantity == "force"]
+    if run.kind != "dynamic" or not cells:
         return math.nan
-    column = values[:, max(where, key=lambda i: _range(values[:, i]))]
+    column = values[:, max(cells, key=lambda i: _range(values[:, i]))]
     speed = run.point.shaft_speed_hz
     return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz, *driven])
 

@@ -68,9 +68,9 @@ class _Try:
 
 def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
     """Find runs with one wrong gain, the clearest first."""
-    count, apart, gains = len(readings.probes), set(known), list[WrongGain]()
-    while len(apart) + 1 <= _MOST * count:
-        remaining = [i for i in range(count) if i not in apart]
+    count, outliers, gains = len(readings.probes), set(known), list[WrongGain]()
+    while len(outliers) + 1 <= _MOST * count:
+        remaining = [i for i in range(count) if i not in outliers]
         if len(remaining) < _MIN_RUNS:
             break
         tried = [gain_of_run(readings, i, [j for j in remaining if j != i]) for i in remaining]
@@ -79,55 +79,57 @@ def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[Wr
         if clearest is None or clearest.chance > _CHANCE / (6 * len(remaining)):
             break
         gains.append(clearest)
-        apart.add(clearest.run)
+        outliers.add(clearest.run)
     return gains
 
 
-def gain_of_run(readings: PointReadings, one: int, others: Sequence[int]) -> WrongGain | None:
-    """The gain of one channel that explains run `one` best beside the `others`; None where no single one does.
+def gain_of_run(readings: PointReadings, run: int, agreeing: Sequence[int]) -> WrongGain | None:
+    """The gain of one channel that explains `run` best beside the `agreeing` runs; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
     """
-    tried = sorted(_tries(readings, one, others), key=lambda t: t.left)
+    tried = sorted(_tries(readings, run, agreeing), key=lambda t: t.left)
     if not tried or abs(tried[0].joint.part) < _LEAST:
         return None
     best = tried[0]
     alike = dict.fromkeys(t.channel for t in tried if t.left < best.left + _AS_WELL)
     gain = 1 / (1 - best.joint.part)
     error = gain**2 / float(np.sqrt(best.joint.information))
-    return WrongGain(one, tuple(alike), gain, error, best.means, best.joint.chance())
+    return WrongGain(run, tuple(alike), gain, error, best.means, best.joint.chance())
 
 
-def _tries(readings: PointReadings, one: int, others: Sequence[int]) -> Iterator[_Try]:
-    """Explanations of run `one` by one channel's gain that nothing in it contradicts."""
-    stiffness = common_stiffness(readings, others)
+def _tries(readings: PointReadings, run: int, agreeing: Sequence[int]) -> Iterator[_Try]:
+    """Explanations of `run` by one channel's gain that nothing in it contradicts."""
+    stiffness = common_stiffness(readings, agreeing)
     if stiffness is None:
         return
-    dynamic = dynamic_difference(readings, one, others, stiffness)
-    static = static_difference(readings, one, others, stiffness)
+    dynamic = dynamic_difference(readings, run, agreeing, stiffness)
+    static = static_difference(readings, run, agreeing, stiffness)
     if dynamic is None:
         return
     for channel in range(4):
-        pattern = dynamic_pattern(readings, one, channel, stiffness)
+        pattern = dynamic_pattern(readings, run, channel, stiffness)
         shown = dynamic.evidence(pattern)
         if shown.chance() > _PHASORS_SHOW or shown.part > _MOST_PART:
             continue
-        for lever, slack in _levers(readings, one, channel, shown.part):
-            found = _with_means(static, channel, lever, slack, shown)
-            rest = dynamic.misfit(pattern, found.joint.part)
-            if found.left <= _STRANGE and rest <= _STRANGE:
-                yield replace(found, left=len(pattern) * (found.left + rest) + (_FREE if lever is None else 0.0))
+        for lever, slack in _levers(readings, run, channel, shown.part):
+            evidence = _with_means(static, channel, lever, slack, shown)
+            misfit = dynamic.misfit(pattern, evidence.joint.part)
+            if evidence.left <= _STRANGE and misfit <= _STRANGE:
+                yield replace(
+                    evidence, left=len(pattern) * (evidence.left + misfit) + (_FREE if lever is None else 0.0)
+                )
 
 
-def _levers(readings: PointReadings, one: int, channel: int, part: float) -> Iterator[tuple[float | None, float]]:
+def _levers(readings: PointReadings, run: int, channel: int, part: float) -> Iterator[tuple[float | None, float]]:
     """Readings that a gain would multiply in the mean, with the uncertainty of the shift; None where not known.
 
     A probe's gain may count from the bearing's centre, or, as that of an amplifier, from 0 V.
     """
     if channel >= 2:
-        yield float(readings.cell_means[one, channel - 2]), 0.0
+        yield float(readings.cell_means[run, channel - 2]), 0.0
         return
-    mean, zero = float(readings.probe_means[one, channel]), readings.centre[channel]
+    mean, zero = float(readings.probe_means[run, channel]), readings.centre[channel]
     yield mean, 0.0
     yield (None, 0.0) if zero is None else (mean - zero, lever_slack(mean - zero, part))
 

@@ -57,19 +57,21 @@ class InconsistentChannels:
 
 def inconsistent_channels(runs: Sequence[Observation]) -> tuple[InconsistentChannels, ...]:
     """Find the quantities whose channels contradict each other in all runs alike."""
-    found = []
+    inconsistent = []
     for quantity in ("displacement", "force"):
         groups: dict[tuple[str, ...], list[ComplexArray]] = {}
-        kept: dict[tuple[str, ...], list[Channel]] = {}
-        for seen in runs:
-            where = seen.pick(quantity)
-            if len(where) < 3 or not excited(seen):
+        by_names: dict[tuple[str, ...], list[Channel]] = {}
+        for observation in runs:
+            places = observation.pick(quantity)
+            if len(places) < 3 or not excited(observation):
                 continue
-            names = tuple(seen.channels[i].name for i in where)
-            kept[names] = [seen.channels[i] for i in where]
-            groups.setdefault(names, []).extend(z for z in seen.phasors[:, where] if np.isfinite(z).all())
-        found += [a for names, z in groups.items() if (a := _apart(quantity, kept[names], np.array(z))) is not None]
-    return tuple(found)
+            names = tuple(observation.channels[i].name for i in places)
+            by_names[names] = [observation.channels[i] for i in places]
+            groups.setdefault(names, []).extend(z for z in observation.phasors[:, places] if np.isfinite(z).all())
+        inconsistent += [
+            a for names, z in groups.items() if (a := _apart(quantity, by_names[names], np.array(z))) is not None
+        ]
+    return tuple(inconsistent)
 
 
 def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> InconsistentChannels | None:
@@ -77,17 +79,17 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
     along = directions([float(c.axis or 0.0) for c in channels])
     if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(along) < 2:
         return None
-    beyond = np.linalg.svd(along)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
+    outside = np.linalg.svd(along)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
     vectors = phasors @ np.linalg.pinv(along).T
-    seen = vectors @ along.T
+    projected = vectors @ along.T
     # every run is one vote of its own size: beyond^T (gain * seen) = beyond^T phasor
-    size = np.linalg.norm(seen, axis=1)
-    design = np.concatenate([(beyond.T * (s / n)) for s, n in zip(seen, size)])
-    remaining = (phasors / size[:, None] @ beyond).ravel()
-    real, rest = np.concatenate([design.real, design.imag]), np.concatenate([remaining.real, remaining.imag])
+    size = np.linalg.norm(projected, axis=1)
+    design = np.concatenate([(outside.T * (s / n)) for s, n in zip(projected, size)])
+    remaining = (phasors / size[:, None] @ outside).ravel()
+    real, target = np.concatenate([design.real, design.imag]), np.concatenate([remaining.real, remaining.imag])
     inverse = np.linalg.pinv(real, rcond=1e-6)
-    gains = inverse @ rest
-    spread = float(np.sum((rest - real @ gains) ** 2)) / max(len(rest) - np.linalg.matrix_rank(real), 1)
+    gains = inverse @ target
+    spread = float(np.sum((target - real @ gains) ** 2)) / max(len(target) - np.linalg.matrix_rank(real), 1)
     noise = np.sqrt(np.diag(inverse @ inverse.T) * spread)
     stated = np.array([USUAL_GAIN if c.uncertainty is None else c.uncertainty for c in channels])
     allowed = np.sqrt(np.diag((inverse @ real) @ np.diag(stated**2) @ (inverse @ real).T))
@@ -99,11 +101,13 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
 def report_inconsistent_channels(runs: Sequence[Observation]) -> None:
     """Warn of channels that contradict each other, and note what that adds to the uncertainty of their gains."""
     cure = "Calibrate them against each other, or state the `uncertainty` of their gains"
-    for apart in inconsistent_channels(runs):
-        for report in {seen.run.id: seen.report for seen in runs if seen.pick(apart.quantity)}.values():
-            report.gains.update(apart.uncertainty())
-            place = f"channels {', '.join(apart.names)}"
-            report.say(f"apart {apart.quantity}", "warning", place, apart.sentence(), cure)
+    for group in inconsistent_channels(runs):
+        for report in {
+            observation.run.id: observation.report for observation in runs if observation.pick(group.quantity)
+        }.values():
+            report.gains.update(group.uncertainty())
+            place = f"channels {', '.join(group.names)}"
+            report.say(f"apart {group.quantity}", "warning", place, group.sentence(), cure)
 
 
 def widened(channels: Mapping[str, Channel], more: Mapping[str, float]) -> dict[str, Channel]:

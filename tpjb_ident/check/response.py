@@ -126,16 +126,16 @@ def check_accelerometers(runs: Sequence[Observation]) -> None:
 
 def _accelerations(observation: Observation) -> list[tuple[str, complex]]:
     """Acceleration over cell force along each accelerometer that shows the line clearly."""
-    lines, where = observation.lines, observation.pick("force")
-    if lines is None or len(where) < 2 or "force" in observation.report.doubts or not excited(observation):
+    lines, cells = observation.lines, observation.pick("force")
+    if lines is None or len(cells) < 2 or "force" in observation.report.doubts or not excited(observation):
         return []
-    found: list[tuple[str, complex]] = []
+    phasors: list[tuple[str, complex]] = []
     for row in observation.phasors:
-        force = to_plane([observation.channels[i] for i in where], row[where])
+        force = to_plane([observation.channels[i] for i in cells], row[cells])
         for index in observation.pick("acceleration"):
             channel, phasor = observation.channels[index], row[index]
             axis = channel.axis or 0.0
             along = complex(force @ np.array([math.cos(axis), math.sin(axis)]))
             if abs(phasor) > 8 * lines.floor[index] and abs(along) > 0.3 * float(np.linalg.norm(force)):
-                found.append((channel.name, complex(phasor) / along))
-    return found
+                phasors.append((channel.name, complex(phasor) / along))
+    return phasors

@@ -102,12 +102,12 @@ def _tell(response: RunResponse, found: WrongGain, names: Sequence[str]) -> None
     response.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
 
 
-def gain_in_words(found: WrongGain, names: Sequence[str]) -> str:
+def gain_in_words(gain: WrongGain, names: Sequence[str]) -> str:
     """What a wrong gain looks like; `names` are those of its channels, the likeliest first."""
-    off = found.gain - 1
+    off = gain.gain - 1
     others = f" (or {' or '.join(names[1:])} another gain)" if len(names) > 1 else ""
-    by = "phasor and mean say so" if found.means else "its phasor says so, its mean cannot"
+    by = "phasor and mean say so" if gain.means else "its phasor says so, its mean cannot"
     return (
-        f"reads {abs(off):.1%} too {'much' if off > 0 else 'little'} (standard error {found.error:.1%}) beside the "
+        f"reads {abs(off):.1%} too {'much' if off > 0 else 'little'} (standard error {gain.error:.1%}) beside the "
         f"other runs at this operating point{others}; {by}"
     )

@@ -36,10 +36,10 @@ def to_plane(channels: Sequence[Channel], readings: NDArray[Any]) -> NDArray[Any
 
 def plane_vector(observation: Observation, quantity: str, values: NDArray[Any]) -> NDArray[Any] | None:
     """X, Y of one value per channel of `quantity`; None where its channels do not span the plane; `values` (m,)."""
-    where = observation.pick(quantity)
-    if len(where) < 2:
+    places = observation.pick(quantity)
+    if len(places) < 2:
         return None
-    vector = to_plane([observation.channels[i] for i in where], values[where])
+    vector = to_plane([observation.channels[i] for i in places], values[places])
     return vector if np.all(np.isfinite(vector)) else None
 
 
@@ -56,12 +56,12 @@ def check_static_loads(observations: Sequence[Observation]) -> bool:
     """
     shown = []
     for observation in observations:
-        stated = observation.run.point.static_load
-        if observation.run.kind in {"dynamic", "locus"} and observation.lines is not None and stated > 0:
+        nominal = observation.run.point.static_load
+        if observation.run.kind in {"dynamic", "locus"} and observation.lines is not None and nominal > 0:
             mean = plane_vector(observation, "force", observation.lines.mean)
             if mean is not None:
                 turn = np.exp(-1j * observation.run.point.static_load_direction)
-                shown.append((observation, mean, complex(complex(mean[0], mean[1]) / stated * turn)))
+                shown.append((observation, mean, complex(complex(mean[0], mean[1]) / nominal * turn)))
     if without_static_part(np.array([ratio for _, _, ratio in shown], dtype=complex)):
         for observation, _, _ in shown:
             text = "is none, as of piezo-electric cells"
@@ -88,17 +88,17 @@ def _check_static_load(observation: Observation, mean: NDArray[Any], ratio: floa
     _check_size(observation, ratio)
     if ratio < 0.02 or observation.lines is None:
         return
-    points, says = math.degrees(math.atan2(mean[1], mean[0])), run.point.static_load_direction_deg
-    off = angle_between(points, says)
+    points, nominal = math.degrees(math.atan2(mean[1], mean[0])), run.point.static_load_direction_deg
+    off = angle_between(points, nominal)
     if off <= _ANGLE_WARNING:
         return
-    where = observation.pick("force")
-    wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
-    guess = guess_wiring([observation.channels[i] for i in where], observation.lines.mean[where], wanted)
+    cells = observation.pick("force")
+    wanted = np.array([math.cos(math.radians(nominal)), math.sin(math.radians(nominal))])
+    guess = guess_wiring([observation.channels[i] for i in cells], observation.lines.mean[cells], wanted)
     severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
     if severity == "error":
         observation.report.doubts.add("force")
-    text = f"points to {points:.0f} deg, static_load_direction is {says:g} deg{guess}"
+    text = f"points to {points:.0f} deg, static_load_direction is {nominal:g} deg{guess}"
     cure = "Check the cells' axis and polarity, their cables, and static_load_direction"
     observation.report.say(f"load direction{guess}", severity, place, text, cure)
 
@@ -121,16 +121,16 @@ def _check_size(observation: Observation, ratio: float) -> None:
 
 def check_speed(observation: Observation) -> None:
     """Speed channel against the stated shaft speed."""
-    stated, measured = observation.run.point.shaft_speed, observation.speed
+    nominal, measured = observation.run.point.shaft_speed, observation.speed
     if math.isnan(measured):
         return
-    stated_hz, measured_hz = stated / (2 * math.pi), measured / (2 * math.pi)
-    if stated == 0.0:
+    stated_hz, measured_hz = nominal / (2 * math.pi), measured / (2 * math.pi)
+    if nominal == 0.0:
         if abs(measured) > _SPEED_STILL:
             text = f"shows {measured_hz:.3g} Hz in a run without rotation"
             observation.report.say("speed", "warning", "speed channel", text, "Check the channel, kind and shaft_speed")
         return
-    off = abs(measured / stated - 1.0)
+    off = abs(measured / nominal - 1.0)
     if off > 0.03:
         severity: Severity = "error" if off > 0.1 else "warning"
         text = f"shows {measured_hz:.4g} Hz, shaft_speed says {stated_hz:.4g} Hz"
@@ -156,8 +156,8 @@ def excited(observation: Observation) -> bool:
     """Whether the force shows the excitation line above its noise."""
     if observation.lines is None:
         return False
-    where = observation.pick("force")
-    size, floor = np.abs(observation.lines.phasor[where]), observation.lines.floor[where]
+    cells = observation.pick("force")
+    size, floor = np.abs(observation.lines.phasor[cells]), observation.lines.floor[cells]
     return bool(np.any(size > _LINE_OVER_FLOOR * floor) and np.any(size > 0))
 
 
@@ -183,8 +183,8 @@ def check_excitation(runs: Sequence[Observation], mass: float) -> None:
 
 def _missing_line(observation: Observation) -> None:
     point = observation.run.point
-    other = observation.other_line
-    hint = f"; the strongest other line is near {other:.3g} Hz" if math.isfinite(other) else ""
+    frequency = observation.other_line
+    hint = f"; the strongest other line is near {frequency:.3g} Hz" if math.isfinite(frequency) else ""
     text = f"the force shows no line at the excitation frequency of {point.excitation_hz:g} Hz{hint}"
     cure = "Check excitation_frequency, and whether the actuators ran; repeat the run"
     observation.report.say("no excitation", "error", "force", text, cure)
@@ -198,38 +198,38 @@ def _along(force: ComplexArray) -> float:
 
 
 def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None:
-    stated = [
+    directed = [
         (s, f, math.degrees(s.run.excitation_direction)) for s, f in shown if s.run.excitation_direction is not None
     ]
-    off = [(s, f, d) for s, f, d in stated if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
-    guess = _common_wiring([(s, d) for s, _, d in stated]) if len(off) > 2 else ""
-    for observation, _, _ in stated if guess else ():
+    off = [(s, f, d) for s, f, d in directed if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
+    guess = _common_wiring([(s, d) for s, _, d in directed]) if len(off) > 2 else ""
+    for observation, _, _ in directed if guess else ():
         observation.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
-    for observation, force, says in off:
+    for observation, force, nominal in off:
         shows = _along(force)
-        severity: Severity = "error" if guess or angle_between(shows, says, 180.0) > _ANGLE_ERROR else "warning"
+        severity: Severity = "error" if guess or angle_between(shows, nominal, 180.0) > _ANGLE_ERROR else "warning"
         if severity == "error":
             observation.report.doubts.add("force")
-        near = round(says + (shows - says + 90.0) % 180.0 - 90.0)
-        text = f"the excitation shows along {near} deg, excitation_direction says {says:g} deg{guess}"
+        near = round(nominal + (shows - nominal + 90.0) % 180.0 - 90.0)
+        text = f"the excitation shows along {near} deg, excitation_direction says {nominal:g} deg{guess}"
         cure = "Check excitation_direction, and the cells' axes and cables"
         observation.report.say(f"excitation direction{guess}", severity, "force", text, cure)
 
 
-def _common_wiring(stated: Sequence[tuple[Observation, float]]) -> str:
+def _common_wiring(directed: Sequence[tuple[Observation, float]]) -> str:
     """One fault of the cells that brings nearly all excitations into their stated directions."""
-    first = stated[0][0]
+    first = directed[0][0]
     channels = [first.channels[i] for i in first.pick("force")]
     if len(channels) != 2:
         return ""
     for words, matrix in repairs(channels):
-        right = 0
-        for observation, says in stated:
-            where = observation.pick("force")
-            if observation.lines is None or [observation.channels[i].name for i in where] != [c.name for c in channels]:
+        correct = 0
+        for observation, nominal in directed:
+            cells = observation.pick("force")
+            if observation.lines is None or [observation.channels[i].name for i in cells] != [c.name for c in channels]:
                 continue
-            mended = to_plane(channels, matrix @ observation.lines.phasor[where])
-            right += angle_between(_along(mended), says, 180.0) <= _ANGLE_WARNING
-        if right >= 0.8 * len(stated):
+            mended = to_plane(channels, matrix @ observation.lines.phasor[cells])
+            correct += angle_between(_along(mended), nominal, 180.0) <= _ANGLE_WARNING
+        if correct >= 0.8 * len(directed):
             return f"; as if {words}"
     return ""

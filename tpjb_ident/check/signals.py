@@ -30,37 +30,39 @@ def needed(run: Run, channel: Channel) -> bool:
     return channel.quantity in NEEDED[run.kind]
 
 
-def check_signal(report: Reporter, channel: Channel, seen: ChannelStatistics, noise_free: bool, alone: bool) -> None:
+def check_signal(
+    report: Reporter, channel: Channel, statistics: ChannelStatistics, noise_free: bool, alone: bool
+) -> None:
     """Judge one channel of one run."""
     grave: Severity = "error" if needed(report.run, channel) else "warning"
     place = f"channel {channel.name}"
-    if seen.values == 0:
+    if statistics.values == 0:
         text = "holds no values at all"
         report.say(f"empty {channel.name}", grave, place, text, "Check the channel's wiring and logger settings")
         return
-    _missing(report, channel, seen, grave)
-    if seen.constant and not noise_free:
-        _dead(report, channel, seen, grave, alone)
-    if seen.constant:
+    _missing(report, channel, statistics, grave)
+    if statistics.constant and not noise_free:
+        _dead(report, channel, statistics, grave, alone)
+    if statistics.constant:
         return
     if not noise_free:
-        _stuck(report, channel, seen, grave)
-    clipped = seen.clipped_share()
+        _stuck(report, channel, statistics, grave)
+    clipped = statistics.clipped_share()
     if clipped > 0:
-        limits = f"{seen.low:g} and {seen.high:g} {channel.unit}"
+        limits = f"{statistics.low:g} and {statistics.high:g} {channel.unit}"
         text = f"{clipped:.1%} of the samples sit flat at an extreme reading (limits {limits}): clipped"
         severity: Severity = grave if clipped > 0.05 else "warning"
         report.say(f"clipped {channel.name}", severity, place, text, "Widen the logger's range and repeat the run")
     if channel.quantity == "temperature":
-        _temperature(report, channel, seen)
+        _temperature(report, channel, statistics)
 
 
-def _missing(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Severity) -> None:
-    share = seen.missing / seen.samples
+def _missing(report: Reporter, channel: Channel, statistics: ChannelStatistics, grave: Severity) -> None:
+    share = statistics.missing / statistics.samples
     if share == 0:
         return
     severity: Severity = grave if share > 0.5 else ("warning" if share > 0.01 else "note")
-    text = f"{seen.missing} of {seen.samples} samples have no value ({share:.1%})"
+    text = f"{statistics.missing} of {statistics.samples} samples have no value ({share:.1%})"
     cure = "Repeat the run" if share > 0.5 else "They are left out"
     report.say(f"missing {channel.name}", severity, f"channel {channel.name}", text, cure)
 
@@ -79,18 +81,19 @@ def _dead(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Se
         report.say(f"constant {channel.name}", "note", place, text, "Check that it is alive")
 
 
-def _stuck(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Severity) -> None:
-    if seen.longest_flat < max(50, 10 * seen.expected_flat()):
+def _stuck(report: Reporter, channel: Channel, statistics: ChannelStatistics, grave: Severity) -> None:
+    if statistics.longest_flat < max(50, 10 * statistics.expected_flat()):
         return
-    share = seen.longest_flat / seen.samples
+    share = statistics.longest_flat / statistics.samples
     severity: Severity = grave if share > 0.25 else ("warning" if share > 0.05 else "note")
-    text = f"stands still for {seen.longest_flat} samples from sample {seen.flat_start} on ({share:.0%} of the run)"
+    span = f"{statistics.longest_flat} samples from sample {statistics.flat_start} on"
+    text = f"stands still for {span} ({share:.0%} of the run)"
     cure = "Check sensor and logger; repeat the run if much of it is lost"
     report.say(f"stuck {channel.name}", severity, f"channel {channel.name}", text, cure)
 
 
-def _temperature(report: Reporter, channel: Channel, seen: ChannelStatistics) -> None:
-    ends = sorted((channel.slope * seen.low + channel.zero, channel.slope * seen.high + channel.zero))
+def _temperature(report: Reporter, channel: Channel, statistics: ChannelStatistics) -> None:
+    ends = sorted((channel.slope * statistics.low + channel.zero, channel.slope * statistics.high + channel.zero))
     if ends[0] < _TEMPERATURES[0] or ends[1] > _TEMPERATURES[1]:
         text = f"reads from {ends[0] - _CELSIUS:.0f} to {ends[1] - _CELSIUS:.0f} degC"
         cure = "Check sensitivity, zero and wiring"

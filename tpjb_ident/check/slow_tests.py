@@ -40,7 +40,7 @@ def _planes(observation: Observation) -> tuple[FloatArray, FloatArray] | None:
     if np.count_nonzero(rows) < 20:
         return None
     samples = observation.samples[rows]
-    planes = (samples[:, own] @ np.linalg.pinv(_directions(observation, own)).T for own in (force, shaft))
+    planes = (samples[:, columns] @ np.linalg.pinv(_directions(observation, columns)).T for columns in (force, shaft))
     return next(planes), next(planes)
 
 
@@ -90,18 +90,18 @@ def _main_move(force: FloatArray) -> FloatArray | None:
 
 
 def _check_push(observation: Observation, shows: float, push: FloatArray) -> None:
-    says = observation.run.point.static_load_direction_deg
-    off = angle_between(shows, says)
+    nominal = observation.run.point.static_load_direction_deg
+    off = angle_between(shows, nominal)
     if off <= _ANGLE_WARNING:
         return
-    where = observation.pick("force")
-    channels = [observation.channels[i] for i in where]
-    wanted = np.array([math.cos(math.radians(says)), math.sin(math.radians(says))])
-    guess = guess_wiring(channels, _directions(observation, where) @ push, wanted)
+    cells = observation.pick("force")
+    channels = [observation.channels[i] for i in cells]
+    wanted = np.array([math.cos(math.radians(nominal)), math.sin(math.radians(nominal))])
+    guess = guess_wiring(channels, _directions(observation, cells) @ push, wanted)
     severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
     if guess:
         observation.report.doubts.add("force")
-    stated = f"static_load_direction of pad {observation.run.pad} is {says:g} deg"
+    stated = f"static_load_direction of pad {observation.run.pad} is {nominal:g} deg"
     text = f"the load rises toward {shows:.0f} deg, {stated}{guess}"
     cure = "Check pad and static_load_direction of this run, and the cells' axes and cables"
     observation.report.say(f"push direction{guess}", severity, "force", text, cure)
@@ -116,9 +116,9 @@ def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArra
     size = float(np.hypot(*slope))
     if size * float(np.ptp(load)) < _FIRM_MOVE or float(slope @ unit) > _FOLLOWS * size:
         return
-    where = observation.pick("displacement")
-    channels = [observation.channels[i] for i in where]
-    guess = guess_wiring(channels, _directions(observation, where) @ slope, unit, within=20.0)
+    probes = observation.pick("displacement")
+    channels = [observation.channels[i] for i in probes]
+    guess = guess_wiring(channels, _directions(observation, probes) @ slope, unit, within=20.0)
     goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
     text = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"
@@ -157,8 +157,8 @@ def check_locus(runs: Sequence[Observation]) -> None:
         for observation in group:
             assert observation.lines is not None
             for quantity, into in (("force", loads), ("displacement", places)):
-                where = observation.pick(quantity)
-                into.append(to_plane([observation.channels[i] for i in where], observation.lines.mean[where]))
+                columns = observation.pick(quantity)
+                into.append(to_plane([observation.channels[i] for i in columns], observation.lines.mean[columns]))
         force, shaft = np.array(loads), np.array(places)
         rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
         if np.count_nonzero(rows) < 4:
@@ -207,9 +207,11 @@ def _check_labels(directions: Sequence[Shown]) -> None:
         return
     odd = _odd_ones(directions)
     for first, second in pairs:
-        struck = [one for one in (first, second) if id(one[0]) in odd]
-        one, other = (struck[0], first if struck[0] is second else second) if len(struck) == 1 else (second, first)
-        _tell(one, other, odd.get(id(one[0])) if len(struck) == 1 else None)
+        struck = [suspect for suspect in (first, second) if id(suspect[0]) in odd]
+        suspect, partner = (
+            (struck[0], first if struck[0] is second else second) if len(struck) == 1 else (second, first)
+        )
+        _tell(suspect, partner, odd.get(id(suspect[0])) if len(struck) == 1 else None)
 
 
 def _contradict(first: Shown, second: Shown) -> bool:
@@ -217,14 +219,14 @@ def _contradict(first: Shown, second: Shown) -> bool:
     return near != (first[0].run.pad == second[0].run.pad)
 
 
-def _tell(one: Shown, other: Shown, belongs: int | None) -> None:
+def _tell(suspect: Shown, partner: Shown, belongs: int | None) -> None:
     """Name a contradiction, at the run that is wrong where that is known."""
-    observation, shows = one
+    observation, shows = suspect
     text = f"pad {observation.run.pad} is loaded toward {shows:.0f} deg"
-    if observation.run.pad == other[0].run.pad:
-        text += f" here, toward {other[1]:.0f} deg in run {other[0].run.id}"
+    if observation.run.pad == partner[0].run.pad:
+        text += f" here, toward {partner[1]:.0f} deg in run {partner[0].run.id}"
     else:
-        text += f", as is pad {other[0].run.pad} in run {other[0].run.id}"
+        text += f", as is pad {partner[0].run.pad} in run {partner[0].run.id}"
     cure = "One of the two runs names the wrong pad: correct it"
     if belongs is not None:
         text += f"; by the directions of the other runs it is pad {belongs}"
@@ -249,11 +251,11 @@ def _odd_ones(directions: Sequence[Shown]) -> dict[int, int]:
                 first = shows - step * ((observation.run.pad or 1) - 1)
                 places = {id(s): _pad_at(d, first, step, count) for s, d in directions}
                 fit = frozenset(id(s) for s, _ in directions if places[id(s)] == s.run.pad)
-                rest = {id(s): places[id(s)] for s, _ in directions if id(s) not in fit}
-                if len(fit) >= 3 and None not in rest.values():
-                    table.setdefault(fit, {k: v for k, v in rest.items() if v is not None})
+                deviating = {id(s): places[id(s)] for s, _ in directions if id(s) not in fit}
+                if len(fit) >= 3 and None not in deviating.values():
+                    table.setdefault(fit, {k: v for k, v in deviating.items() if v is not None})
     most = max((len(fit) for fit in table), default=0)
-    best = [rest for fit, rest in table.items() if len(fit) == most]
+    best = [deviating for fit, deviating in table.items() if len(fit) == most]
     return best[0] if len(best) == 1 and 2 * most > len(directions) else {}
 
 

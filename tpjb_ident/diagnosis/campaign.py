@@ -152,15 +152,15 @@ def measure_campaign(
     ahead: Callable[[], StaticTests | None] | None = None,
 ) -> Measured:
     """Identify a campaign and measure its static tests."""
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     if not campaign.of_kind("dynamic"):
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to diagnose")
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = IdentifySettings(clearance=least)
     identification = identify(
-        campaign, chosen, lambda text, done, total: tell(f"identifying, {text}", 20 * done, 100 * total)
+        campaign, chosen, lambda text, done, total: report(f"identifying, {text}", 20 * done, 100 * total)
     )
-    tell("pivot curves, clearance and locus", 20, 100)
+    report("pivot curves, clearance and locus", 20, 100)
     static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
     curves, polygon, locus = static.curves, static.clearance, static.locus
     identification = replace(identification, conditions=identification.conditions + static.left_out)
@@ -183,7 +183,7 @@ def _diagnose_measured(
     """Find what the model of an identified campaign lacks."""
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
     settings = replace(settings, tolerances=measured.tolerances)
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     identification, curves = measured.identification, measured.curves
     measured_pivots = baseline.pivots == "measured"
     laws = (
@@ -199,7 +199,7 @@ def _diagnose_measured(
     )  # fmt: skip
     observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
     result = diagnose(
-        observations, setup, settings, lambda text, share: tell(f"diagnosing, {text}", 30 + int(70 * share), 100)
+        observations, setup, settings, lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100)
     )
     return CampaignDiagnosis(result, identification, setup)
 
@@ -214,13 +214,13 @@ def diagnose_table(
 ) -> CampaignDiagnosis:
     """Find what a model lacks to give the K and C of a table."""
     baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     if baseline.pivots == "measured":
         raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
     settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
     observations = observe_table(path, reading_error, settings.tolerance)
     setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
-    result = diagnose(observations, setup, settings, lambda text, share: tell(text, int(100 * share), 100))
+    result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))
     return CampaignDiagnosis(result, None, setup)
 
 

@@ -100,12 +100,12 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip))
 
 
-def _column(forward: ForwardModel, base: FloatArray, known: tuple[Nuisance, ...], index: int) -> FloatArray:
-    return column_of(forward, (), known, np.zeros(len(known)), base, index)
+def _column(forward: ForwardModel, base: FloatArray, unknowns: tuple[Nuisance, ...], index: int) -> FloatArray:
+    return column_of(forward, (), unknowns, np.zeros(len(unknowns)), base, index)
 
 
 def _next_test(
-    run: Map, verdict: Verdict, found: Search, baseline: tuple[Setup, Layout], settings: DiagnoseSettings
+    run: Map, verdict: Verdict, result: Search, baseline: tuple[Setup, Layout], settings: DiagnoseSettings
 ) -> str:
     """What one more test would tell, in words: which explanation it is, or that it is the one named."""
     if verdict.verdict == "consistent":
@@ -114,19 +114,19 @@ def _next_test(
         worst = verdict.disagreement[0]
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
     setup, layout = baseline
-    rivals = _rivals(found)
+    rivals = _rivals(result)
     if not rivals:
         return ""
-    model = _possible(setup, found.model)
-    others = [e for r in rivals if (e := _possible(setup, r)) is not None]
-    if model is None or not others:
+    model = _possible(setup, result.model)
+    alternatives = [e for r in rivals if (e := _possible(setup, r)) is not None]
+    if model is None or not alternatives:
         return ""
     count = len(options_for(setup, layout))
-    tried = run(_separated, [(setup, i, (model, *others), settings.tolerances) for i in range(count)])
+    tried = run(_separated, [(setup, i, (model, *alternatives), settings.tolerances) for i in range(count)])
     tests = ranked([separation for separation in tried if separation is not None])
     if not tests:
         return ""
-    text = say(suggested(tests), found.model.label, *(r.label for r in rivals))
+    text = say(suggested(tests), result.model.label, *(r.label for r in rivals))
     return f"to confirm: {text}" if verdict.verdict == "named" else text
 
 
@@ -145,12 +145,12 @@ def _possible(setup: Setup, fitted: Fit):  # type: ignore[no-untyped-def]
     return fitted.effects
 
 
-def _rivals(found: Search) -> list[Fit]:
+def _rivals(result: Search) -> list[Fit]:
     """The likeliest other explanations, one per name."""
-    rows = sorted((r for row in found.rivals for r in row if not r.at_bound), key=lambda f: -f.evidence)
+    rows = sorted((r for row in result.rivals for r in row if not r.at_bound), key=lambda f: -f.evidence)
     by_names: dict[frozenset[str], Fit] = {}
     for r in rows:
-        if r.names != found.model.names:
+        if r.names != result.model.names:
             by_names.setdefault(r.names, r)
     return list(by_names.values())[:IMPOSTORS]
 
@@ -212,11 +212,11 @@ def _by_point(diagnosis: Diagnosis, prediction: FloatArray) -> dict[tuple[float,
 
 def median_deviations(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
     """Median of predicted / measured - 1 before and after, of every direct coefficient."""
-    found: dict[str, tuple[float, float]] = {}
+    medians: dict[str, tuple[float, float]] = {}
     if table.empty:
-        return found
+        return medians
     for name in ("kxx", "kyy", "cxx", "cyy"):
         off = (table[f"{coefficient_column(name)}_ratio"] - 1.0).groupby(table["pivots"]).median()
         if BEFORE in off and np.isfinite(off[BEFORE]):
-            found[name] = (float(off[BEFORE]), float(off.get(AFTER, off[BEFORE])))
-    return found
+            medians[name] = (float(off[BEFORE]), float(off.get(AFTER, off[BEFORE])))
+    return medians

@@ -278,15 +278,15 @@ def options_for(setup: Setup, layout: Layout) -> tuple[Design | Check, ...]:
 
 
 def separated(
-    setup: Setup, design: Design | Check, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
+    setup: Setup, design: Design | Check, first: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> Separation | None:
     """What one design would show; None where it cannot be or the model has no equilibrium."""
     if isinstance(design, Check):
-        return Separation(design, tuple(design.separation(one, rival) for rival in rivals))
-    if not design.fits(one, *rivals):
+        return Separation(design, tuple(design.separation(first, rival) for rival in rivals))
+    if not design.fits(first, *rivals):
         return None
     try:
-        return Separation(design, _each(setup, design, one, rivals, known))
+        return Separation(design, _each(setup, design, first, rivals, known))
     except NoEquilibriumError:
         return None
 
@@ -294,12 +294,12 @@ def separated(
 def _each(
     setup: Setup, design: Design, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
 ) -> tuple[float, ...]:
-    seen = design.planned(setup)
-    forward = design.forward(setup, seen)
+    planned = design.planned(setup)
+    forward = design.forward(setup, planned)
     acting = design.acting(one)
     prediction = forward(acting)
     columns = at_baseline(forward, acting, setup, known, prediction)
-    return tuple(apart(seen, columns, prediction - forward(design.acting(rival))) for rival in rivals)
+    return tuple(apart(planned, columns, prediction - forward(design.acting(rival))) for rival in rivals)
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
@@ -337,15 +337,15 @@ def together(tests: Sequence[Separation]) -> float:
 
 def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
     """In words: what `suggested` gives, and what it is expected to tell."""
-    other = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
+    names = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
     if expected < TELLING:
         return (
-            f"nothing on the list separates {one} from {other} (best: {words}, {expected:.1f} standard deviations); "
+            f"nothing on the list separates {one} from {names} (best: {words}, {expected:.1f} standard deviations); "
             "a change of hardware would, such as another oil or another bearing on the same rig"
         )
     least = "at least " if len(rivals) > 1 else ""
-    return f"{words}: expected to separate {one} from {other} by {least}{expected:.0f} standard deviations"
+    return f"{words}: expected to separate {one} from {names} by {least}{expected:.0f} standard deviations"
 
 
 @dataclass(frozen=True)

@@ -113,8 +113,8 @@ class CampaignPlan:
 def plan(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> CampaignPlan:
     """Work out what a layout of tests could tell."""
     chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
-    seen = signatures(setup, layout, chosen)
-    return separated(chosen, np.asarray(np.linalg.solve(seen.factor(), seen.columns)))
+    shown = signatures(setup, layout, chosen)
+    return separated(chosen, np.asarray(np.linalg.solve(shown.factor(), shown.columns)))
 
 
 @dataclass(frozen=True)
@@ -146,14 +146,14 @@ def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> Floa
     """Change by a typical size, from half of it; zero where the model has no equilibrium on either side."""
     low, high = candidate.bounds
     for share in (0.5, -0.5, 0.05, -0.05):
-        there = min(max(candidate.neutral + share * candidate.step, low), high)
-        if there == candidate.neutral:
+        value = min(max(candidate.neutral + share * candidate.step, low), high)
+        if value == candidate.neutral:
             continue
         try:
-            moved = forward.fresh()((candidate.effect(there),)) - base
+            moved = forward.fresh()((candidate.effect(value),)) - base
         except NoEquilibriumError:
             continue
-        return np.asarray(moved / (there - candidate.neutral) * candidate.step)
+        return np.asarray(moved / (value - candidate.neutral) * candidate.step)
     return np.zeros_like(base)
 
 
@@ -191,10 +191,10 @@ class DataSet:
         """Counts, flat."""
         row: dict[str, object] = {"data_set": self.name, "numbers": self.numbers}
         k = len(self.known.candidates)
-        for words, told in (("known", self.known), ("free", self.free)):
+        for words, labels in (("known", self.known), ("free", self.free)):
             row |= {
-                f"detectable_nuisances_{words}": k - len(told.below_floor),
-                f"confusable_pairs_nuisances_{words}": len(told.confusable), "pairs": k * (k - 1) // 2,
+                f"detectable_nuisances_{words}": k - len(labels.below_floor),
+                f"confusable_pairs_nuisances_{words}": len(labels.confusable), "pairs": k * (k - 1) // 2,
             }  # fmt: skip
         return {**row, "mixed_up": "; ".join(" / ".join(pair) for pair in self.free.confusable)}
 
@@ -203,21 +203,21 @@ def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
     """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
     faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
     chosen = one_amplitude(setup.bearing)
-    seen = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
+    shown = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
     return tuple(
-        DataSet(name, int(mask.sum()), *(_told(seen, mask, chosen, free) for free in (False, True)))
-        for name, mask in masks(seen.observations.elements, planned).items()
+        DataSet(name, int(mask.sum()), *(_told(shown, mask, chosen, free) for free in (False, True)))
+        for name, mask in masks(shown.observations.elements, planned).items()
     )
 
 
-def _told(seen: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
+def _told(shown: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
     """Sizes and separations by a part of the elements."""
-    factor = seen.factor(free)
+    factor = shown.factor(free)
     part = (factor @ factor.T)[np.ix_(mine, mine)]
     scale = np.sqrt(np.diag(part))
     whole = np.linalg.cholesky(part / np.outer(scale, scale))
-    return separated(chosen, np.asarray(np.linalg.solve(whole, seen.columns[mine] / scale[:, None])))
+    return separated(chosen, np.asarray(np.linalg.solve(whole, shown.columns[mine] / scale[:, None])))
 
 
 def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:

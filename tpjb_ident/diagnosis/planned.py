@@ -53,8 +53,8 @@ def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
     for test in layout.dynamic:
         base = (("load", test.load), ("direction", test.direction), ("speed", test.speed))
         for omega in test.excitation:
-            where = (*base, ("excitation", omega))
-            out += [Element("h", f"{part}{entry}", where) for part in "kc" for entry in ENTRY_NAMES]
+            place = (*base, ("excitation", omega))
+            out += [Element("h", f"{part}{entry}", place) for part in "kc" for entry in ENTRY_NAMES]
         out += [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in test.pads]
     for locus_test in layout.locus:
         where3 = (("load", locus_test.load), ("direction", locus_test.direction), ("speed", locus_test.speed))

@@ -91,18 +91,18 @@ def identify(
     runs = campaign.of_kind("dynamic")
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     settings = _with_mains(settings, campaign)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
-        bands = identify_bands(campaign, _band_settings(settings), tell, rig)
+        bands = identify_bands(campaign, _band_settings(settings), report, rig)
     if not sines.of_kind("dynamic"):
         identification = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
     else:
-        with all_runs(sines, settings.phasors, tell, workers, store) as finished:
-            identification = assemble(sines, finished, settings, tell, workers)
+        with all_runs(sines, settings.phasors, report, workers, store) as finished:
+            identification = assemble(sines, finished, settings, report, workers)
     identification = identification if bands is None else _with_bands(identification, bands)
     return _with_zero_uncertainty(identification, campaign)
 
@@ -116,15 +116,15 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
     return replace(identification, points=points)
 
 
-def _with_bands(found: Identification, bands: IdentifiedBands) -> Identification:
+def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
     """The points of sines and those of bands together, sorted as ever."""
-    points = [*found.points, *(p for band in bands.results for p in band.points)]
-    joint = np.concatenate([found.calibration_changes, bands.changes], axis=1)
+    points = [*result.points, *(p for band in bands.results for p in band.points)]
+    joint = np.concatenate([result.calibration_changes, bands.changes], axis=1)
     changes = joint.reshape(len(joint), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    table = {c.sentence(): c for c in (*found.conditions, *bands.conditions)}
+    table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
     return replace(
-        found,
+        result,
         points=tuple(points[i] for i in order),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
         conditions=tuple(table.values()),
@@ -150,7 +150,7 @@ def assemble(
     campaign: Campaign,
     finished: FinishedRuns,
     settings: IdentifySettings,
-    tell: Progress,
+    report: Progress,
     workers: Workers | None = None,
 ) -> Identification:
     """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time."""
@@ -162,7 +162,7 @@ def assemble(
     sources = [replace(source, baseline=baseline) for source in sources]
     axes = np.array([c.axis for c in campaign.channels.values() if c.quantity == "displacement"], dtype=float)
     sweeps = swept_probes(campaign)
-    tell("estimating", 0, len(sources))
+    report("estimating", 0, len(sources))
     first = list(map_ordered(workers, _first, [(source,) for source in sources], settings))
     mains = [digest.mains for digest in digests]
     in_cells = [digest.mains_force for digest in digests]
@@ -182,7 +182,7 @@ def assemble(
     for point, change in map_ordered(workers, _finished, list(zip(sources, corrections)), work):
         points.append(point)
         changes.append(change)
-        tell("estimating", len(points), len(sources))
+        report("estimating", len(points), len(sources))
     joint = np.concatenate(changes, axis=1)
     excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
     conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
@@ -240,12 +240,12 @@ class _Points:
         with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
         bent = change_conditions(film, uncertain, with_both[settings.method], figures.amplitude, settings.clearance)
         bent += () if none is None else none.conditions()
-        found = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
+        conditions = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)
         gains = gain_doubts(data, self.pairs) if data.shaft is None else ()
-        doubts = (gains, *found, check_conditions(self.checked, [run.run for run in recorded.runs]))
+        doubts = (gains, *conditions, check_conditions(self.checked, [run.run for run in recorded.runs]))
         completion = Completion(with_both, merged(*doubts), used.miss, {**used.budget(before), **systematic})
-        whole = corrected if data.shaft is None else recorded
-        finished = point_result(whole, figures, completion, self.temperatures, settings)
+        point_data = corrected if data.shaft is None else recorded
+        finished = point_result(point_data, figures, completion, self.temperatures, settings)
         return finished, np.sum(list(changes.values()), axis=0)
 
 

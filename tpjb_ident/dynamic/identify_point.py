@@ -128,12 +128,12 @@ def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> d
     drive = nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     table = replace(table, directions_differ=differ)
-    found: dict[str, DynamicStiffness] = {}
+    estimates: dict[str, DynamicStiffness] = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, _, norm = name.partition(":")
         if method != "iv" or drive is not None or settings.method == "iv":
-            found[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
-    return found
+            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+    return estimates
 
 
 def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[Condition, ...]:
@@ -161,11 +161,15 @@ def nominal_drive(data: PointData) -> ComplexArray | None:
     windows it knows next to nothing of a single window's noise, and nothing of the displacements' noise.
     """
     angles = [run.direction for run in data.runs]
-    known = np.array([a for a in angles if a is not None])
-    if len(known) < len(angles) or len(known) < 2 or np.abs(np.sin(known - known[0])).max() < MIN_SINE:
+    stated_angles = np.array([a for a in angles if a is not None])
+    if (
+        len(stated_angles) < len(angles)
+        or len(stated_angles) < 2
+        or np.abs(np.sin(stated_angles - stated_angles[0])).max() < MIN_SINE
+    ):
         return None
     result = np.full(data.F.shape, np.nan + 0j)
-    for i, angle in enumerate(known):
+    for i, angle in enumerate(stated_angles):
         selected = data.run_index == i
         along = data.F[selected] @ np.array([np.cos(angle), np.sin(angle)])
         along = along[np.isfinite(along)]

@@ -99,32 +99,32 @@ def refuse_flat_channels(run: Run) -> None:
     """
     problems = []
     for quantity in ("force", "displacement"):
-        seen = {name: _statistics(run, name) for name, c in run.channels.items() if c.quantity == quantity}
-        if any(_repeated(s) > NOISE_FREE for s in seen.values() if not s.constant):
+        statistics = {name: _statistics(run, name) for name, c in run.channels.items() if c.quantity == quantity}
+        if any(_repeated(s) > NOISE_FREE for s in statistics.values() if not s.constant):
             # noise below the converter's step: standing still says nothing here
             continue
-        problems += [_problem(run, name, s) for name, s in seen.items() if _stands_still(s)]
+        problems += [_problem(run, name, s) for name, s in statistics.items() if _stands_still(s)]
     if problems:
         raise RigDataError(problems)
 
 
 def _statistics(run: Run, name: str) -> ChannelStatistics:
-    seen = ChannelStatistics()
-    seen.add(np.asarray(run.record(name).values))
-    return seen
+    statistics = ChannelStatistics()
+    statistics.add(np.asarray(run.record(name).values))
+    return statistics
 
 
-def _repeated(seen: ChannelStatistics) -> float:
+def _repeated(statistics: ChannelStatistics) -> float:
     """Share of samples equal to the one before, apart from the longest stretch."""
-    return (seen.repeats - seen.longest_flat + 1) / max(seen.values - seen.longest_flat, 1)
+    return (statistics.repeats - statistics.longest_flat + 1) / max(statistics.values - statistics.longest_flat, 1)
 
 
-def _stands_still(seen: ChannelStatistics) -> bool:
-    return seen.longest_flat >= max(SHORTEST, TIMES_EXPECTED * seen.expected_flat())
+def _stands_still(statistics: ChannelStatistics) -> bool:
+    return statistics.longest_flat >= max(SHORTEST, TIMES_EXPECTED * statistics.expected_flat())
 
 
-def _problem(run: Run, name: str, seen: ChannelStatistics) -> Problem:
-    start, share = seen.flat_start / run.sample_rate, seen.longest_flat / max(seen.samples, 1)
+def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:
+    start, share = statistics.flat_start / run.sample_rate, statistics.longest_flat / max(statistics.samples, 1)
     how_long = f"from {start:.2f} s on for {100 * share:.0f} % of the run"
     text = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
     cure = "Check sensor, range and logger, and repeat the run"

@@ -66,10 +66,10 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
 
     `time` (m,) [s], `duration` (m,) [s].
     """
-    apart = np.abs(time[:, None] - time[None, :])
-    kernel = np.zeros_like(apart)
+    lag = np.abs(time[:, None] - time[None, :])
+    kernel = np.zeros_like(lag)
     for tau in FLICKER_TIMES:
-        term = np.exp(-apart / tau)
+        term = np.exp(-lag / tau)
         if duration is not None:
             x = duration / tau
             # variance of the average of an exponentially correlated process over x time constants
@@ -133,8 +133,8 @@ def _rotated(series: NoiseSeries, unit: float) -> tuple[FloatArray, FloatArray]:
 def _by_shape(series: Sequence[NoiseSeries]) -> list[list[NoiseSeries]]:
     """Series grouped by their numbers of blocks and of signal columns."""
     groups: dict[tuple[int, ...], list[NoiseSeries]] = {}
-    for one in series:
-        groups.setdefault(one.mean.shape, []).append(one)
+    for samples in series:
+        groups.setdefault(samples.mean.shape, []).append(samples)
     return list(groups.values())
 
 
@@ -158,13 +158,13 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
         total += 0.5 * ((logs[2] - expected) / spread) ** 2
         return total + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 
-    found = optimize.minimize(
+    solution = optimize.minimize(
         objective,
         np.array([0.0, 0.0, prior]),
         method="Nelder-Mead",
         options={"xatol": 0.05, "fatol": 0.05, "maxiter": 150, "initial_simplex": _simplex(prior)},
     )
-    w, f, d = np.exp(found.x)
+    w, f, d = np.exp(solution.x)
     return NoiseModel(white=float(w * white), flicker=float(f * white), drift=float(d * unit))
 
 

@@ -68,21 +68,21 @@ class Shift:
 
 
 def nuisances(
-    elements: Sequence[Element], setup: Setup, known: Tolerances, by_pad: bool = True
+    elements: Sequence[Element], setup: Setup, tolerances: Tolerances, by_pad: bool = True
 ) -> tuple[Nuisance, ...]:
     """List what may be off for an observation vector."""
     pads = range(1, len(setup.bearing.pads) + 1) if by_pad else ()
     listed = [
-        _whole("viscosity", "1", _viscosity, known, "oil_viscosity"),
-        _whole("viscosity_exponent", "1", _exponent, known, "viscosity_law"),
-        _whole("supply_temperature", "K", _supply, known, "supply_temperature"),
-        _whole("assembled_clearance", "m", _assembled, known),
-        _whole("pad_clearance", "m", _pad_clearance, known, "preload_error"),
-        _whole("film_heat", "1", _film_heat, known, "heat_loss"),
+        _whole("viscosity", "1", _viscosity, tolerances, "oil_viscosity"),
+        _whole("viscosity_exponent", "1", _exponent, tolerances, "viscosity_law"),
+        _whole("supply_temperature", "K", _supply, tolerances, "supply_temperature"),
+        _whole("assembled_clearance", "m", _assembled, tolerances),
+        _whole("pad_clearance", "m", _pad_clearance, tolerances, "preload_error"),
+        _whole("film_heat", "1", _film_heat, tolerances, "heat_loss"),
     ]
     for pad in pads:
         offset = functools.partial(_offset, pad=pad)
-        scatter = known["clearance_scatter"], "m", f"pad {pad}", offset
+        scatter = tolerances["clearance_scatter"], "m", f"pad {pad}", offset
         listed.append(
             Nuisance("clearance_scatter", *scatter, aliases=frozenset({f"pad_offset pad {pad}", "uneven_pads"}))
         )
@@ -90,17 +90,22 @@ def nuisances(
         alias = frozenset({f"soft_pivot pad {pad}"})
         listed.append(
             Nuisance(
-                "pivot_stiffness_scatter", known["pivot_stiffness_scatter"], "1", f"pad {pad}", softer, aliases=alias
+                "pivot_stiffness_scatter",
+                tolerances["pivot_stiffness_scatter"],
+                "1",
+                f"pad {pad}",
+                softer,
+                aliases=alias,
             )
         )
     for i in range(2):
-        gain = functools.partial(_probe, axes=known.probe_axes, index=i)
-        listed.append(Nuisance("probe_gain", known["probe_gain"], "1", f"probe {i + 1}", gain,
+        gain = functools.partial(_probe, axes=tolerances.probe_axes, index=i)
+        listed.append(Nuisance("probe_gain", tolerances["probe_gain"], "1", f"probe {i + 1}", gain,
                               aliases=frozenset({"probe_gain"})))  # fmt: skip
         cell = functools.partial(_cell, index=i)
-        listed.append(Nuisance("cell_gain", known.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
+        listed.append(Nuisance("cell_gain", tolerances.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
                               aliases=frozenset({"loadcell_gain"})))  # fmt: skip
-    listed += _readings(elements, known)
+    listed += _readings(elements, tolerances)
     return tuple(nuisance for nuisance in listed if nuisance.sigma > 0.0)
 
 
@@ -110,17 +115,17 @@ def _whole(
     return Nuisance(name, known[name], unit, "", change, aliases=frozenset(aliases))
 
 
-def _readings(elements: Sequence[Element], known: Tolerances) -> list[Nuisance]:
-    shifts = centre_shifts(elements) * known.centre
+def _readings(elements: Sequence[Element], tolerances: Tolerances) -> list[Nuisance]:
+    shifts = centre_shifts(elements) * tolerances.centre
     out = [
-        Nuisance("centre", known.centre, "m", letter, column=shifts[:, axis])
+        Nuisance("centre", tolerances.centre, "m", letter, column=shifts[:, axis])
         for axis, letter in enumerate("xy") if np.any(shifts[:, axis])
     ]  # fmt: skip
     pads = np.array([e.place("pad") for e in elements])
     warm = np.array([e.observable == "pad_temperature" for e in elements], dtype=bool)
     for pad in sorted(set(pads[warm])):
-        column = np.where(warm & (pads == pad), known["thermometer"], 0.0)
-        out.append(Nuisance("thermometer", known["thermometer"], "K", f"pad {pad:.0f}", column=column))
+        column = np.where(warm & (pads == pad), tolerances["thermometer"], 0.0)
+        out.append(Nuisance("thermometer", tolerances["thermometer"], "K", f"pad {pad:.0f}", column=column))
     return out
 
 
@@ -135,17 +140,17 @@ def at_baseline(
 
 
 def column_of(
-    forward: ForwardModel, effects: Sequence[Effect], known: Sequence[Nuisance], at: FloatArray, base: FloatArray,
+    forward: ForwardModel, effects: Sequence[Effect], unknowns: Sequence[Nuisance], at: FloatArray, base: FloatArray,
     index: int,
 ) -> FloatArray:  # fmt: skip
     """Change of the observation vector per standard deviation of one nuisance, (n,); `at` (m,), `base` (n,)."""
-    if known[index].column is not None:
-        return np.asarray(known[index].column)
+    if unknowns[index].column is not None:
+        return np.asarray(unknowns[index].column)
     # towards zero: there the model surely has an equilibrium
     step = -STEP if at[index] > 0.0 else STEP
     moved = at.copy()
     moved[index] += step
-    return (predict(forward, effects, known, moved) - base) / step
+    return (predict(forward, effects, unknowns, moved) - base) / step
 
 
 def predict(

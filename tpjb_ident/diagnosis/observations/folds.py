@@ -33,7 +33,7 @@ class Fold:
 def folds(observations: Observations) -> tuple[Fold, ...]:
     """Split all elements into blocks; every element is in one of them."""
     elements = observations.elements
-    names, beyond = _dynamic_names(elements)
+    names, unassigned = _dynamic_names(elements)
     sectors = _sectors(elements)
     rows: dict[str, list[int]] = {}
     for i, e in enumerate(elements):
@@ -44,7 +44,7 @@ def folds(observations: Observations) -> tuple[Fold, ...]:
         else:
             name = f"{'dry test' if e.family == 'dry' else 'clearance'} of pad {e.place('pad'):.0f}"
         rows.setdefault(name, []).append(i)
-    far = beyond | {"locus, sector 3"}
+    far = unassigned | {"locus, sector 3"}
     return tuple(Fold(name, np.array(members), name in far) for name, members in rows.items())
 
 
@@ -67,13 +67,13 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
         if e.family == "h" and e.place("speed") == usual:
             lines.setdefault((e.place("load"), e.place("direction")), set()).add(e.place("excitation"))
     names: dict[int, str] = {}
-    beyond: set[str] = set()
+    unassigned: set[str] = set()
     top = max((load for load, _ in lines), default=0.0)
     for i, e in members:
         key = (e.place("load"), e.place("direction"))
         if e.place("speed") != usual:
             names[i] = f"speed {e.place('speed'):.1f} rad/s"
-            beyond.add(names[i])
+            unassigned.add(names[i])
             continue
         swept = lines.get(key, set())
         name = f"load {key[0]:.0f} N at {np.degrees(key[1]):.0f} deg"
@@ -81,11 +81,11 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
             line = e.place("excitation")
             outer = line in (min(swept), max(swept))
             name += ", temperatures" if e.family == "temperature" else f", {line / (2 * np.pi):g} Hz"
-            beyond |= {name} if outer else set()
+            unassigned |= {name} if outer else set()
         elif key[0] == top and len(lines) > 2:
-            beyond.add(name)
+            unassigned.add(name)
         names[i] = name
-    return names, beyond
+    return names, unassigned
 
 
 def _sectors(elements: tuple[Element, ...]) -> dict[int, int]:

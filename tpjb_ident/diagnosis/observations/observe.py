@@ -139,13 +139,13 @@ class _Builder:
         self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray, tolerance: FloatArray | float
     ) -> None:
         value = np.atleast_1d(value)
-        keep = np.isfinite(value) & np.isfinite(np.diag(covariance))
+        finite = np.isfinite(value) & np.isfinite(np.diag(covariance))
         sigma = np.broadcast_to(np.asarray(tolerance, float), value.shape)
-        self.value += list(value[keep])
-        self.sigma += list(sigma[keep])
-        self.elements += [e for e, k in zip(elements, keep, strict=True) if k]
-        self.covariance.append(covariance[np.ix_(keep, keep)])
-        self.kept = keep
+        self.value += list(value[finite])
+        self.sigma += list(sigma[finite])
+        self.elements += [e for e, k in zip(elements, finite, strict=True) if k]
+        self.covariance.append(covariance[np.ix_(finite, finite)])
+        self.kept = finite
 
 
 def observe(
@@ -201,9 +201,9 @@ def _mains_on_excitation(result: PointResult) -> bool:
 def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
     omega = result.point.excitation
     h = result.stiffness.h
-    where = (*base, ("excitation", omega))
-    elements = [Element("h", f"k{e}", where) for e in ENTRY_NAMES]
-    elements += [Element("h", f"c{e}", where) for e in ENTRY_NAMES]
+    place = (*base, ("excitation", omega))
+    elements = [Element("h", f"k{e}", place) for e in ENTRY_NAMES]
+    elements += [Element("h", f"c{e}", place) for e in ENTRY_NAMES]
     scale = np.repeat(result.stiffness.direct, 4)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
@@ -220,16 +220,16 @@ def _add_locus(
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
     stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
     for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
-        where = (
+        place = (
             ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
         )  # fmt: skip
         names = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
-        both = np.vstack([give, np.eye(2)])
-        covariance = both @ spread @ both.T
+        stacked = np.vstack([give, np.eye(2)])
+        covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
         builder.add(
-            [Element(family, name, where) for family, name in names],
+            [Element(family, name, place) for family, name in names],
             np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
         )  # fmt: skip
         out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
@@ -254,12 +254,12 @@ def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryT
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
     n = len(polygon.angles)
     places = [(("pad", k + 1.0), ("angle", float(polygon.angles[k]))) for k in range(n)]
-    elements = [Element("clearance", "clearance_pushed", where) for where in places]
+    elements = [Element("clearance", "clearance_pushed", place) for place in places]
     builder.add(
         elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
         tolerance.position,
     )  # fmt: skip
-    elements = [Element("clearance", "side_angle", where) for where in places]
+    elements = [Element("clearance", "side_angle", place) for place in places]
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
     builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
     return float(polygon.push_load)

@@ -45,10 +45,10 @@ class AmplitudePath:
     @property
     def neutral_slope(self) -> FloatArray:
         """Derivative where nothing happens yet, of a parabola through the neighbours, (n,)."""
-        here = int(np.searchsorted(self.at, 0.0))
-        nodes = [i for i in (here - 1, here, here + 1) if 0 <= i < len(self.at)]
+        neutral = int(np.searchsorted(self.at, 0.0))
+        nodes = [i for i in (neutral - 1, neutral, neutral + 1) if 0 <= i < len(self.at)]
         if len(nodes) < 3:
-            nodes = list(range(3)) if here == 0 else list(range(len(self.at) - 3, len(self.at)))
+            nodes = list(range(3)) if neutral == 0 else list(range(len(self.at) - 3, len(self.at)))
         scale = float(np.abs(self.at[nodes]).max())
         powers = np.vander(self.at[nodes] / scale, 3, increasing=True)
         return np.asarray(np.linalg.solve(powers, self.columns[:, nodes].T)[1] / scale)
@@ -58,9 +58,9 @@ class AmplitudePath:
 
     def _pieces(self, inside: FloatArray, basis: FloatArray) -> FloatArray:
         count = len(self.at)
-        left = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
-        length = self.at[left + 1] - self.at[left]
-        u = (inside - self.at[left]) / length
+        lower = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
+        length = self.at[lower + 1] - self.at[lower]
+        u = (inside - self.at[lower]) / length
         # of value at left, value at right, derivative at left, derivative at right
         parts = (u[:, None] ** np.arange(4)) @ basis
         if basis is _VALUE:
@@ -69,7 +69,7 @@ class AmplitudePath:
             parts[:, :2] /= length[:, None]
         out = np.zeros((len(inside), 2 * count))
         rows = np.arange(len(inside))
-        for column, at in enumerate((left, left + 1, count + left, count + left + 1)):
+        for column, at in enumerate((lower, lower + 1, count + lower, count + lower + 1)):
             out[rows, at] = parts[:, column]
         return out
 

@@ -55,11 +55,11 @@ class Basis:
 
     def covariance(self, scales: FloatArray) -> FloatArray:
         """Noise and model error at scales t_k, (n, n); `scales` (c,)."""
-        own = np.array(scales, float)
+        all_scales = np.array(scales, float)
         for component, scale in zip(self.components, scales, strict=True):
-            own[list(component.made_of)] += scale
+            all_scales[list(component.made_of)] += scale
         out = self.noise.copy()
-        for component, scale, at in zip(self.components, own, self._at, strict=True):
+        for component, scale, at in zip(self.components, all_scales, self._at, strict=True):
             if not component.made_of:
                 out[at] += scale * component.matrix
         return out
@@ -205,22 +205,24 @@ def _slopes(
     scales = np.exp(logs)
     weighted = inverse @ linear.residual
     components = basis.components
-    own = [i for i, component in enumerate(components) if not component.made_of]
+    basic = [i for i, component in enumerate(components) if not component.made_of]
     # Q D_k over the rows that each acts on
     products = {
-        i: inverse[:, components[i].rows] @ components[i].matrix if i else (basis.sparse @ inverse).T for i in own
+        i: inverse[:, components[i].rows] @ components[i].matrix if i else (basis.sparse @ inverse).T for i in basic
     }
-    made = np.zeros((len(components), len(own)))  # what is made of others has their sums
+    combined = np.zeros((len(components), len(basic)))  # what is made of others has their sums
     for i, component in enumerate(components):
-        made[i, [own.index(k) for k in component.made_of or (i,)]] = 1.0
-    trace = made @ [np.trace(products[i][components[i].rows]) for i in own]
-    square = made @ [weighted[components[i].rows] @ components[i].matrix @ weighted[components[i].rows] for i in own]
+        combined[i, [basic.index(k) for k in component.made_of or (i,)]] = 1.0
+    trace = combined @ [np.trace(products[i][components[i].rows]) for i in basic]
+    square = combined @ [
+        weighted[components[i].rows] @ components[i].matrix @ weighted[components[i].rows] for i in basic
+    ]
     share = scales / (1.0 + scales)
     gradient = 0.5 * scales * (square - trace) + 0.5 - share
-    both = np.zeros((len(own), len(own)))
-    for a, i in enumerate(own):
-        for b, j in enumerate(own[a:], a):
+    both = np.zeros((len(basic), len(basic)))
+    for a, i in enumerate(basic):
+        for b, j in enumerate(basic[a:], a):
             # tr(Q D_i Q D_j) over the rows that each acts on
             both[a, b] = both[b, a] = float(np.vdot(products[i][components[j].rows], products[j][components[i].rows].T))
-    fisher = 0.5 * np.outer(scales, scales) * (made @ both @ made.T)
+    fisher = 0.5 * np.outer(scales, scales) * (combined @ both @ combined.T)
     return gradient, fisher + np.diag(share * (1.0 - share))

@@ -48,22 +48,22 @@ def components(observations: Observations) -> tuple[Component, ...]:
     everything = np.arange(len(observations))
     out = [Component("scatter", everything, observations.covariance / np.outer(scale, scale), NOTHING)]
     share = observations.sigma / scale
-    beyond = np.zeros_like(observations.covariance)  # all kinds together
+    combined = np.zeros_like(observations.covariance)  # all kinds together
     kinds = np.array([KINDS[e.family] for e in observations.elements])
     for kind in dict.fromkeys(kinds):
         rows = np.flatnonzero(kinds == kind)
         members = [observations.elements[i] for i in rows]
         matrix = _correlation(members) * np.outer(share[rows], share[rows])
-        beyond[np.ix_(rows, rows)] = matrix
+        combined[np.ix_(rows, rows)] = matrix
         out.append(Component(str(kind), rows, matrix))
-    return (*out, Component("beyond", everything, beyond, NOTHING, HIGHEST, tuple(range(1, len(out)))))
+    return (*out, Component("beyond", everything, combined, NOTHING, HIGHEST, tuple(range(1, len(out)))))
 
 
 def _correlation(elements: Sequence[Element]) -> FloatArray:
     """Correlation between elements of one kind: only the same observable of the same pad has any."""
     keys = [(e.observable, e.place("pad") if e.place("pad") == e.place("pad") else 0.0) for e in elements]
-    same = np.array([[a == b for b in keys] for a in keys], dtype=float)
-    distance = np.zeros_like(same)
+    equal = np.array([[a == b for b in keys] for a in keys], dtype=float)
+    distance = np.zeros_like(equal)
     for name in ("load", "excitation", "speed"):
         x = coordinate(elements, name)
         distance += 0.5 * (x[:, None] - x[None, :]) ** 2
@@ -72,7 +72,7 @@ def _correlation(elements: Sequence[Element]) -> FloatArray:
     around = elements[0].family in {"locus", "load"}
     # the constant part of a locus is its centre, which is free
     constant, smooth = (0.0, CONSTANT + SMOOTH) if around else (CONSTANT, SMOOTH)
-    return same * (constant + smooth * np.exp(-distance)) + ROUGH * np.eye(len(elements))
+    return equal * (constant + smooth * np.exp(-distance)) + ROUGH * np.eye(len(elements))
 
 
 #: Share of the stated tolerance that campaigns turn out to need, for what is planned before any is there: with models

@@ -20,62 +20,62 @@ ROUNDS = 3
 STEPS_BETWEEN = 4
 
 
-def converge(run: Map, problem: Problem, found: Fit, rounds: int = ROUNDS) -> Fit:
+def converge(run: Map, problem: Problem, fit: Fit, rounds: int = ROUNDS) -> Fit:
     """Give a fit derivatives of its own, those of the nuisances too, and move all of them together."""
-    if found.converged:
-        return found
-    state = SearchState(found.start, found.prediction)
-    scales = found.assessment.scales
+    if fit.converged:
+        return fit
+    state = SearchState(fit.start, fit.prediction)
+    scales = fit.assessment.scales
     for number in range(rounds):
         if number:
             state = replace(state, start=_renewed(run, problem, state.start, state.prediction))
-            found = fitted(problem, state.start, state.prediction, scales)
-            scales = found.assessment.scales
+            fit = fitted(problem, state.start, state.prediction, scales)
+            scales = fit.assessment.scales
         moved = False
         for _ in range(STEPS_BETWEEN):
-            next_state, stepped = _stepped(run, problem, state, found)
+            next_state, stepped = _stepped(run, problem, state, fit)
             if not stepped:
                 break
             state, moved = _learnt(problem, state, next_state), True
-            found = fitted(problem, state.start, state.prediction, scales)
-            scales = found.assessment.scales
+            fit = fitted(problem, state.start, state.prediction, scales)
+            scales = fit.assessment.scales
         if number and not moved:
-            return replace(found, converged=True)
-    return found
+            return replace(fit, converged=True)
+    return fit
 
 
-def _learnt(problem: Problem, here: SearchState, there: SearchState) -> SearchState:
+def _learnt(problem: Problem, state: SearchState, trial: SearchState) -> SearchState:
     """Correct all derivatives by what a step showed, in units of the priors' widths (Broyden, as in `fit`)."""
-    count, width = here.start.jacobian.shape[1], here.start.width
-    step = (there.start.free - here.start.free) / width
-    columns = np.column_stack([here.start.jacobian, here.start.columns]) * width
-    change = there.prediction - here.prediction - columns @ step
+    count, width = state.start.jacobian.shape[1], state.start.width
+    step = (trial.start.free - state.start.free) / width
+    columns = np.column_stack([state.start.jacobian, state.start.columns]) * width
+    change = trial.prediction - state.prediction - columns @ step
     # what acts on readings is linear
     step[count:][[nuisance.column is not None for nuisance in problem.nuisances]] = 0.0
     length = float(step @ step)
     if length < 1e-20:
-        return there
+        return trial
     columns = (columns + np.outer(change, step / length)) / width
-    return replace(there, start=replace(there.start, jacobian=columns[:, :count], columns=columns[:, count:]))
+    return replace(trial, start=replace(trial.start, jacobian=columns[:, :count], columns=columns[:, count:]))
 
 
-def _stepped(run: Map, problem: Problem, here: SearchState, found: Fit) -> tuple[SearchState, bool]:
+def _stepped(run: Map, problem: Problem, state: SearchState, fit: Fit) -> tuple[SearchState, bool]:
     """Take the step that a linear model proposes, or a part of it; whether it was one worth taking."""
-    weight: FloatArray = np.asarray(np.linalg.inv(problem.basis.covariance(found.assessment.scales)), float)
-    free = found.assessment.free
-    now = here.start.free
-    errors = np.sqrt(np.maximum(np.diag(found.assessment.covariance), 1e-300))
+    weight: FloatArray = np.asarray(np.linalg.inv(problem.basis.covariance(fit.assessment.scales)), float)
+    free = fit.assessment.free
+    now = state.start.free
+    errors = np.sqrt(np.maximum(np.diag(fit.assessment.covariance), 1e-300))
     if np.all(np.abs(free - now) < CONVERGED * errors):
-        return here, False
-    cost = here.cost(problem, weight)
+        return state, False
+    cost = state.cost(problem, weight)
     for share in (1.0, 0.4, 0.1):
-        start = _moved(here.start, now + share * (free - now))
+        start = _moved(state.start, now + share * (free - now))
         (y,) = tuple(run(attempt, [(start,)]))
         if y is not None:
             next_state = SearchState(start, y)
             if next_state.cost(problem, weight) < cost:
                 return next_state, True
-    return here, False
+    return state, False
 
 
 def _moved(start: InitialFit, free: FloatArray) -> InitialFit:
@@ -88,10 +88,10 @@ def _renewed(run: Map, problem: Problem, start: InitialFit, y: FloatArray) -> In
     """Take all derivatives anew; what acts on readings has its own."""
     count = start.jacobian.shape[1]
     asked = [*range(count), *(count + i for i, nuisance in enumerate(problem.nuisances) if nuisance.column is None)]
-    every = np.column_stack([start.jacobian, start.columns])
+    jacobian = np.column_stack([start.jacobian, start.columns])
     for index, column in zip(asked, run(_column, [(start, y, i) for i in asked]), strict=True):
-        every[:, index] = column
-    return replace(start, jacobian=every[:, :count], columns=every[:, count:])
+        jacobian[:, index] = column
+    return replace(start, jacobian=jacobian[:, :count], columns=jacobian[:, count:])
 
 
 def _column(forward: ForwardModel, problem: Problem, start: InitialFit, y: FloatArray, index: int) -> FloatArray:

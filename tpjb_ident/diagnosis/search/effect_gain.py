@@ -34,7 +34,7 @@ def effect_gain(problem: Problem, model: Fit, less: Fit, candidate: Candidate) -
     stand_in = np.flatnonzero((np.abs(at[1]) > STAND_IN) & (np.abs(at[1]) > np.abs(at[0]) + 1.0))
     gone = sorted({*problem.aliases(candidate), *(int(i) for i in stand_in)})
     unseen = []
-    for one in (model, less):
-        told = assess(problem.basis, without(one, gone), one.assessment.scales) if gone else one.assessment
+    for fit in (model, less):
+        told = assess(problem.basis, without(fit, gone), fit.assessment.scales) if gone else fit.assessment
         unseen.append(float(np.sum(told.scores())))
     return EffectGain(unseen[0] - unseen[1], model.evidence - less.evidence)

@@ -76,35 +76,39 @@ class Objective:
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 
-def _minimised(forward: ForwardModel, problem: Problem, here: SearchState, objective: Objective) -> SearchState:
+def _minimised(forward: ForwardModel, problem: Problem, state: SearchState, objective: Objective) -> SearchState:
     """Steps at fixed scales of the model's error until no amplitude moves."""
-    for _ in range(MAX_STEPS if here.start.jacobian.shape[1] else 0):
-        assessment = objective.assess(problem, here.start, here.prediction)
-        now = np.concatenate(here.start.amplitudes)
-        step = np.concatenate(here.start.split(_targets(here.start, assessment))) - now
+    for _ in range(MAX_STEPS if state.start.jacobian.shape[1] else 0):
+        assessment = objective.assess(problem, state.start, state.prediction)
+        now = np.concatenate(state.start.amplitudes)
+        step = np.concatenate(state.start.split(_targets(state.start, assessment))) - now
         errors = np.sqrt(np.maximum(np.diag(assessment.covariance)[: len(now)], 0.0))
         if np.all(np.abs(step) < CONVERGED * errors):
             break
-        moved = _improved(forward, problem, here, step, (objective, assessment))
+        moved = _improved(forward, problem, state, step, (objective, assessment))
         if moved is None:
             break
-        here = moved
-    return here
+        state = moved
+    return state
 
 
 def _improved(
-    forward: ForwardModel, problem: Problem, here: SearchState, step: FloatArray, evidence: tuple[Objective, Assessment]
+    forward: ForwardModel,
+    problem: Problem,
+    state: SearchState,
+    step: FloatArray,
+    evidence: tuple[Objective, Assessment],
 ) -> SearchState | None:
     """The place after a step, or after a part of it, that is better; None if none is."""
     objective, assessment = evidence
-    now = np.concatenate(here.start.amplitudes)
+    now = np.concatenate(state.start.amplitudes)
     for share in (1.0, 0.4, 0.1):
-        trial = replace(here.start, amplitudes=here.start.split(now + share * step))
+        trial = replace(state.start, amplitudes=state.start.split(now + share * step))
         y = attempt(forward, problem, trial)
         if y is None:
             continue
         moved = np.concatenate(trial.amplitudes) - now
-        trial = replace(trial, jacobian=_corrected(here.start, y - here.prediction, moved))
+        trial = replace(trial, jacobian=_corrected(state.start, y - state.prediction, moved))
         trial_assessment = objective.assess(problem, trial, y)
         if trial_assessment.evidence > assessment.evidence:
             return SearchState(trial, y)

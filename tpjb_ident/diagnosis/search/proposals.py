@@ -65,12 +65,12 @@ class Proposals:
         `table` (n, k) each.
         """
         free = self._free(drawn, table)
-        every = scores(self.problem, drawn, free, paths=self.paths)
-        ranked = self._promising(every)
+        ranking = scores(self.problem, drawn, free, paths=self.paths)
+        ranked = self._promising(ranking)
         # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
         first = alone(self.problem, drawn, free, self.paths)[:ALONE]
         names = {s.candidates for s in first} - {s.candidates for s in ranked}
-        ranked = [*ranked, *first, *(s for s in every if s.candidates in names)]
+        ranked = [*ranked, *first, *(s for s in ranking if s.candidates in names)]
         return best_of(self.fits([with_model(drawn, s, free, self.paths) for s in ranked]))
 
     def _free(self, model: Fit, table: Columns) -> Columns:

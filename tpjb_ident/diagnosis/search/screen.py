@@ -163,8 +163,8 @@ class _Level:
     """Scores at one level of the error scales."""
 
     def __init__(self, problem: Problem, model: Fit, table: Columns, share: float, paths: AmplitudePaths) -> None:
-        known = model.assessment.linear
-        assessment = assess(problem.basis, known, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
+        linear = model.assessment.linear
+        assessment = assess(problem.basis, linear, np.maximum(model.assessment.scales * share, 1e-5), fixed=True)
         self.offset = assessment.evidence - model.evidence
         residual = model.assessment.linear.residual
         self.at: dict[Candidate, slice] = {}
@@ -187,9 +187,9 @@ class _Level:
     def _along(self, c: Candidate) -> Score:
         """Score of one amplitude along its course: the best of a grid, and the Gaussian there."""
         width = self.width[self.at[c].start]
-        known, toward, gram = self.paths[c]
+        projection, toward, gram = self.paths[c]
         t = _grid(*((float(v[0]) - c.neutral) / width for v in c.limits))
-        path, slopes = known.weights(t * width), known.slope_weights(t * width) * width
+        path, slopes = projection.weights(t * width), projection.slope_weights(t * width) * width
         gain = path @ toward - 0.5 * (t**2 + np.einsum("ti,ij,tj->t", path, gram, path))
         gain -= 0.5 * np.log1p(np.einsum("ti,ij,tj->t", slopes, gram, slopes))
         best = int(np.argmax(gain))
@@ -240,9 +240,9 @@ def instead(problem: Problem, model: Fit, table: Columns, beyond: float) -> list
         for i in problem.aliases(c):
             if abs(size[i]) <= beyond or column.shape[1] != 1:
                 continue
-            own, other = problem.scaled(column)[:, 0], problem.scaled(model.columns)[:, i] * size[i]
+            new, old = problem.scaled(column)[:, 0], problem.scaled(model.columns)[:, i] * size[i]
             low, high = c.limits
-            amplitude = np.clip(c.origin + (own @ other) / max(float(own @ own), 1e-300), low, high)
+            amplitude = np.clip(c.origin + (new @ old) / max(float(new @ new), 1e-300), low, high)
             nuisance = model.nuisance.copy()
             nuisance[i] = 0.0
             jacobian = np.column_stack([model.jacobian, column])
@@ -257,8 +257,8 @@ def visible(problem: Problem, model: Fit, candidate: Candidate, column: FloatArr
 
     `column` (n, k).
     """
-    one = problem.scaled(column) @ candidate.steps
-    return math.sqrt(max(float(one @ model.assessment.inverse @ one), 0.0))
+    shift = problem.scaled(column) @ candidate.steps
+    return math.sqrt(max(float(shift @ model.assessment.inverse @ shift), 0.0))
 
 
 def without(model: Fit, gone: Sequence[int]) -> Linear:

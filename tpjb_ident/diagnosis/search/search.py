@@ -39,18 +39,18 @@ class Search:
 
 def search(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Search:
     """Look for the effects and terms that unseen points want."""
-    say = progress or (lambda what, share: None)
+    report = progress or (lambda what, share: None)
     drawn = baseline_fit(problem)
-    say("every effect of the library", 0.1)
+    report("every effect of the library", 0.1)
     first = survey(run, drawn, problem.pool)
     # what is off by two tolerances at once acts no longer to first order: a bearing that is merely off must not need
     # an effect for that
     baseline = converge(run, problem, drawn)
     proposals = Proposals(run, problem, settings, drawn, first.slopes, first.paths)
     selection = Selection(run, problem, settings, proposals, [baseline])
-    model, singles, rivals = _selected(selection, say)
+    model, singles, rivals = _selected(selection, report)
     if model.assessment.scales[-1] > WRONG:
-        again = _selected(selection, say, afar=True)
+        again = _selected(selection, report, afar=True)
         if again[0].evidence > model.evidence + CLEARLY:
             model, singles, rivals = again
     values = tuple(selection.effect_gain_in(model, i) for i in range(len(model.candidates)))

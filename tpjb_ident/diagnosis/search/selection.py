@@ -155,11 +155,11 @@ class Selection:
 
     def effect_gain_in(self, model: Fit, index: int) -> EffectGain:
         """What one candidate of a model is worth: the others are fitted again without it."""
-        known = self._known.get((id(model), index))
-        if known is None:
+        cached = self._known.get((id(model), index))
+        if cached is None:
             # the model is kept with the answer: its number must not be given to another one
-            known = self._known[(id(model), index)] = model, self._effect_gain_in(model, index)
-        return known[1]
+            cached = self._known[(id(model), index)] = model, self._effect_gain_in(model, index)
+        return cached[1]
 
     def _effect_gain_in(self, model: Fit, index: int) -> EffectGain:
         less = self.without(model, index)
@@ -175,23 +175,23 @@ class Selection:
 
     def without(self, model: Fit, index: int) -> Fit | None:
         """A model without one of its candidates, the others fitted again."""
-        known = self._less.get((id(model), index))
-        if known is None:
-            known = self._less[(id(model), index)] = model, self._without(model, index)
-        return known[1] if len(model.candidates) > 1 else self.baseline
+        cached = self._less.get((id(model), index))
+        if cached is None:
+            cached = self._less[(id(model), index)] = model, self._without(model, index)
+        return cached[1] if len(model.candidates) > 1 else self.baseline
 
     def _without(self, model: Fit, index: int) -> Fit | None:
-        keep = [i for i in range(len(model.candidates)) if i != index]
+        indices = [i for i in range(len(model.candidates)) if i != index]
         start = InitialFit(
-            tuple(model.candidates[i] for i in keep), tuple(model.amplitudes[i] for i in keep),
-            np.column_stack([model.jacobian[:, :0], *(model.jacobian[:, model.slices[i]] for i in keep)]),
+            tuple(model.candidates[i] for i in indices), tuple(model.amplitudes[i] for i in indices),
+            np.column_stack([model.jacobian[:, :0], *(model.jacobian[:, model.slices[i]] for i in indices)]),
             model.nuisance, model.columns,
         )  # fmt: skip
         less = next(iter(self.run(fit, [(start,)])))
-        if keep and less is not None:
+        if indices and less is not None:
             self._places[less.label] = max(self._places.get(less.label, less), less, key=lambda f: f.evidence)
-        if keep or less is None:
-            return less if keep else self.baseline
+        if indices or less is None:
+            return less if indices else self.baseline
         if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
             return self.baseline
         # the way from an effect back to nothing may end at a better place than the way from the drawing

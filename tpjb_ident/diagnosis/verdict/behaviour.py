@@ -48,9 +48,9 @@ class Behaviour:
     parameters: dict[str, float]
 
 
-def behaviours(problem: Problem, found: Search, beyond: bool = False) -> tuple[Behaviour, ...]:
+def behaviours(problem: Problem, result: Search, beyond: bool = False) -> tuple[Behaviour, ...]:
     """Describe the generic terms of a search's model, and the pads that are further off than stated."""
-    model = found.model
+    model = result.model
     out = []
     for candidate, amplitudes, at in zip(model.candidates, model.amplitudes, model.slices, strict=True):
         if candidate.name not in TERMS:
@@ -60,7 +60,7 @@ def behaviours(problem: Problem, found: Search, beyond: bool = False) -> tuple[B
         errors = model.errors[at]
         spread = float(np.max(errors) / max(np.max(np.abs(amplitudes)), 1e-300))
         out.append(_described(candidate.name, candidate.form, matrix, spread, values))
-    return (*out, *(_pads(problem, found.effects) if beyond else ()))
+    return (*out, *(_pads(problem, result.effects) if beyond else ()))
 
 
 def _pads(problem: Problem, fitted: Fit) -> list[Behaviour]:
@@ -98,15 +98,15 @@ def _described(name: str, form: str, matrix: FloatArray, spread: float, values: 
         size = float(sizes[first])
         angle = math.degrees(math.atan2(axes[1, first], axes[0, first]))
         direction = (angle + 90.0) % 180.0 - 90.0
-        other = float(sizes[1 - first])
+        second = float(sizes[1 - first])
         how = f"in one direction, {direction:.0f} deg"
-        if abs(other) > ONE_WAY * abs(size):
-            how = f"unequal: {direction:.0f} deg and, {other / size:.2f} times as much, across"
+        if abs(second) > ONE_WAY * abs(size):
+            how = f"unequal: {direction:.0f} deg and, {second / size:.2f} times as much, across"
     if name == "series_compliance":
         size = 1.0 / size if size else math.inf
-    what = {"series_compliance": "a spring", "parallel_stiffness": "a stiffness", "parallel_damping": "a damping"}[name]
-    where = "between bearing and probes" if name == "series_compliance" else "beside the bearing"
-    words = f"{what} of {size:.3g} {unit} {how}, {where}"
+    noun = {"series_compliance": "a spring", "parallel_stiffness": "a stiffness", "parallel_damping": "a damping"}[name]
+    place = "between bearing and probes" if name == "series_compliance" else "beside the bearing"
+    words = f"{noun} of {size:.3g} {unit} {how}, {place}"
     return Behaviour(kind, size, unit, direction, spread, words, name, values)
 
 
@@ -142,13 +142,13 @@ def drifts(problem: Problem, fitted: Fit) -> tuple[Drift, ...]:
 
 def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drift] | None:  # type: ignore[no-untyped-def]
     name, coordinate, levels = row
-    where = np.array([e.place(coordinate) if e.family in {"h", "temperature"} else math.nan
+    coordinates = np.array([e.place(coordinate) if e.family in {"h", "temperature"} else math.nan
                       for e in problem.observations.elements])  # fmt: skip
-    finite_values = sorted(set(where[np.isfinite(where)]))
+    finite_values = sorted(set(coordinates[np.isfinite(coordinates)]))
     if len(finite_values) < levels:
         return None
     middle = float(np.mean(finite_values))
-    slope = np.nan_to_num(where / middle - 1.0)
+    slope = np.nan_to_num(coordinates / middle - 1.0)
     linear = fitted.assessment.linear
     # per unit of relative growth; a prior of one: up to twice, down to nothing
     moved = float(

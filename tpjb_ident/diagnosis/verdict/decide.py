@@ -44,13 +44,13 @@ class Evidence:
     reasons: tuple[str, ...]
 
 
-def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Evidence:
+def judge(problem: Problem, result: Search, settings: DiagnoseSettings) -> Evidence:
     """Weigh a search: the dominant causes first, then what they leave."""
-    baseline, effects = found.baseline, found.effects
+    baseline, effects = result.baseline, result.effects
     before = excess(problem, baseline)
     # against the drawing: a baseline at its likeliest has tolerances exceeded in the place of an effect
     closed = closure(problem, baseline_fit(problem), effects)
-    if not found.model.candidates:
+    if not result.model.candidates:
         if before.p >= settings.alarm:
             text = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
             return Evidence("consistent", baseline, closed, before, (), (text,))
@@ -60,17 +60,17 @@ def judge(problem: Problem, found: Search, settings: DiagnoseSettings) -> Eviden
         )
         return Evidence("unexplained", baseline, closed, before, (), (text,))
     remaining = excess(problem, effects)
-    reasons = _refusals(found, closed, remaining, settings)
+    reasons = _refusals(result, closed, remaining, settings)
     if reasons and before.p >= settings.alarm:
         text = f"no disagreement beyond noise and stated tolerances (p = {before.p:.2g})"
         return Evidence("consistent", baseline, closed, before, (), (text,))
     if reasons:
         return Evidence("unexplained", baseline, closed, before, (), reasons)
-    alike = _alike(found, settings)
+    alike = _alike(result, settings)
     share = f"{100 * closed.closed:.0f} % of the squared gap on unseen points is closed"
     if math.isnan(closed.closed):
         share = "unseen points want it though what may be off closes the gap as well, beyond its tolerances"
-    if remaining.p < settings.alarm or found.model.candidates != effects.candidates:
+    if remaining.p < settings.alarm or result.model.candidates != effects.candidates:
         beyond = f"more than noise and stated tolerances (p = {remaining.p:.1g}), most in {remaining.where}"
         text = f"{share}; what is left is {beyond}"
         return Evidence("partly-explained", effects, closed, remaining, alike, (text,))
@@ -94,14 +94,14 @@ def _refusals(found: Search, closed: Closure, left: Excess, settings: DiagnoseSe
     return tuple(out)
 
 
-def _alike(found: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
+def _alike(result: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], ...]:
     """Per effect, the others that could stand in its place as well, its own label first."""
     out = []
-    for candidate, row in zip(found.model.candidates, found.rivals, strict=False):
+    for candidate, row in zip(result.model.candidates, result.rivals, strict=False):
         if candidate.name in TERMS:
             continue
-        near = [r for r in row if r.evidence > found.model.evidence - settings.alike and not r.at_bound]
-        used = {c.label for c in found.model.candidates}
+        near = [r for r in row if r.evidence > result.model.evidence - settings.alike and not r.at_bound]
+        used = {c.label for c in result.model.candidates}
         others = [c for r in near for c in r.candidates if c.label not in used and c.name not in TERMS]
         names = tuple(dict.fromkeys(c.label if c.name == candidate.name else c.name for c in others))
         if names:
@@ -110,24 +110,24 @@ def _alike(found: Search, settings: DiagnoseSettings) -> tuple[tuple[str, ...], 
 
 
 def decide(
-    problem: Problem, found: Search, settings: DiagnoseSettings, exact: FloatArray | None = None
+    problem: Problem, result: Search, settings: DiagnoseSettings, exact: FloatArray | None = None
 ) -> Verdict:  # fmt: skip
     """Turn a search into a verdict; `exact` (n,)."""
     observations, held = problem.observations, problem.held
-    evidence = judge(problem, found, settings)
+    evidence = judge(problem, result, settings)
     named = evidence.named
     if exact is None:
-        exact = found.effects.prediction - found.effects.columns @ found.effects.nuisance
+        exact = result.effects.prediction - result.effects.columns @ result.effects.nuisance
     after = exact if named.candidates else problem.base
     unseen_after = effects_unseen(problem, named, after) if named.candidates else problem.base
     worst = localise(observations, unseen(problem, named))
     return Verdict(
         verdict=evidence.name,
-        effects=_effects(problem, found, evidence),
+        effects=_effects(problem, result, evidence),
         indistinguishable=evidence.alike if evidence.name in {"ambiguous", "partly-explained"} else (),
-        below_floor=_below_floor(problem, found, settings),
+        below_floor=_below_floor(problem, result, settings),
         next_test="",
-        candidates=_ranked(problem, found),
+        candidates=_ranked(problem, result),
         disagreement=localise(observations, problem.base),
         gap_by_observable=gap_by_observable(observations, problem.base, unseen_after, held),
         gap={
@@ -142,9 +142,9 @@ def decide(
         remainder=_remainder(
             problem, evidence, worst[0].observable + " at " + worst[0].where if worst else "", settings.alarm
         ),
-        behaves_like=behaviours(problem, found, evidence.left.p < settings.alarm),
-        drift=_drifts(problem, found, evidence),
-        assumptions=_assumptions(problem, found, settings),
+        behaves_like=behaviours(problem, result, evidence.left.p < settings.alarm),
+        drift=_drifts(problem, result, evidence),
+        assumptions=_assumptions(problem, result, settings),
         reasons=evidence.reasons,
     )
 
@@ -159,23 +159,23 @@ def _remainder(problem: Problem, evidence: Evidence, where: str, alarm: float) -
     )
 
 
-def _drifts(problem: Problem, found: Search, evidence: Evidence) -> tuple[Drift, ...]:
+def _drifts(problem: Problem, result: Search, evidence: Evidence) -> tuple[Drift, ...]:
     if evidence.name == "consistent":
         return ()
     if evidence.named.candidates:
-        return drifts(problem, found.model)
-    return drifts(problem, found.singles[0]) if found.singles else ()
+        return drifts(problem, result.model)
+    return drifts(problem, result.singles[0]) if result.singles else ()
 
 
-def _effects(problem: Problem, found: Search, evidence: Evidence) -> tuple[FoundEffect, ...]:
+def _effects(problem: Problem, result: Search, evidence: Evidence) -> tuple[FoundEffect, ...]:
     if not evidence.named.candidates:
         return ()
     rows = []
-    for index, candidate in enumerate(found.model.candidates):
+    for index, candidate in enumerate(result.model.candidates):
         if candidate.name in TERMS:
             continue
-        parameters = parameters_of(found.model, index)
-        order = found.effect_gain[index].unseen
+        parameters = parameters_of(result.model, index)
+        order = result.effect_gain[index].unseen
         rows.append((order, FoundEffect(candidate.name, parameters, _stands_in(problem, candidate.name, parameters))))
     return tuple(e for _, e in sorted(rows, key=lambda row: -row[0]))
 
@@ -184,9 +184,9 @@ def _stands_in(problem: Problem, name: str, parameters: dict[str, Estimate]) -> 
     pads = sum(n.name == "clearance_scatter" for n in problem.nuisances)
     words = []
     for key, value in parameters.items():
-        known = plausible(name, key, pads) if value.lo < value.hi else None
-        if known is not None:
-            words.append(known.words(f"{name} {key}", value.value, value.lo, value.hi))
+        limits = plausible(name, key, pads) if value.lo < value.hi else None
+        if limits is not None:
+            words.append(limits.words(f"{name} {key}", value.value, value.lo, value.hi))
     return "; ".join(w for w in words if w)
 
 
@@ -212,17 +212,17 @@ def parameters_of(fitted: Fit, index: int) -> dict[str, Estimate]:
     return out
 
 
-def _below_floor(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
-    seen: dict[str, float] = {}
-    for candidate, column in found.first.items():
+def _below_floor(problem: Problem, result: Search, settings: DiagnoseSettings) -> tuple[str, ...]:
+    sizes: dict[str, float] = {}
+    for candidate, column in result.first.items():
         if candidate.name not in TERMS:
-            size = visible(problem, found.model, candidate, column)
-            seen[candidate.name] = max(seen.get(candidate.name, 0.0), size)
-    return tuple(sorted(n for n, d in seen.items() if d < settings.visible and n not in found.model.names))
+            size = visible(problem, result.model, candidate, column)
+            sizes[candidate.name] = max(sizes.get(candidate.name, 0.0), size)
+    return tuple(sorted(n for n, d in sizes.items() if d < settings.visible and n not in result.model.names))
 
 
-def _ranked(problem: Problem, found: Search) -> tuple[RankedCandidate, ...]:
-    fits: Sequence[Fit] = (found.model, found.effects, *found.singles, *(r for row in found.rivals for r in row))
+def _ranked(problem: Problem, result: Search) -> tuple[RankedCandidate, ...]:
+    fits: Sequence[Fit] = (result.model, result.effects, *result.singles, *(r for row in result.rivals for r in row))
     table: dict[str, Fit] = {}
     for f in fits:
         if f.candidates:
@@ -231,27 +231,27 @@ def _ranked(problem: Problem, found: Search) -> tuple[RankedCandidate, ...]:
     for f in sorted(table.values(), key=lambda f: -f.evidence):
         told = {c.label: {k: vars(p) for k, p in parameters_of(f, i).items()} for i, c in enumerate(f.candidates)}
         held = gap(problem.observations, unseen(problem, f), problem.held)
-        out.append(RankedCandidate(f.label, f.evidence - found.baseline.evidence, held, told))
+        out.append(RankedCandidate(f.label, f.evidence - result.baseline.evidence, held, told))
     return tuple(out)
 
 
-def _assumptions(problem: Problem, found: Search, settings: DiagnoseSettings) -> tuple[Assumption, ...]:
+def _assumptions(problem: Problem, result: Search, settings: DiagnoseSettings) -> tuple[Assumption, ...]:
     """Every tolerance that took part, with what the fit made of it."""
-    count = found.model.jacobian.shape[1]
-    free = found.model.assessment.free[count:]
+    count = result.model.jacobian.shape[1]
+    free = result.model.assessment.free[count:]
     fitted: dict[str, list[float]] = {}
     units: dict[str, tuple[float, str]] = {}
     for nuisance, size in zip(problem.nuisances, free, strict=True):
         fitted.setdefault(nuisance.name, []).append(float(size * nuisance.sigma))
         units[nuisance.name] = nuisance.sigma, nuisance.unit
-    stated = settings.tolerances.stated
+    tolerances = settings.tolerances.stated
     out = []
     for name, values in fitted.items():
         sigma, unit = units[name]
-        source = stated[name].source if name in stated else settings.tolerances.cell_gain.source
+        source = tolerances[name].source if name in tolerances else settings.tolerances.cell_gain.source
         out.append(Assumption(name, sigma, values if len(values) > 1 else values[0], unit, source))
-    scales = dict(zip((c.name for c in problem.basis.components), found.model.assessment.scales, strict=True))
+    scales = dict(zip((c.name for c in problem.basis.components), result.model.assessment.scales, strict=True))
     if "h" in scales:
         learnt = settings.tolerance.stiffness * math.sqrt(scales["h"] + scales["beyond"])
-        out.append(Assumption("model", settings.tolerance.stiffness, learnt, "1", stated["model"].source))
+        out.append(Assumption("model", settings.tolerance.stiffness, learnt, "1", tolerances["model"].source))
     return tuple(out)

@@ -20,9 +20,9 @@ class Plausible:
         """What to say of an amplitude with its interval; empty where it is plausible."""
         if lo <= self.high and hi >= self.low:
             return ""
-        beyond = self.high if value > self.high else self.low
+        limit = self.high if value > self.high else self.low
         return (
-            f"{name} {value:.3g} is beyond {beyond:.3g}, as far as its source goes ({self.source}): "
+            f"{name} {value:.3g} is beyond {limit:.3g}, as far as its source goes ({self.source}): "
             "another cause, or a second one, may stand behind this name"
         )
 
@@ -47,11 +47,13 @@ RANGES = {
 def plausible(name: str, parameter: str, pads: int) -> Plausible | None:
     """Range of an effect's parameter; None where nothing bounds it (a direction, a generic term)."""
     kind = kind_of(name)
-    known = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
+    described = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
     if (name, parameter) in RANGES:
         return Plausible(*RANGES[(name, parameter)])
-    if known is None or known.neutral != known.neutral or math.isnan(known.typical):
+    if described is None or described.neutral != described.neutral or math.isnan(described.typical):
         return None
-    origin, reach = known.to_linear(known.neutral), 3.0 * known.typical_step
-    ends = sorted(known.from_linear(origin + s * reach) for s in (-1.0, 1.0))
-    return Plausible(max(ends[0], known.low), min(ends[1], known.high), f"three times a typical size; {kind.source}")
+    origin, reach = described.to_linear(described.neutral), 3.0 * described.typical_step
+    ends = sorted(described.from_linear(origin + s * reach) for s in (-1.0, 1.0))
+    return Plausible(
+        max(ends[0], described.low), min(ends[1], described.high), f"three times a typical size; {kind.source}"
+    )

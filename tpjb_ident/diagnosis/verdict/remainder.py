@@ -70,9 +70,9 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     A posterior mean m of something with prior variance 1 and posterior variance v scatters with 1 - v.
     """
     # every kind of observable as wrong as stated, nothing beyond, no more scatter than stated
-    stated = problem.basis.stated
-    assessment = assess(problem.basis, fitted.assessment.linear, stated, fixed=True)
-    total = problem.basis.covariance(stated) + fitted.assessment.linear.spread
+    tolerances = problem.basis.stated
+    assessment = assess(problem.basis, fitted.assessment.linear, tolerances, fixed=True)
+    total = problem.basis.covariance(tolerances) + fitted.assessment.linear.spread
     residual = assessment.linear.residual
     rows = _groups(problem)
     tests = [(float(chdtrc(len(at), _square(total, residual, at))), name) for name, at in rows]

@@ -80,8 +80,8 @@ def _phi(rows: LineRows, source: ComplexArray, middle: float, basis: Basis) -> C
 
 def _flat(rows: LineRows, r: int) -> ComplexArray:
     """What takes off the ends of a run's record from its rows."""
-    one = rows.one_run(r)
-    return remainder(ends_columns(one)) if rows.ends else np.eye(len(one.D), dtype=complex)
+    run_rows = rows.one_run(r)
+    return remainder(ends_columns(run_rows)) if rows.ends else np.eye(len(run_rows.D), dtype=complex)
 
 
 def _explained(rows: LineRows, flat: list[ComplexArray]) -> ComplexArray:

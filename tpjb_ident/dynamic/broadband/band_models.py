@@ -125,19 +125,19 @@ def fit_band(rows: Sequence[LineRows], model: str, instrument: str, shared: Shar
     if len(rows) < 2 * m:
         return None
     sums = [line_sums(line, middle, basis, instrument) for line in rows]
-    found = _solve(sums)
-    if found is None:
+    solution = _solve(sums)
+    if solution is None:
         return None
-    covariance, dof = _covariance(sums, found)
-    moved = _moved(sums, found, shared)
-    parts = _parts(rows, (found, middle, basis), instrument, shared)
-    chi_square, spare, probability, misfit = _held_against(parts, 2 * found.theta.shape[1])
+    covariance, dof = _covariance(sums, solution)
+    moved = _moved(sums, solution, shared)
+    parts = _parts(rows, (solution, middle, basis), instrument, shared)
+    chi_square, spare, probability, misfit = _held_against(parts, 2 * solution.theta.shape[1])
     scale = np.repeat(1 / middle ** np.arange(m), 4)
     outer = np.outer(scale, scale)
     order = _by_kind(m)
     return BandModel(
         model,
-        found.theta.ravel()[order] * scale,
+        solution.theta.ravel()[order] * scale,
         covariance[np.ix_(order, order)] * outer,
         dof[order],
         (moved.T @ moved / len(moved))[np.ix_(order, order)] * outer,
@@ -164,15 +164,15 @@ def _solve(sums: list[list[RunSums]]) -> _Solution | None:
     inverse: FloatArray = np.zeros((2 * q, 2 * q))
     noise: list[list[ComplexArray]] = []
     for _ in range(ROUNDS):
-        normal, right = np.zeros((2 * q, 2 * q)), np.zeros(2 * q)
-        for line, own in zip(sums, weights):
-            for run, w in zip(line, own):
+        normal, moment = np.zeros((2 * q, 2 * q)), np.zeros(2 * q)
+        for line, weight in zip(sums, weights):
+            for run, w in zip(line, weight):
                 normal += outer_matrix(w, run.A).real
-                right += (w @ run.B).real.ravel()
+                moment += (w @ run.B).real.ravel()
         if not np.linalg.cond(normal) < 1e12:
             return None
         inverse = np.asarray(np.linalg.inv(normal), dtype=float)
-        theta = (inverse @ right).reshape(2, q)
+        theta = (inverse @ moment).reshape(2, q)
         noise = [[run.residual(theta) for run in line] for line in sums]
         weights = _weights(sums, noise)
     return _Solution(theta, inverse, weights, noise)
@@ -193,51 +193,51 @@ def _weights(sums: list[list[RunSums]], noise: list[list[ComplexArray]]) -> list
     return [[w / size for w in line] for line in out]
 
 
-def _covariance(sums: list[list[RunSums]], found: _Solution) -> tuple[FloatArray, FloatArray]:
+def _covariance(sums: list[list[RunSums]], solution: _Solution) -> tuple[FloatArray, FloatArray]:
     """Covariance of Theta row by row, and the degrees of freedom of its variances."""
     parts, dof = [], []
-    for line, own, spreads in zip(sums, found.weights, found.noise):
-        for run, w, spread in zip(line, own, spreads):
+    for line, weight, spreads in zip(sums, solution.weights, solution.noise):
+        for run, w, spread in zip(line, weight, spreads):
             score = 0.5 * outer_matrix(w @ spread @ w.conj().T, run.Z).real
-            parts.append(found.inverse @ score @ found.inverse.T)
+            parts.append(solution.inverse @ score @ solution.inverse.T)
             dof.append(2 * run.dof)
     each = np.einsum("kpp->kp", np.array(parts))
     return np.sum(parts, axis=0), satterthwaite(each, np.array(dof)[:, None])
 
 
-def _moved(sums: list[list[RunSums]], found: _Solution, shared: SharedErrors) -> FloatArray:
+def _moved(sums: list[list[RunSums]], solution: _Solution, shared: SharedErrors) -> FloatArray:
     """Change of Theta, row by row, in every draw of what lines share, (n, 2 q)."""
     q = len(sums[0][0].A)
-    right = np.zeros((len(shared.runs), 2 * q))
-    for k, (line, own) in enumerate(zip(sums, found.weights)):
+    moment = np.zeros((len(shared.runs), 2 * q))
+    for k, (line, weight) in enumerate(zip(sums, solution.weights)):
         change = (shared.lines[k, :, :4] + 1j * shared.lines[k, :, 4:]).reshape(-1, 2, 2)
-        for r, (run, w) in enumerate(zip(line, own)):
+        for r, (run, w) in enumerate(zip(line, weight)):
             total = np.einsum("nij,aj->nia", change, run.A0)
             if shared.runs[:, r].any():
-                total = total + shared.runs[:, r, None, None] * (found.theta @ run.A.T)
-            right += np.einsum("ik,nka->nia", w, total).real.reshape(len(right), -1)
-    return np.asarray(right @ found.inverse.T)
+                total = total + shared.runs[:, r, None, None] * (solution.theta @ run.A.T)
+            moment += np.einsum("ik,nka->nia", w, total).real.reshape(len(moment), -1)
+    return np.asarray(moment @ solution.inverse.T)
 
 
 def _parts(
     rows: Sequence[LineRows], model: tuple[_Solution, float, Basis], instrument: str, shared: SharedErrors
 ) -> tuple[BandPart, ...]:
     """H in parts of the band; none where one of them cannot be solved."""
-    found, middle, basis = model
+    solution, middle, basis = model
     order = _by_kind(2)
     parts = []
     for part in np.array_split(np.arange(len(rows)), min(PARTS, len(rows) // 2)):
-        sums = [line_sums(_left(rows[k], found.theta, middle, basis), middle, complex_h, instrument) for k in part]
+        sums = [line_sums(_left(rows[k], solution.theta, middle, basis), middle, complex_h, instrument) for k in part]
         alone = _solve(sums)
         if alone is None:
             return ()
         covariance, dof = _covariance(sums, alone)
         omega = float(np.mean([rows[k].omega for k in part]))
-        by_model = np.einsum("s,isj->ij", basis(np.array([omega / middle]))[0], found.theta.reshape(2, -1, 2))
+        by_model = np.einsum("s,isj->ij", basis(np.array([omega / middle]))[0], solution.theta.reshape(2, -1, 2))
         off = alone.theta.ravel()[order]
         h = by_model + (off[:4] + 1j * off[4:]).reshape(2, 2)
-        own = replace(shared, lines=shared.lines[part])
-        moved = _moved(sums, replace(alone, theta=np.concatenate([h.real, h.imag], axis=1)), own)[:, order]
+        section = replace(shared, lines=shared.lines[part])
+        moved = _moved(sums, replace(alone, theta=np.concatenate([h.real, h.imag], axis=1)), section)[:, order]
         covariance = covariance[np.ix_(order, order)]
         span = (rows[part[0]].omega, rows[part[-1]].omega)
         parts.append(BandPart(omega, h, covariance, dof[order], moved, span, np.zeros(8), off))

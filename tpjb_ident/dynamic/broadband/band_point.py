@@ -109,14 +109,14 @@ def read_point(
 
 def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
     """The settings with the differences between clocks that the group's runs show together."""
-    seen = []
+    clocks = []
     for run in group.runs if group.kind in TELL_CLOCKS else ():
         try:
-            seen.append(run_clocks(run, settings))
+            clocks.append(run_clocks(run, settings))
         except RigDataError:  # its own transform says so
             continue
     reach = 2 * np.pi * group.band[1] * (settings.seconds or 0.0)
-    return replace(settings, clocks=common_rates(seen, reach))
+    return replace(settings, clocks=common_rates(clocks, reach))
 
 
 def _spectra_settings(group: BandGroup, settings: BandSettings) -> SpectraSettings:
@@ -192,11 +192,11 @@ def _lines(spectra: RunSpectra, part: Sequence[int]) -> list[BalanceRun]:
         return []
     middle = float(np.median(spectra.frequencies[list(part)]))
     mass, windows = spectra.phasors.housing_mass, len(spectra.D)
-    found = []
+    blocks = []
     for k in part:
-        every = spectra.A[:, k] * (middle / spectra.frequencies[k]) ** 2
-        A, own, F = every.mean(axis=0), spectra.A[:, k].mean(axis=0), spectra.F[:, k].mean(axis=0)
-        variance = float(np.sum(np.abs(every - A) ** 2)) / max(4 * (windows - 1), 1)
-        share = float(mass * np.linalg.norm(own) / max(float(np.linalg.norm(F)), 1e-300))
-        found.append(BalanceRun(middle, F - mass * own, A, share, mass, variance, windows))
-    return found
+        scaled = spectra.A[:, k] * (middle / spectra.frequencies[k]) ** 2
+        A, mean_A, F = scaled.mean(axis=0), spectra.A[:, k].mean(axis=0), spectra.F[:, k].mean(axis=0)
+        variance = float(np.sum(np.abs(scaled - A) ** 2)) / max(4 * (windows - 1), 1)
+        share = float(mass * np.linalg.norm(mean_A) / max(float(np.linalg.norm(F)), 1e-300))
+        blocks.append(BalanceRun(middle, F - mass * mean_A, A, share, mass, variance, windows))
+    return blocks

@@ -145,14 +145,14 @@ def _model_row(result: BandResult, model: BandModel) -> dict[str, Any]:
     names = [column for kind in KINDS.values() for column in kind.columns]
     half, se = model.half_width(), model.standard_error
     for i, name in enumerate(names):
-        known = i < len(model.parameters)
-        value = model.parameters[i] if known else 0.0
+        fitted = i < len(model.parameters)
+        value = model.parameters[i] if fitted else 0.0
         row |= {
             name: value,
-            f"{name}_lo": value - half[i] if known else 0.0,
-            f"{name}_hi": value + half[i] if known else 0.0,
-            f"{name}_se": se[i] if known else 0.0,
-            f"{name}_dof": model.dof[i] if known else np.inf,
+            f"{name}_lo": value - half[i] if fitted else 0.0,
+            f"{name}_hi": value + half[i] if fitted else 0.0,
+            f"{name}_se": se[i] if fitted else 0.0,
+            f"{name}_dof": model.dof[i] if fitted else np.inf,
         }
     row["quality"] = "; ".join(str(c) for c in result.quality) or "ok"
     return row

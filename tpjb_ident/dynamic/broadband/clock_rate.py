@@ -37,8 +37,8 @@ class ClockRate:
 def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str, ClockRate]:
     """Differences that runs share, by quantity; those that are clear, and matter."""
     table = {}
-    for quantity in sorted({q for one in seen for q in one}):
-        clocks = [one[quantity] for one in seen if quantity in one and np.isfinite(one[quantity].error)]
+    for quantity in sorted({q for rates in seen for q in rates}):
+        clocks = [rates[quantity] for rates in seen if quantity in rates and np.isfinite(rates[quantity].error)]
         if not clocks:
             continue
         weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])

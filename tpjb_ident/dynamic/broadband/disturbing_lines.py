@@ -37,20 +37,20 @@ class Disturbance:
 def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Disturbance, ...]:
     """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
     reach = min(0.45 * samples.rate, 1.5 * top)
-    found = []
+    candidates = []
     if speed > 0:
-        own = _shown(samples, speed, SHAFT_WANDER)
+        shaft = _shown(samples, speed, SHAFT_WANDER)
         turns = SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
-        found += [Disturbance(f"{k}X", k * own, k) for k in range(1, turns + 1) if k * own < reach]
+        candidates += [Disturbance(f"{k}X", k * shaft, k) for k in range(1, turns + 1) if k * shaft < reach]
     if mains > 0:
-        own = _shown(samples, mains, MAINS_WANDER)
+        shaft = _shown(samples, mains, MAINS_WANDER)
         names = ["mains", *(f"mains {k}" for k in range(2, MAINS_HARMONICS + 1))]
-        found += [Disturbance(name, k * own) for k, name in enumerate(names, 1) if k * own < reach]
-    apart: list[Disturbance] = []
-    for one in found:
-        if all(abs(one.frequency - other.frequency) > samples.rate / samples.length for other in apart):
-            apart.append(one)
-    return tuple(apart)
+        candidates += [Disturbance(name, k * shaft) for k, name in enumerate(names, 1) if k * shaft < reach]
+    resolved: list[Disturbance] = []
+    for line in candidates:
+        if all(abs(line.frequency - other.frequency) > samples.rate / samples.length for other in resolved):
+            resolved.append(line)
+    return tuple(resolved)
 
 
 def _shown(samples: Samples, nominal: float, wander: float) -> float:
@@ -88,8 +88,8 @@ def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], perio
     gram = basis @ basis.T
     values, vectors = np.linalg.eigh(gram)
     # a line that the excitation's own period holds cannot be told from it: it is left where it is
-    keep = values > 1e-6 * max(float(np.max(np.sum(columns**2, axis=1))), 1e-300)
-    inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
+    significant = values > 1e-6 * max(float(np.max(np.sum(columns**2, axis=1))), 1e-300)
+    inverse = (vectors[:, significant] / values[significant]) @ vectors[:, significant].T
     cleaned = stack - scale * (((target @ basis.T) @ inverse) @ columns)
     return replace(samples, values={q: cleaned[2 * i : 2 * i + 2] for i, q in enumerate(names)})
 
@@ -117,8 +117,8 @@ def bins_taken(
     frequencies: FloatArray, lines: tuple[Disturbance, ...], seconds: float, width: float = LEFT_OUT
 ) -> BoolArray:
     """Bins that a line may have spoiled, (n,)."""
-    taken = np.zeros(len(frequencies), dtype=bool)
+    disturbed = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
         wander = SHAFT_WANDER * line.order if line.order else MAINS_WANDER
-        taken |= np.abs(frequencies - line.frequency) <= max(width / seconds, wander)
-    return taken
+        disturbed |= np.abs(frequencies - line.frequency) <= max(width / seconds, wander)
+    return disturbed

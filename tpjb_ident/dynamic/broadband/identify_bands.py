@@ -82,9 +82,9 @@ def identify_bands(
         conditions = load_conditions(misses[i], common) + zero.conditions()
         conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
         result = _finish(point, misses[i], slopes, sources, conditions)
-        own, moved = band_points(point, result, misses[i], settings.clearance)
-        results.append(replace(result, points=own))
-        changes.append(moved if len(own) else np.empty((len(sources.load), 0)))
+        band, moved = band_points(point, result, misses[i], settings.clearance)
+        results.append(replace(result, points=band))
+        changes.append(moved if len(band) else np.empty((len(sources.load), 0)))
     joint = np.concatenate(changes, axis=1)
     return IdentifiedBands(
         tuple(results), joint, named_runs(remaining, len(runs)) + _lost(points, remaining) + sources.conditions()
@@ -117,7 +117,7 @@ def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Con
 def _slopes(points: list[BandPoint], first: list[list[LineEstimates]], i: int) -> ComplexArray | None:
     """dh/d(ln W) at the lines of point `i` (n_lines, 2, 2) by the campaign's other loads; None where there are none."""
     mine = points[i]
-    same = [
+    neighbours = [
         j
         for j, point in enumerate(points)
         if point.group.kind == mine.group.kind
@@ -125,12 +125,12 @@ def _slopes(points: list[BandPoint], first: list[list[LineEstimates]], i: int) -
         and point.point.shaft_speed_hz == mine.point.shaft_speed_hz
         and point.point.static_load > 0
     ]
-    curves = [_over(mine.plan.frequencies, points[j].plan.frequencies, first[j]) for j in same]
-    known = [(j, curve) for j, curve in zip(same, curves) if curve is not None]
-    if i not in [j for j, _ in known]:
+    curves = [_over(mine.plan.frequencies, points[j].plan.frequencies, first[j]) for j in neighbours]
+    usable = [(j, curve) for j, curve in zip(neighbours, curves) if curve is not None]
+    if i not in [j for j, _ in usable]:
         return None
-    loads = [points[j].point.static_load for j, _ in known]
-    return slope_over_load(loads, [curve for _, curve in known], [j for j, _ in known].index(i))
+    loads = [points[j].point.static_load for j, _ in usable]
+    return slope_over_load(loads, [curve for _, curve in usable], [j for j, _ in usable].index(i))
 
 
 def _over(at: FloatArray, frequencies: FloatArray, estimates: list[LineEstimates]) -> ComplexArray | None:
@@ -155,10 +155,10 @@ def _finish(
     scatter = run_scatter([line.fit for line in good], len(sources.load))
     # a model takes all lines with an answer: which of them stand clear of the noise is chance in part
     used = [(rows, line) for _, rows, line in estimates if line.usable or (line.fit.found and line.method != "hv")]
-    both = [_line(point, rows, line, (miss, slopes is not None), sources, scatter) for rows, line in used]
-    shared = SharedErrors(np.array([change for _, change in both]), scatter.gains)
+    fits = [_line(point, rows, line, (miss, slopes is not None), sources, scatter) for rows, line in used]
+    shared = SharedErrors(np.array([change for _, change in fits]), scatter.gains)
     models = _models([rows for rows, _ in used], good[0].method, shared) if good else {}
-    lines = [finished for (finished, _), (_, line) in zip(both, used) if line.usable]
+    lines = [finished for (finished, _), (_, line) in zip(fits, used) if line.usable]
     bare = [
         line for line in lines if point.baseline.estimates and point.baseline.at(2 * np.pi * line.frequency) is None
     ]
@@ -204,12 +204,12 @@ def _line(
     """One line with all its uncertainties, and what the draws of those that lines share do to it."""
     best = _stiffness(line.omega, line.fit, line.method)
     change = sources.changes(rows, point.spectra, best, *load)
-    seen = change + scatter.changes(line.fit)
+    shifts = change + scatter.changes(line.fit)
     rig = point.baseline.at(line.omega)
     if line.method == "hv":
         # a rectangle from H1 to H2 has the standard deviation of its half width by the root of three
-        seen = seen + sources.load.reshape(len(change), 8) * line.bracket / np.sqrt(3)
-    systematic = np.cov(seen.T, bias=True) + (0.0 if rig is None else rig[1])
+        shifts = shifts + sources.load.reshape(len(change), 8) * line.bracket / np.sqrt(3)
+    systematic = np.cov(shifts.T, bias=True) + (0.0 if rig is None else rig[1])
     table = {name: _stiffness(line.omega, fit, name) for name, fit in line.fits.items() if fit.found}
     table = {name: replace(est, systematic=systematic) for name, est in table.items()}
     frequency = line.omega / (2 * np.pi)
@@ -226,32 +226,32 @@ def _band_conditions(
     spectra: Sequence[RunSpectra], estimates: Sequence[LineEstimates], lines: Sequence[BandLine]
 ) -> tuple[Condition, ...]:
     """Conditions of one operating point."""
-    found = []
+    flags = []
     conditions = np.array([line.fit.condition for line in estimates])
     if len(estimates) and np.median(conditions) > 1e6:
         text = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
-        found.append(Condition("fewer-than-two-directions", text))
+        flags.append(Condition("fewer-than-two-directions", text))
     elif len(lines) < LEAST_LINES * len(estimates):
         text = f"{len(lines)} of {len(estimates)} lines stand {STRONG:g} times (F ratio) above the noise"
-        found.append(Condition("excitation-too-weak", text))
+        flags.append(Condition("excitation-too-weak", text))
     elif np.median(conditions) > ILL_CONDITIONED:
         text = f"condition number {np.median(conditions):.0f} (median over the band)"
-        found.append(Condition("ill-conditioned", text))
+        flags.append(Condition("ill-conditioned", text))
     if spectra[0].disturbances:
         held = [d for d in spectra[0].disturbances if _inside(spectra[0], d.frequency)]
         if held:
             named = ", ".join(f"{d.name} {d.frequency:.4g} Hz" for d in held[:6])
             more = f" and {len(held) - 6} more" if len(held) > 6 else ""
-            found.append(Condition("lines-left-out", f"{named}{more}"))
+            flags.append(Condition("lines-left-out", f"{named}{more}"))
     if lines and lines[0].method == "hv":
         low = float(np.median([line.coherence.min() for line in lines]))
         text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
-        found.append(Condition("no-instrument", text))
+        flags.append(Condition("no-instrument", text))
         if low < LOW_COHERENCE:
-            found.append(Condition("low-coherence", f"{low:.2f}, median over the band"))
+            flags.append(Condition("low-coherence", f"{low:.2f}, median over the band"))
     if spectra[0].phasors.acceleration is None and spectra[0].phasors.housing_mass > 0:
-        found.append(Condition("inertia-not-corrected", "no accelerometers"))
-    return tuple(found)
+        flags.append(Condition("inertia-not-corrected", "no accelerometers"))
+    return tuple(flags)
 
 
 def _inside(spectra: RunSpectra, frequency: float) -> bool:

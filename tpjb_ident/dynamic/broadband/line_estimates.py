@@ -110,12 +110,14 @@ def periods_fit(rows: LineRows) -> LineFit:
         return no_fit(rows.n_runs)
     h = h * (scale[2] / scale[0])
     g = np.linalg.pinv((fitted[:, :2] * scale[0]).T)
-    every = np.arange(rows.n_runs)
-    leverage, share = by_runs(fitted[:, :2] * scale[0], g, every, rows.n_runs)
+    run_places = np.arange(rows.n_runs)
+    leverage, share = by_runs(fitted[:, :2] * scale[0], g, run_places, rows.n_runs)
     leverage = leverage / counts[:, None, None]
     equation = np.concatenate([-h, np.eye(2)], axis=1)
     noise = np.einsum("ia,rab,kb->rik", equation, spreads, equation.conj())
-    apart = inconsistent_runs(fitted[:, :2] * scale[0] @ h.T, means @ equation.T, noise / counts[:, None, None], every)
+    apart = inconsistent_runs(
+        fitted[:, :2] * scale[0] @ h.T, means @ equation.T, noise / counts[:, None, None], run_places
+    )
     strength = _strength(fitted[:, :2] * scale[0], spreads[:, :2, :2], counts)
     slopes = np.empty((0, 2, 2), complex)
     return LineFit(h, leverage, noise, counts - 1, float(condition), slopes, strength, share, apart)

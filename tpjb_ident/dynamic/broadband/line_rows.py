@@ -85,8 +85,8 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
     frequencies = spectra[0].frequencies
     free = ~np.any([s.taken for s in spectra], axis=0)
     if spectra[0].period is not None:
-        kept = np.flatnonzero(free)
-        return LinePlan(tuple(np.array([k]) for k in kept), frequencies[kept], 0.0)
+        chosen = np.flatnonzero(free)
+        return LinePlan(tuple(np.array([k]) for k in chosen), frequencies[chosen], 0.0)
     n = len(frequencies)
     width = max(BINS, math.ceil(n / LINES))
     count = n // width

@@ -75,21 +75,21 @@ def _first_peak(correlation: FloatArray, least: int, most: int) -> int | None:
     return None if not len(high) else int(high[0]) + least
 
 
-def _sharpened(samples: Samples, whole: int, band: tuple[float, float]) -> float:
+def _sharpened(samples: Samples, samples_each: int, band: tuple[float, float]) -> float:
     """The period by the phase that the band's lines gain from one stretch of `whole` samples to the next."""
-    period = float(whole)
+    period = float(samples_each)
     for _ in range(2):
-        Z, f = _periods(samples, whole, band)
+        Z, f = _periods(samples, samples_each, band)
         if Z.shape[1] < 2:
             return period
         turn = np.sum(Z[:, 1:] * Z[:, :-1].conj(), axis=(0, 1))
         weight = np.abs(turn)
         # a period of p samples seen through stretches of q gains 2 pi f (q - p) / rate
         slope = float(np.sum(weight * f * np.angle(turn)) / max(float(np.sum(weight * f**2)), 1e-300))
-        period = whole - slope * samples.rate / (2 * np.pi)
-        if round(period) == whole:
+        period = samples_each - slope * samples.rate / (2 * np.pi)
+        if round(period) == samples_each:
             return period
-        whole = round(period)
+        samples_each = round(period)
     return period
 
 

@@ -145,11 +145,11 @@ def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[
     if run.excitation_kind not in MAY_REPEAT:
         return None
     frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
-    found = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
-    if found is None and run.excitation_kind == "multisine":
+    period = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
+    if period is None and run.excitation_kind == "multisine":
         text = "a multi-sine, but no period is found that the record holds three times"
         raise _error(run, "excitation", text, 'Record longer; or state excitation = "random" if it does not repeat')
-    return found
+    return period
 
 
 def _places(rate: float, length: int, settings: SpectraSettings) -> IntArray:

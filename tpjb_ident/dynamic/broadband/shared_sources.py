@@ -152,19 +152,19 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     part = shown.T @ shown
     dof = float(np.trace(part) ** 2 / np.trace(part @ part))
     size = float(np.sqrt(np.sum(np.abs(gain) ** 2) / np.trace(part)))
-    found: tuple[Condition, ...] = ()
+    conditions: tuple[Condition, ...] = ()
     if size > TOO_MUCH:
-        found = (Condition("runs-disagree", f"runs differ by {100 * size:.1f} % in force over displacement"),)
-    return RunScatter(size * float(stdtrit(dof, 0.975)) / 1.96, draws, found)
+        conditions = (Condition("runs-disagree", f"runs differ by {100 * size:.1f} % in force over displacement"),)
+    return RunScatter(size * float(stdtrit(dof, 0.975)) / 1.96, draws, conditions)
 
 
 def _left_of_gains(fits: Sequence[LineFit]) -> FloatArray:
     """What a gain of every run's force leaves in the residuals' gains once h has taken its part, (2 n_runs, n_runs)."""
     n_runs = len(fits[0].dof)
     power = np.sum([fit.apart.power for fit in fits], axis=0)
-    taken = np.zeros((n_runs, n_runs), dtype=complex)
+    removed = np.zeros((n_runs, n_runs), dtype=complex)
     for fit in fits:
         turned = fit.h @ fit.share @ np.linalg.inv(fit.h)
-        taken += np.einsum("sij,rji->rs", turned, fit.apart.force)
-    remaining = np.eye(n_runs) - taken / power[:, None]
+        removed += np.einsum("sij,rji->rs", turned, fit.apart.force)
+    remaining = np.eye(n_runs) - removed / power[:, None]
     return np.concatenate([remaining.real, remaining.imag])

@@ -135,10 +135,10 @@ def _basis(ratio: RunRatios, log_load: float) -> ComplexArray:
 
 def _projected(ratio: RunRatios, basis: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Design (m, 8) and answers (m, 2) with H itself projected off, relative to the direct coefficients, real."""
-    rest = np.linalg.svd(ratio.shape, full_matrices=True)[0][:, 2:].conj().T
+    null_space = np.linalg.svd(ratio.shape, full_matrices=True)[0][:, 2:].conj().T
     size = float(np.hypot(*ratio.direct))
-    design = rest @ (ratio.sideways[:, None] * (ratio.shape @ basis)) / size
-    answer = rest @ ratio.force / size
+    design = null_space @ (ratio.sideways[:, None] * (ratio.shape @ basis)) / size
+    answer = null_space @ ratio.force / size
     return np.concatenate([design.real, design.imag]), np.concatenate([answer.real, answer.imag])
 
 
@@ -164,13 +164,13 @@ def _turn(ratio: RunRatios, basis: ComplexArray, fits: list[tuple[FloatArray, Fl
     # a slope that is off by dS moves H by dS M^T: the misses of the runs, as the fit of H averages them
     mixing = np.linalg.pinv(ratio.shape) @ (ratio.sideways[:, None] * ratio.shape)
     moved = mixing @ basis
-    left, doubt = np.zeros((8, 8)), np.zeros((8, 8))
+    remaining, doubt = np.zeros((8, 8)), np.zeros((8, 8))
     for row, (_, covariance) in enumerate(fits):
         at = [2 * row, 2 * row + 1, 4 + 2 * row, 5 + 2 * row]
-        for total, part in ((left, moved), (doubt, basis)):
-            both = np.concatenate([part.real, part.imag])
-            total[np.ix_(at, at)] = both @ covariance @ both.T
-    return DirectionSensitivity(np.array([basis @ coefficients for coefficients, _ in fits]), left, doubt)
+        for total, part in ((remaining, moved), (doubt, basis)):
+            stacked = np.concatenate([part.real, part.imag])
+            total[np.ix_(at, at)] = stacked @ covariance @ stacked.T
+    return DirectionSensitivity(np.array([basis @ coefficients for coefficients, _ in fits]), remaining, doubt)
 
 
 def common_turn(h: ComplexArray, turn: DirectionSensitivity | None, angle: float) -> FloatArray:

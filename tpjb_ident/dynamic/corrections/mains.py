@@ -49,17 +49,17 @@ class Pickup:
 def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pickup | None:
     """Size of the mains line in every probe, from runs where nothing else sits on it; `axes` (m,) [rad]."""
     along = directions(axes)
-    seen = [along @ line for line in lines if line is not None]
-    if len(seen) < MIN_RUNS:
+    pickups = [along @ line for line in lines if line is not None]
+    if len(pickups) < MIN_RUNS:
         return None
-    probes = np.array(seen)
+    probes = np.array(pickups)
     size = np.median(np.abs(probes), axis=0)
     back = np.linalg.pinv(along).T
     relative = probes * np.exp(-1j * np.angle(probes[:, :1]))
     locked = np.abs(np.exp(1j * np.angle(relative)).mean(axis=0)).min() > LOCKED
     if locked:
-        return Pickup((size * np.exp(1j * np.angle(relative.mean(axis=0))))[None] @ back, size, len(seen))
-    return Pickup(size[:, None] * back, size, len(seen))
+        return Pickup((size * np.exp(1j * np.angle(relative.mean(axis=0))))[None] @ back, size, len(pickups))
+    return Pickup(size[:, None] * back, size, len(pickups))
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,8 @@ def relative_scatter(points: Iterable[PointData], first: list[DynamicStiffness])
 
 def force_pickup(lines: Iterable[ComplexArray | None]) -> FloatArray:
     """Usual size of the mains line in the oil force, X and Y (2,) [N], from runs where nothing else sits on it."""
-    seen = [np.abs(line) for line in lines if line is not None]
-    return np.median(seen, axis=0) if seen else np.zeros(2)
+    sizes = [np.abs(line) for line in lines if line is not None]
+    return np.median(sizes, axis=0) if sizes else np.zeros(2)
 
 
 def force_pickup_spread(data: PointData, size: FloatArray) -> FloatArray:

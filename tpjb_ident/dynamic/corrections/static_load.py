@@ -77,8 +77,8 @@ def _set_point(data: LoadCase) -> complex:
 def campaign_zero(points: Sequence[LoadCase], stated: float = 0.0) -> CellZero:
     """Zero of the cells from all runs of a campaign; see `cell_zero`."""
     loads = [data.mean_loads for data in points]
-    means = np.concatenate([each[:, 0] + 1j * each[:, 1] for each in loads] or [np.empty(0)])
-    set_points = np.concatenate([np.full(len(each), _set_point(d)) for each, d in zip(loads, points)] or [np.empty(0)])
+    means = np.concatenate([load[:, 0] + 1j * load[:, 1] for load in loads] or [np.empty(0)])
+    set_points = np.concatenate([np.full(len(load), _set_point(d)) for load, d in zip(loads, points)] or [np.empty(0)])
     return cell_zero(means, set_points, stated)
 
 
@@ -89,16 +89,18 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[L
     no static force have no ratio: it is zero then.
     """
     ratios = [load_ratio(data, zero) for data in points]
-    known = np.concatenate(ratios)
-    known = known[np.isfinite(known)]
-    middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
-    if without_static_part(known):
+    finite_ratios = np.concatenate(ratios)
+    finite_ratios = finite_ratios[np.isfinite(finite_ratios)]
+    middle = (
+        complex(np.median(finite_ratios.real), np.median(finite_ratios.imag)) if len(finite_ratios) else complex(1.0)
+    )
+    if without_static_part(finite_ratios):
         return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], 0j
-    if not len(known) or not 0.5 < abs(middle.real) < 2.0:
+    if not len(finite_ratios) or not 0.5 < abs(middle.real) < 2.0:
         # nothing to correct by such cells, but the ratio itself must be told
         return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
-    distance = np.abs(known - middle)
-    inner = known[distance <= 4 * np.median(distance) + 1e-12]
+    distance = np.abs(finite_ratios - middle)
+    inner = finite_ratios[distance <= 4 * np.median(distance) + 1e-12]
     common = complex(inner.mean())
     spread = (inner / common - 1.0) / np.sqrt(max(len(inner) * (len(inner) - 1), 1))
     known_to = float(np.linalg.norm(spread.real)), float(np.linalg.norm(spread.imag))
@@ -151,7 +153,7 @@ def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
 def _borrowed(i: int, points: Sequence[LoadCase], slopes: list[ComplexArray | None]) -> ComplexArray | None:
     """Slope of the nearest excitation at the same load; K and C each keep theirs."""
     p = points[i].point
-    same = [
+    neighbours = [
         j
         for j, slope in enumerate(slopes)
         if slope is not None
@@ -159,9 +161,9 @@ def _borrowed(i: int, points: Sequence[LoadCase], slopes: list[ComplexArray | No
         and points[j].point.static_load_direction_deg == p.static_load_direction_deg
         and points[j].point.shaft_speed_hz == p.shaft_speed_hz
     ]
-    if not same:
+    if not neighbours:
         return None
-    nearest = min(same, key=lambda j: abs(points[j].point.excitation - p.excitation))
+    nearest = min(neighbours, key=lambda j: abs(points[j].point.excitation - p.excitation))
     slope = slopes[nearest]
     if slope is None:
         return None

@@ -113,8 +113,8 @@ class SystematicSources:
             table["delay"] = apparent_change(data, stiffness, self._draws(lambda q: self._delayed(q, stiffness.omega)))
         if len(self.mass):
             heavier = np.eye(2) * (1 + self.mass)[:, None, None]
-            same = np.broadcast_to(np.eye(2), heavier.shape)
-            table["mass"] = apparent_change(data, stiffness, GainDraws(same, same, heavier, ()))
+            identity = np.broadcast_to(np.eye(2), heavier.shape)
+            table["mass"] = apparent_change(data, stiffness, GainDraws(identity, identity, heavier, ()))
         return table
 
     def _draws(self, matrices: Any) -> GainDraws:

@@ -185,8 +185,8 @@ def _score_iteration(
         D_true = _true_displacement(h, means, noise, T)
         inverse = np.asarray(np.linalg.inv(direction_covariances(means, _residual_noise(h, noise), T)), dtype=complex)
         remaining = information(means.D, D_true, inverse)
-        right = np.einsum("gac,gb,gc->ab", inverse, D_true.conj(), means.F).reshape(4)
-        h_new = np.asarray(np.linalg.solve(remaining, right), dtype=complex).reshape(2, 2)
+        moment = np.einsum("gac,gb,gc->ab", inverse, D_true.conj(), means.F).reshape(4)
+        h_new = np.asarray(np.linalg.solve(remaining, moment), dtype=complex).reshape(2, 2)
         change = np.abs(h_new - h).max() / np.abs(h).max()
         h = h_new
         if change < 1e-12:
@@ -235,14 +235,14 @@ def windows_used_again(table: PhasorTable, weights: FloatArray) -> FloatArray:
     doubtful = np.flatnonzero((share < REJECTED) & (size >= 3))
     if not len(doubtful):
         return weights
-    others = repeats(table, np.where(np.isin(table.direction, doubtful), 0.0, weights))
-    if others is None:
+    remaining = repeats(table, np.where(np.isin(table.direction, doubtful), 0.0, weights))
+    if remaining is None:
         return weights
-    few = len(others.means) < MIN_OTHERS
+    few = len(remaining.means) < MIN_OTHERS
     result = weights.copy()
     for direction in doubtful:
-        core = _agreeing(table, int(direction), others)
-        if core.sum() >= AGREEING * size[direction] and (few or _explained(table, core, others)):
+        core = _agreeing(table, int(direction), remaining)
+        if core.sum() >= AGREEING * size[direction] and (few or _explained(table, core, remaining)):
             result[core] = 1.0
     return result
 
@@ -256,15 +256,15 @@ def _agreeing(table: PhasorTable, direction: int, others: Repeats) -> BoolArray:
     return np.asarray(selected & (u2 <= 2.0 * trimming_limits(8)[1]))
 
 
-def _explained(table: PhasorTable, core: BoolArray, others: Repeats) -> bool:
+def _explained(table: PhasorTable, core: BoolArray, remaining: Repeats) -> bool:
     """Whether the others' own disagreement explains how far this direction is off."""
-    fit = eiv_fit(others)
+    fit = eiv_fit(remaining)
     residual = table.F[core].mean(axis=0) - fit.h @ table.D[core].mean(axis=0)
     A = np.concatenate([-fit.h, np.eye(2)], axis=1)
-    noise = A @ others.noise @ A.conj().T
-    count = min(float(core.sum()), float(np.mean(others.means.count)))
+    noise = A @ remaining.noise @ A.conj().T
+    count = min(float(core.sum()), float(np.mean(remaining.means.count)))
     # The others' chi-square scales the noise to what runs really differ by; 2 for predicting afresh.
     spread = 2.0 * max(fit.chi_square, 1.0) * noise / count
     distance = float((residual.conj() @ np.linalg.solve(spread, residual)).real) / 2.0
-    spare = 4.0 * (len(others.means) - 2)
+    spare = 4.0 * (len(remaining.means) - 2)
     return distance <= float(fdtri(4, spare, 1.0 - SIGNIFICANCE))

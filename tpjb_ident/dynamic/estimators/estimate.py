@@ -207,9 +207,9 @@ Numbers = tuple[ComplexArray, FloatArray, FloatArray, float]
 
 def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float) -> Numbers:
     """Covariance of a weighted regression: from the repeats where there are any, else from residuals."""
-    known = with_repeats(table, h, weights, correction)
-    if known is not None:
-        return h, known[0], known[1], known[2]
+    repeated = with_repeats(table, h, weights, correction)
+    if repeated is not None:
+        return h, repeated[0], repeated[1], repeated[2]
     covariance, dof = homoscedastic(table.D, table.F - table.D @ h.T, weights, correction)
     return h, covariance, dof, np.nan
 

@@ -30,10 +30,12 @@ class Regression:
     def __init__(self, X: ComplexArray, Y: ComplexArray) -> None:
         self.X, self.Y = X, Y
         self.n, self.q = Y.shape
-        right = (X.conj()[:, :, None] * Y[:, None, :]).reshape(self.n, -1)
+        moments = (X.conj()[:, :, None] * Y[:, None, :]).reshape(self.n, -1)
         cross = X[:, 0].conj() * X[:, 1]
         power = X.real**2 + X.imag**2
-        self._terms = np.concatenate([power, cross.real[:, None], cross.imag[:, None], right.real, right.imag], axis=1)
+        self._terms = np.concatenate(
+            [power, cross.real[:, None], cross.imag[:, None], moments.real, moments.imag], axis=1
+        )
         self._x, self._y = np.ascontiguousarray(X.T), np.ascontiguousarray(Y.T)
         #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
         #: A little of every component keeps it regular where some follow from the others exactly.
@@ -46,13 +48,13 @@ class Regression:
         a, d = sums[..., 0], sums[..., 1]
         b = sums[..., 2] + 1j * sums[..., 3]
         half = (sums.shape[-1] - 4) // 2
-        right = (sums[..., 4 : 4 + half] + 1j * sums[..., 4 + half :]).reshape(*sums.shape[:-1], 2, self.q)
+        moment = (sums[..., 4 : 4 + half] + 1j * sums[..., 4 + half :]).reshape(*sums.shape[:-1], 2, self.q)
         tiny = 1e-14 * a * d + np.finfo(float).tiny
         det = a * d - (b.real**2 + b.imag**2)
         det = np.where(np.abs(det) > tiny, det, tiny)[..., None]
         B = np.empty((*sums.shape[:-1], self.q, 2), dtype=complex)
-        B[..., 0] = (d[..., None] * right[..., 0, :] - b[..., None] * right[..., 1, :]) / det
-        B[..., 1] = (a[..., None] * right[..., 1, :] - b.conj()[..., None] * right[..., 0, :]) / det
+        B[..., 0] = (d[..., None] * moment[..., 0, :] - b[..., None] * moment[..., 1, :]) / det
+        B[..., 1] = (a[..., None] * moment[..., 1, :] - b.conj()[..., None] * moment[..., 0, :]) / det
         return B
 
     def residual(self, B: ComplexArray) -> ComplexArray:

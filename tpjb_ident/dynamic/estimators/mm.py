@@ -46,9 +46,9 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
     if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
         return _least_squares_only(X, Y)
     regression = Regression(X, Y)
-    some = evenly_chosen(direction, MANY_WINDOWS)
-    first = regression if len(some) == n else Regression(X[some], Y[some])
-    start = robust_start(first, direction[some], seed)
+    subset = evenly_chosen(direction, MANY_WINDOWS)
+    first = regression if len(subset) == n else Regression(X[subset], Y[subset])
+    start = robust_start(first, direction[subset], seed)
     if start.exact:
         return _exact_fit(regression, start.coefficients)
     B, scatter = start.coefficients, start.scatter

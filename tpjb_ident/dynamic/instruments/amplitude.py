@@ -132,14 +132,14 @@ def zero_amplitude(data: PointData, h: ComplexArray, expected: float) -> ZeroAmp
     prior = LOOSE * max(expected, abs(slope.stiffening) if slope.significant else 0.0) * size
     fits = [_row(D, F[:, row], square, noise[:, row], prior) for row in range(2)]
     change = np.array([found[2:] for found, _ in fits])
-    left = np.zeros((8, 8))
+    remaining = np.zeros((8, 8))
     for row, (_, covariance) in enumerate(fits):
         at = [2 * row, 2 * row + 1, 4 + 2 * row, 5 + 2 * row]
-        left[np.ix_(at, at)] = covariance
+        remaining[np.ix_(at, at)] = covariance
     share = float(np.linalg.norm(change)) / np.sqrt(2) / size
     # the next term, with the fourth power of the motion, is of the order of the square of this one
-    left += np.diag((share**2 * np.abs(np.concatenate([h.real.ravel(), h.imag.ravel()]))) ** 2)
-    return ZeroAmplitude(change, square, left, share)
+    remaining += np.diag((share**2 * np.abs(np.concatenate([h.real.ravel(), h.imag.ravel()]))) ** 2)
+    return ZeroAmplitude(change, square, remaining, share)
 
 
 def _beside_repeats(data: PointData) -> FloatArray:
@@ -192,12 +192,12 @@ def _row(
         root = 1 / np.sqrt(variance)[:, None]
         gram = (design * root).conj().T @ (design * root)
         covariance = np.linalg.inv(gram + 2 * loose)
-        found = covariance @ ((design * root).conj().T @ (F[:, None] * root))[:, 0]
-        residual = np.abs(F - design @ found) ** 2
+        solution = covariance @ ((design * root).conj().T @ (F[:, None] * root))[:, 0]
+        residual = np.abs(F - design @ solution) ** 2
         spent = float(np.trace(covariance @ gram).real)
         spare = max(len(F) - spent, 1.0)
         share = max(float(np.sum((residual - 2 * noise**2) / force)) / (2 * spare), 1e-12)
     mixing = np.linalg.pinv(D) @ (square[:, None] * D)
     spread = mixing @ covariance[2:, 2:] @ mixing.conj().T
     # of a circular complex error: each part has the variance that the weights were made of
-    return found, np.block([[spread.real, -spread.imag], [spread.imag, spread.real]])
+    return solution, np.block([[spread.real, -spread.imag], [spread.imag, spread.real]])

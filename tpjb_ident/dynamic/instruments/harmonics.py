@@ -55,10 +55,10 @@ def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStif
     if not np.isfinite(est.h).all():
         return FilmChange()
     doubled = est.h.real + 2j * est.h.imag
-    kept = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
-    alone = [pair for pair in kept if not pair[1].shared]
-    if len(kept) >= MIN_RUNS:
-        share, unseen = _quadratic_share(kept, doubled)
+    usable = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
+    alone = [pair for pair in usable if not pair[1].shared]
+    if len(usable) >= MIN_RUNS:
+        share, unseen = _quadratic_share(usable, doubled)
         change, hidden = CHANGE * share, CHANGE * unseen
     else:
         shares = [_share(first, second, doubled) for first, second in alone]
@@ -79,23 +79,23 @@ def _share(first: LineMean, second: LineMean, doubled: ComplexArray) -> float:
     return max(bent**2 - (2 * _noise(second, doubled)) ** 2, 0.0) / float(np.linalg.norm(first.force)) ** 2
 
 
-def _quadratic_share(kept: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> tuple[float, float]:
+def _quadratic_share(usable: Sequence[tuple[LineMean, LineMean]], doubled: ComplexArray) -> tuple[float, float]:
     """The same of all runs together, and how much of it could stay unseen.
 
     Only what goes with the squares of the motion, size and phase, is the film's. Mains on the line, and noise, have
     any phase; they stay in the residual.
     """
-    size = np.array([np.linalg.norm(first.force) for first, _ in kept])[:, None]
-    d = np.array([first.displacement for first, _ in kept])
-    bent = np.array([second.force - doubled @ second.displacement for _, second in kept]) / size
+    size = np.array([np.linalg.norm(first.force) for first, _ in usable])[:, None]
+    d = np.array([first.displacement for first, _ in usable])
+    bent = np.array([second.force - doubled @ second.displacement for _, second in usable]) / size
     squares = np.stack([d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], axis=1) / size
     fitted = squares @ np.linalg.lstsq(squares, bent, rcond=None)[0]
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
-    remaining = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(kept) - 3)
-    unseen = 3 * (DISTINCT - 1) * remaining / len(kept)
+    remaining = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(usable) - 3)
+    unseen = 3 * (DISTINCT - 1) * remaining / len(usable)
     # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
-    chance = remaining * float(fdtri(6, 2 * (len(kept) - 3), 1.0 - CHANCE))
-    return max(3 * (explained - chance) / len(kept), 0.0), unseen
+    chance = remaining * float(fdtri(6, 2 * (len(usable) - 3), 1.0 - CHANCE))
+    return max(3 * (explained - chance) / len(usable), 0.0), unseen
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:

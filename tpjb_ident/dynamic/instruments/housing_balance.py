@@ -75,19 +75,19 @@ def balance_runs(data: PointData) -> list[BalanceRun]:
     """Means of a point's runs; empty where the rig has no accelerometers."""
     if data.runs[0].acceleration is None:
         return []
-    found = []
+    verdicts = []
     mass = data.runs[0].housing_mass
     for i, (run, line) in enumerate(zip(data.runs, data.lines)):
         selected = (data.run_index == i) & data.whole & np.isfinite(data.A).all(axis=1)
         if not selected.any():
             continue
-        both = _one_phase(np.concatenate([data.F[selected], data.A[selected]], axis=1), data.D[selected])
-        both = both[_ordinary(both[:, :2]) & _ordinary(both[:, 2:])]
-        F, A, n = both[:, :2].mean(axis=0), both[:, 2:].mean(axis=0), len(both)
+        rotated = _one_phase(np.concatenate([data.F[selected], data.A[selected]], axis=1), data.D[selected])
+        rotated = rotated[_ordinary(rotated[:, :2]) & _ordinary(rotated[:, 2:])]
+        F, A, n = rotated[:, :2].mean(axis=0), rotated[:, 2:].mean(axis=0), len(rotated)
         share = float(mass * np.linalg.norm(A) / max(float(np.linalg.norm(F)), 1e-300))
-        variance = float(np.sum(np.abs(both[:, 2:] - A) ** 2)) / max(4 * (n - 1), 1)
-        found.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share, mass, variance, n))
-    return found
+        variance = float(np.sum(np.abs(rotated[:, 2:] - A) ** 2)) / max(4 * (n - 1), 1)
+        verdicts.append(BalanceRun(run.lines.excitation[line].frequency, F - mass * A, A, share, mass, variance, n))
+    return verdicts
 
 
 def _one_phase(z: ComplexArray, d: ComplexArray) -> ComplexArray:

@@ -91,12 +91,12 @@ def _undoing(
 
 def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: MeasuredRun, name: str) -> ComplexArray:
     """The gain, 1 at disturbing lines that a table does not reach."""
-    known = np.isfinite(gain) & (np.abs(gain) > 1e-6)
-    if not known[:driven].all():
-        text = f"its response at the excitation of {frequencies[~known][0]:g} Hz is not known, or nothing comes through"
+    valid = np.isfinite(gain) & (np.abs(gain) > 1e-6)
+    if not valid[:driven].all():
+        text = f"its response at the excitation of {frequencies[~valid][0]:g} Hz is not known, or nothing comes through"
         cure = "Extend filter_table, or check filter"
         raise RigDataError(Problem("error", getattr(run, "file", ""), f"channel {name}", text, cure, run.id))
-    return np.where(known, gain, 1.0)
+    return np.where(valid, gain, 1.0)
 
 
 def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | None:
@@ -127,11 +127,11 @@ def _rhythm(bent: FloatArray, export_rate: float, held: bool) -> float | None:
     spectrum = np.abs(np.fft.rfft(bent - bent.mean(), padded))
     step = export_rate / padded
     low, top = int(8 * padded / n), int(0.505 * export_rate / step)
-    found = spectrum[low : top + 1]
-    if not len(found) or not found.max() > 0:
+    peaks = spectrum[low : top + 1]
+    if not len(peaks) or not peaks.max() > 0:
         return None
     # the first line of a rhythm is the rate, the others are its multiples
-    peak = low + int(np.flatnonzero(found > 0.7 * found.max())[0])
+    peak = low + int(np.flatnonzero(peaks > 0.7 * peaks.max())[0])
     while peak + 1 < len(spectrum) and spectrum[peak + 1] > spectrum[peak]:
         peak += 1
     ratio = 1 / (peak * step / export_rate)
@@ -170,15 +170,15 @@ def inspect_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[
     for name, values in zip(names, readings):
         if run.channels[name].quantity != "acceleration":
             clipped += _clipped(run, name, values)
-        found = slower_channel(values, rate)
-        if found is not None:
-            slower[name] = found
+        slow = slower_channel(values, rate)
+        if slow is not None:
+            slower[name] = slow
     if clipped:
         raise RigDataError(clipped)
     if not slower:
         return {}, ()
-    told = ", ".join(f"{n} {'held' if s.held else 'interpolated'} from {s.rate:.4g} Hz" for n, s in slower.items())
-    return slower, (Condition("slower-channels", f"{told}; what that does to a sine was taken out"),)
+    rates = ", ".join(f"{n} {'held' if s.held else 'interpolated'} from {s.rate:.4g} Hz" for n, s in slower.items())
+    return slower, (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
 
 
 def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:

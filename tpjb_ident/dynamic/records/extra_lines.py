@@ -32,7 +32,7 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
     """Frequencies of lines beside the known ones [Hz], and what to say about them."""
     n = min(run.length, LOOK)
     known = result.lines.frequencies
-    found: list[float] = []
+    frequencies: list[float] = []
     lines = None
     for quantity, block in (("force", result.cell_force), ("displacement", result.displacement)):
         record = run.vector(quantity, 0, n)
@@ -40,11 +40,11 @@ def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float,
         if not np.isfinite(record.values).all() or not np.isfinite(sizes).any():
             continue
         smallest = MIN_SHARE * float(np.nanmedian(sizes))
-        if lines is None or found:
-            lines = _KnownLines(n, run.sample_rate, np.append(known, found))
-        found += lines.beside(record.values, smallest)
+        if lines is None or frequencies:
+            lines = _KnownLines(n, run.sample_rate, np.append(known, frequencies))
+        frequencies += lines.beside(record.values, smallest)
     top = REACH * max(line.frequency for line in result.lines.excitation)
-    extra = tuple(sorted(f for f in found if f < top))[:MAX_LINES]
+    extra = tuple(sorted(f for f in frequencies if f < top))[:MAX_LINES]
     if not extra:
         return (), ()
     conditions = [Condition("unexpected lines", f"lines at {', '.join(f'{f:.4g}' for f in extra)} Hz; fitted along")]

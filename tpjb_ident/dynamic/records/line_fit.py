@@ -66,12 +66,12 @@ def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArr
         return RobustLines(*nothing, 1.0)
     bad = np.zeros((1, len(values)), dtype=bool)
     bad[0, present] = u > 1
-    keep = np.array(present)
-    keep[beside(bad)] = False
-    lost = float(1 - keep.mean())
+    used = np.array(present)
+    used[beside(bad)] = False
+    lost = float(1 - used.mean())
     if lost > MAX_LOST:
         return RobustLines(*nothing, lost)
-    return RobustLines(_least_squares(design[keep], values[keep]).T, scale, keep, lost)
+    return RobustLines(_least_squares(design[used], values[used]).T, scale, used, lost)
 
 
 def _verdicts(full: FloatArray, y: FloatArray, usual: FloatArray) -> tuple[FloatArray | None, FloatArray]:

@@ -26,15 +26,15 @@ class LineMean:
 def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None, ...]:
     """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's."""
     lines = (run.lines.excitation + run.lines.nuisance)[: run.displacement.phasors.shape[1]]
-    found: list[tuple[LineMean, LineMean] | None] = []
+    pairs: list[tuple[LineMean, LineMean] | None] = []
     for i, driven in enumerate(run.lines.excitation):
-        own = [k for k, line in enumerate(lines) if abs(line.frequency - 2 * driven.frequency) < 1e-3]
+        doubled = [k for k, line in enumerate(lines) if abs(line.frequency - 2 * driven.frequency) < 1e-3]
         # mains on it adds little; what turns with the shaft does not count as the film's
-        named = own and not lines[own[0]].name.endswith("X")
-        mains = bool(named) and lines[own[0]].name.startswith("mains")
-        pair = (_mean(run, i), replace(_mean(run, own[0]), shared=mains)) if named else None
-        found.append(pair if pair is not None and np.isfinite(pair[0].force).all() else None)
-    return tuple(found)
+        named = doubled and not lines[doubled[0]].name.endswith("X")
+        mains = bool(named) and lines[doubled[0]].name.startswith("mains")
+        pair = (_mean(run, i), replace(_mean(run, doubled[0]), shared=mains)) if named else None
+        pairs.append(pair if pair is not None and np.isfinite(pair[0].force).all() else None)
+    return tuple(pairs)
 
 
 def _mean(run: RunPhasors, line: int) -> LineMean:

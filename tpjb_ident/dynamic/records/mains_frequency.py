@@ -28,9 +28,9 @@ APART = 1.0
 
 def mains_frequency(campaign: Campaign, usual: float) -> float:
     """Frequency of the mains [Hz]."""
-    stated = getattr(campaign, "mains", None)
-    if stated is not None:
-        return float(stated)
+    nominal = getattr(campaign, "mains", None)
+    if nominal is not None:
+        return float(nominal)
     dynamic = campaign.of_kind("dynamic")
     coincident = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
     if not coincident or usual not in MAINS_FREQUENCIES:
@@ -44,9 +44,9 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
 
 def _votes(runs: Sequence[Run], choice: float) -> int:
     """In how many runs a line stands at `choice` where nothing else does."""
-    count = seen = 0
+    count = visible = 0
     for run in runs:
-        if seen >= MAX_RUNS:
+        if visible >= MAX_RUNS:
             break
         point = run.point
         others = [k * point.excitation_hz for k in (1, 2, 3)] + [k * point.shaft_speed_hz for k in range(1, 7)]
@@ -54,7 +54,7 @@ def _votes(runs: Sequence[Run], choice: float) -> int:
             continue
         shown = _stands_out(run, choice)
         if shown is not None:
-            seen += 1
+            visible += 1
             count += shown
     return count
 

@@ -147,17 +147,17 @@ class LineFitter:
         if self._blocks is None or not (scale <= SCALE_LIMIT * usual).all():
             return None
         gram = np.linalg.inv(self._gram_inverse)
-        size, found, left_out = np.abs(residual), coefficients, None
+        size, solution, left_out = np.abs(residual), coefficients, None
         for _ in range(_FEW_ROUNDS):
             previous, left_out = left_out, beside(size > GLITCH_LIMIT * scale[:, None])
             if previous is not None and np.array_equal(previous, left_out):
-                return found, scale, len(left_out) / self.length
+                return solution, scale, len(left_out) / self.length
             if len(left_out) > FEW * self.length:
                 return None
             rows = self.design[left_out]
             # the residual of the left-out samples is what they contributed beyond the fit
             change = residual[:, left_out] @ rows @ np.linalg.inv(gram - rows.T @ rows)
-            found = coefficients - change
+            solution = coefficients - change
             size = np.abs(residual + change @ self.design.T)
             scale = 1.4826 * np.median(size, axis=1)
         return None

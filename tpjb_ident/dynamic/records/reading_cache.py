@@ -45,8 +45,8 @@ class ShortRecord:
         """As the run's own."""
         if quantity not in self._kept:
             self._kept[quantity] = self._run.vector(quantity, 0, self.length)
-        kept = self._kept[quantity]
-        return replace(kept, values=kept.values[start:stop], time=kept.time[start:stop])
+        samples = self._kept[quantity]
+        return replace(samples, values=samples.values[start:stop], time=samples.time[start:stop])
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
         """As the run's own."""
@@ -80,9 +80,9 @@ class ReadingCache:
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names`, (stop - start,) each; not to be written to."""
-        kept = self._beginning() if stop <= self.samples else {}
-        if all(name in kept for name in names):
-            return [kept[name][start:stop] for name in names]
+        beginning = self._beginning() if stop <= self.samples else {}
+        if all(name in beginning for name in names):
+            return [beginning[name][start:stop] for name in names]
         return list(self._reader.read(names, start, stop))
 
     def time(self, start: int, stop: int) -> FloatArray:

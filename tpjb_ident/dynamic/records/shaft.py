@@ -76,7 +76,7 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
     What turns with the shaft (runout of the probes, unbalance in the cells) then has the drive's frequency, and its
     phasor is the same in all runs of a point but for this phase.
     """
-    found = np.full(len(phasors.lines.excitation), np.nan + 0j)
+    phases = np.full(len(phasors.lines.excitation), np.nan + 0j)
     for i, line in enumerate(phasors.lines.excitation):
         n = shaft_order(line.frequency, phasors.lines.speed)
         if not n:
@@ -89,8 +89,8 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
         finite_values = turns[np.isfinite(turns)]
         mean = complex(np.sum(finite_values**n)) / max(len(finite_values), 1)
         if abs(mean) > LOCKED:
-            found[i] = mean / abs(mean)
-    return found
+            phases[i] = mean / abs(mean)
+    return phases
 
 
 def _by_keyphasor(run: MeasuredRun, turning: float) -> ComplexArray | None:

@@ -102,16 +102,16 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
     # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
     middle = float(np.sqrt(omegas.min() * omegas.max()))
     size = float(np.mean([np.abs(e.h).max() for e in usable]))
-    normal, right, total = np.zeros((MODELS[model],) * 2), np.zeros(MODELS[model]), 0.0
+    normal, moment, total = np.zeros((MODELS[model],) * 2), np.zeros(MODELS[model]), 0.0
     for est in usable:
         design = _design(est.omega / middle, model)
         y = est.vector / size
         inverse = np.linalg.inv(est.covariance / size**2)
         normal += design.T @ inverse @ design
-        right += design.T @ inverse @ y
+        moment += design.T @ inverse @ y
         total += float(y @ inverse @ y)
-    x = np.linalg.solve(normal, right)
-    chi_square = max(total - float(x @ right), 0.0)
+    x = np.linalg.solve(normal, moment)
+    chi_square = max(total - float(x @ moment), 0.0)
     scale = size * np.repeat([1.0, 1 / middle, 1 / middle**2][: len(x) // 4], 4)
     parameters = (x * scale).reshape(-1, 2, 2)
     mass = parameters[2] if model == "K-C-M" else np.zeros((2, 2))

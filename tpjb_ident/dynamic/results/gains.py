@@ -63,7 +63,7 @@ def _of_sweep(run: Run) -> list[SweptProbe]:
     cells = [n for n, c in run.channels.items() if c.quantity == "force"]
     readings = {name: values for name in (*probes, *cells) if (values := _values(run, name)) is not None}
     load = _load(run, [readings[n] for n in cells if n in readings])
-    found = []
+    swept = []
     for name in probes:
         if name not in readings:
             continue
@@ -71,8 +71,8 @@ def _of_sweep(run: Run) -> list[SweptProbe]:
         finite_values = values[np.isfinite(values)]
         low, high = np.quantile(finite_values, [0.01, 0.99]) if len(finite_values) >= FEWEST else (np.nan, np.nan)
         centre = swept_centre(load, values) if load is not None and len(load) == len(values) else None
-        found.append(SweptProbe(run.id, name, 0.5 * float(high - low), centre))
-    return found
+        swept.append(SweptProbe(run.id, name, 0.5 * float(high - low), centre))
+    return swept
 
 
 def _values(run: Run, name: str) -> FloatArray | None:
@@ -129,8 +129,8 @@ def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
     places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
     if len(places) < 2:
         return []
-    apart = float(np.hypot(*np.ptp(places, axis=0)))
-    return [f"the shaft's mean positions lie {1e6 * apart:.3g} um apart"] if apart > APART * clearance else []
+    distance = float(np.hypot(*np.ptp(places, axis=0)))
+    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > APART * clearance else []
 
 
 def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:

@@ -100,15 +100,15 @@ def _inertia_left(mass: float, omega: float) -> Condition:
 
 def _missing(data: PointData) -> list[Condition]:
     """Windows without phasors, pointed out when they are many or a whole run's."""
-    whole = data.whole
-    empty = [run.run for i, run in enumerate(data.runs) if not whole[data.run_index == i].any()]
+    complete = data.whole
+    empty = [run.run for i, run in enumerate(data.runs) if not complete[data.run_index == i].any()]
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
-    if whole.mean() < 1 - MAX_LOST:
-        text = f"{int((~whole).sum())} of {len(whole)} windows gave no phasors"
+    if complete.mean() < 1 - MAX_LOST:
+        text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
         return [Condition("most-windows-lost", text)]
-    if whole.mean() < 0.9:
-        return [Condition("windows-missing", f"{int((~whole).sum())} of {len(whole)} windows gave no phasors")]
+    if complete.mean() < 0.9:
+        return [Condition("windows-missing", f"{int((~complete).sum())} of {len(complete)} windows gave no phasors")]
     return []
 
 
@@ -132,14 +132,14 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
     """
     from scipy.special import bdtrc
 
-    whole = data.whole
-    bad = (weights < REJECTED_WEIGHT) & whole
+    complete = data.whole
+    bad = (weights < REJECTED_WEIGHT) & complete
     total = int(bad.sum())
     named = []
     for i, run in enumerate(data.runs):
-        selected = (data.run_index == i) & whole
+        selected = (data.run_index == i) & complete
         n, hits = int(selected.sum()), int(bad[selected].sum())
-        others = (total - hits + 0.5) / (int(whole.sum()) - n + 1.0)
+        others = (total - hits + 0.5) / (int(complete.sum()) - n + 1.0)
         if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(others, 1.0)) < 1e-3:
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
             named.append(f"{run.run}{angle} ({hits} of {n})")

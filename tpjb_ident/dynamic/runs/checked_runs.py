@@ -17,31 +17,31 @@ CONTRADICTED, DOUBTFUL = "records-contradicted", "records-doubtful"
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
     """Judge all finished runs beside each other; those with an error of their own are left out."""
-    seen = [observation for digest in finished.digests for observation in digest.seen]
-    if not seen:  # runs that are no files
+    observed = [observation for digest in finished.digests for observation in digest.seen]
+    if not observed:  # runs that are no files
         return Verdicts()
-    found = campaign_verdicts(campaign, seen)
-    finished.leave_out_unusable(found.unusable)
+    result = campaign_verdicts(campaign, observed)
+    finished.leave_out_unusable(result.unusable)
     if not finished.places:
         raise finished.left_out[0].error
-    return found
+    return result
 
 
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
     """What the checks say of dynamic runs beside each other, by run."""
-    found = verdicts([observation.report for observation in judged(campaign, observations)])
+    result = verdicts([observation.report for observation in judged(campaign, observations)])
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
-    for run, problems in found.shared.items():
-        found.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
+    for run, problems in result.shared.items():
+        result.doubtful.setdefault(run, []).extend(p for p in problems if p.place in optional)
         problems[:] = [p for p in problems if p.place not in optional]
-    return found
+    return result
 
 
-def check_conditions(found: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
+def check_conditions(result: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
     """What the checks say of one point."""
     members = list(runs)
-    groups = ((CONTRADICTED, found.shared), (DOUBTFUL, found.doubtful))
+    groups = ((CONTRADICTED, result.shared), (DOUBTFUL, result.doubtful))
     told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
     return tuple(Condition(name, _sentence(problems)) for name, problems in told if problems)
 

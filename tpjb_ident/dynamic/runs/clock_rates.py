@@ -79,10 +79,10 @@ def rate_samples(data: PointData) -> RateSamples:
         selected = data.run_index == i
         omega = 2 * np.pi * run.lines.excitation[line].frequency
         for name, z in (("force", cells[selected]), ("acceleration", data.A[selected])):
-            told = _drift(z, data.D[selected], run.start)
-            if told is not None:
+            drift = _drift(z, data.D[selected], run.start)
+            if drift is not None:
                 span = run.start[-1] - run.start[0] + run.length
-                table[name].append(np.array([told[0] / omega, told[1] / omega, told[0] * span]))
+                table[name].append(np.array([drift[0] / omega, drift[1] / omega, drift[0] * span]))
     return RateSamples(*(np.array(table[name]).reshape(-1, 3) for name in ("force", "acceleration")))
 
 
@@ -98,19 +98,19 @@ def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, 
     weight = np.ones(len(t))
     for _ in range(5):
         design = np.stack([np.ones_like(middle), middle], axis=1) * np.sqrt(weight)[:, None]
-        found = np.linalg.lstsq(design, phase * np.sqrt(weight), rcond=None)[0]
-        residual = np.abs(phase - found[0] - found[1] * middle)
+        solution = np.linalg.lstsq(design, phase * np.sqrt(weight), rcond=None)[0]
+        residual = np.abs(phase - solution[0] - solution[1] * middle)
         scale = 1.4826 * float(np.median(residual)) + 1e-15
         weight = np.minimum(1.0, 2.0 * scale / np.maximum(residual, 1e-300))
     spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
-    return float(found[1]), float(np.sqrt(spread / np.sum(weight * middle**2)) + 1e-15)
+    return float(solution[1]), float(np.sqrt(spread / np.sum(weight * middle**2)) + 1e-15)
 
 
 def clock_rates(samples: Iterable[RateSamples]) -> ClockRates:
     """Differences that the runs of a campaign share; zero where none is clear."""
-    every = list(samples)
-    force = np.concatenate([s.force for s in every] or [np.empty((0, 3))])
-    acceleration = np.concatenate([s.acceleration for s in every] or [np.empty((0, 3))])
+    names = list(samples)
+    force = np.concatenate([s.force for s in names] or [np.empty((0, 3))])
+    acceleration = np.concatenate([s.acceleration for s in names] or [np.empty((0, 3))])
     cells, error = _shared(force)
     if not cells:
         return ClockRates()
@@ -120,11 +120,11 @@ def clock_rates(samples: Iterable[RateSamples]) -> ClockRates:
     return ClockRates(cells, housing, error)
 
 
-def _shared(found: FloatArray) -> tuple[float, float]:
+def _shared(rates: FloatArray) -> tuple[float, float]:
     """Robust weighted mean and its error; zero where it is not clear, not notable, or not alike in the runs."""
-    if len(found) == 0:
+    if len(rates) == 0:
         return 0.0, np.inf
-    rate, error = found[:, 0], found[:, 1]
+    rate, error = rates[:, 0], rates[:, 1]
     floor = float(np.median(error))
     weight = 1 / np.hypot(error, floor) ** 2
     middle = float(np.median(rate))
@@ -135,5 +135,5 @@ def _shared(found: FloatArray) -> tuple[float, float]:
         middle = float(np.sum(robust * rate) / np.sum(robust))
     spread = float(np.sum(robust * distance**2) / np.sum(robust)) / max(len(rate) - 1, 1)
     doubt = float(np.sqrt(max(1 / np.sum(weight), spread if len(rate) > 1 else 0.0)))
-    notable = np.median(np.abs(found[:, 2])) > NOTABLE
+    notable = np.median(np.abs(rates[:, 2])) > NOTABLE
     return (middle, doubt) if abs(middle) > CLEAR * doubt and notable else (0.0, doubt)

@@ -84,13 +84,13 @@ def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[Op
     return [groups[key] for key in sorted(groups)]
 
 
-def point_of(stated: OperatingPoint, frequency: float) -> OperatingPoint:
+def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
     """Operating point of one line; the set point's frequency where the line belongs to it."""
-    nominal = stated.excitation_hz
+    nominal = point.excitation_hz
     if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
-        return stated
+        return point
     rounded = 2 * np.pi * round(frequency, 3)
-    return OperatingPoint(stated.static_load, stated.static_load_direction, stated.shaft_speed, rounded)
+    return OperatingPoint(point.static_load, point.static_load_direction, point.shaft_speed, rounded)
 
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:
@@ -104,8 +104,8 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
         for run, i, d in zip(runs, lines, D)
     ]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
-    found = _found(point, members)
-    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index, found)
+    windows = _found(point, members)
+    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index, windows)
 
 
 def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> float:

@@ -50,31 +50,31 @@ def all_runs(
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    kept = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
+    finished_runs = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
     done = 0
 
     def finished(index: int, answer: tuple[str, RunResult | ExcludedRun | None]) -> None:
         nonlocal done
         mark, result = answer
         if isinstance(result, ExcludedRun):
-            kept.leave_out(index, result)
+            finished_runs.leave_out(index, result)
         else:
             if store is not None and result is not None and mark:
                 store.keep(mark, result)
-            kept.put(index, result, mark)
+            finished_runs.put(index, result, mark)
         done += 1
         progress(runs[index].id, done, len(runs))
 
     jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
     try:
         as_completed(workers or InProcessWorkers(), process_run, list(jobs), finished)
-        kept.leave_out_dead_accelerometers()
-        if runs and not kept.places:
-            raise kept.left_out[0].error
+        finished_runs.leave_out_dead_accelerometers()
+        if runs and not finished_runs.places:
+            raise finished_runs.left_out[0].error
     except BaseException:
-        kept.close()
+        finished_runs.close()
         raise
-    return kept
+    return finished_runs
 
 
 def process_run(
@@ -126,14 +126,14 @@ def _anywhere(run: Run) -> Any:
 def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
     """Phasors and temperatures of one run."""
     with run.opened():
-        kept = with_kept_beginning(run)
+        cached = with_kept_beginning(run)
         try:
-            phasors = run_phasors(kept, housing_mass, settings)
+            phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, _dead_accelerometers(kept, phasors), _repaired(run))
-        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(kept, phasors))
-        return RunResult(result, mean_temperatures(kept), _seen(run, kept, phasors))
+        conditions = merged(phasors.conditions, _dead_accelerometers(cached, phasors), _repaired(run))
+        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
+        return RunResult(result, mean_temperatures(cached), _seen(run, cached, phasors))
 
 
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
@@ -163,11 +163,11 @@ def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]
     to the channels' axes they vanish. Only then is the run read once more and held against the rules of
     `rigdata.check_campaign`, which know a computed record without noise from a dead sensor.
     """
-    found = _dead(run, phasors)
-    grave = [p for name, p in found.items() if run.channels[name].quantity != "acceleration"]
+    dead = _dead(run, phasors)
+    grave = [p for name, p in dead.items() if run.channels[name].quantity != "acceleration"]
     if grave:
         raise RigDataError(grave)
-    return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in found.values())
+    return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in dead.values())
 
 
 def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:

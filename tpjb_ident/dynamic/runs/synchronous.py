@@ -42,8 +42,8 @@ def without_shaft(data: PointData) -> PointData:
     z = np.array(means)
     scale = np.linalg.norm(z[:, :2])
     design = np.concatenate([z[:, :2] / scale, s[:, None]], axis=1)
-    found = np.linalg.lstsq(design, z[:, 2:], rcond=None)[0]
-    r = -np.linalg.solve(found[:2].T / scale, found[2])
+    solution = np.linalg.lstsq(design, z[:, 2:], rcond=None)[0]
+    r = -np.linalg.solve(solution[:2].T / scale, solution[2])
     text = f"{n}X as of {1e6 * np.linalg.norm(r):.3g} um of runout, by the shaft's phase in {len(s)} runs"
     # taken off the displacements: what the load does to H acts on the motion without it
     moved = data.D - s[data.run_index][:, None] * r
