@@ -116,7 +116,10 @@ def check_agreement(
     common = _solve_stiffness([group[i] for i in consistent]) if outliers and len(consistent) > 1 else None
     for i in sorted(outliers):
         gain = None if readings is None else gain_of_run(readings, i, consistent)
-        hint = "" if gain is None or gain.chance > _CHANCE else _as_if(group[0].names[gain.channels[0]], gain.gain)
+        hint = ""
+        if gain is not None and gain.chance <= _CHANCE:
+            direction = "much" if gain.gain > 1 else "little"
+            hint = f"; as if {group[0].names[gain.channels[0]]} read {abs(gain.gain - 1):.0%} too {direction}"
         _tell(group[i], stiffness if common is None else common, hint)
     return outliers
 
@@ -156,10 +159,6 @@ def _distance(response: RunResponse, remaining: Sequence[RunResponse]) -> tuple[
     residual = float(np.linalg.norm(response.force - stiffness @ response.displacement)) / size
     ratio = residual**2 / 4 / (max(variance, 1e-300) * (1 + leverage(unit, response.displacement / size)))
     return ratio / float(fdtri(4, spare, 1 - _CHANCE)), misfit_of(response, stiffness)
-
-
-def _as_if(name: str, gain: float) -> str:
-    return f"; as if {name} read {abs(gain - 1):.0%} too {'much' if gain > 1 else 'little'}"
 
 
 def _tell(response: RunResponse, stiffness: ComplexArray, gain: str) -> None:

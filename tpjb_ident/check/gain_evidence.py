@@ -27,7 +27,7 @@ _NO_MORE, _LINES_TELL = 1.75, 10
 #: Fewer degrees of freedom cannot tell whether runs differ by noise alone.
 _TELLING = 8
 #: How well the zero of a probe, and so its distance from there, is known from a clearance run.
-_LEVER_KNOWN = 0.25
+LEVER_KNOWN = 0.25
 
 
 @dataclass(frozen=True)
@@ -254,11 +254,6 @@ def dynamic_pattern(readings: PointReadings, run: int, channel: int, stiffness: 
     if channel < 2:
         return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[run, channel])
     return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[run, channel - 2])
-
-
-def lever_slack(lever: float, part: float) -> float:
-    """How uncertain a shift of the mean is, because the zero from which a probe's gain counts is [m]."""
-    return abs(_LEVER_KNOWN * lever * part)
 
 
 def _stacked(vector: ComplexArray) -> FloatArray:

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tpjb_ident.check.gain_evidence import (
+    LEVER_KNOWN,
     Difference,
     Evidence,
     PointReadings,
     common_stiffness,
     dynamic_difference,
     dynamic_pattern,
-    lever_slack,
     static_difference,
 )
 
@@ -131,7 +131,7 @@ def _levers(readings: PointReadings, run: int, channel: int, part: float) -> Ite
         return
     mean, zero = float(readings.probe_means[run, channel]), readings.centre[channel]
     yield mean, 0.0
-    yield (None, 0.0) if zero is None else (mean - zero, lever_slack(mean - zero, part))
+    yield (None, 0.0) if zero is None else (mean - zero, abs(LEVER_KNOWN * (mean - zero) * part))
 
 
 def _with_means(static: Difference | None, channel: int, lever: float | None, slack: float, shown: Evidence) -> _Try:

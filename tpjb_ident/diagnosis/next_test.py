@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from model.effects import Effect, kind_of
-from model.instruments import Instruments, SensorMap
+from model.instruments import SensorMap
 from model.setup import Setup
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
@@ -232,17 +232,16 @@ def mirrored(setup: Setup) -> Setup:
     turned = setup.change_pads(
         lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)
     )
-    return turned.change(misalignment=(angle, math.pi - towards), instruments=_instruments(setup.instruments))
+    displacement = tuple(map(_map, setup.instruments.displacement))
+    force = tuple(map(_map, setup.instruments.force))
+    instruments = replace(setup.instruments, displacement=displacement, force=force)
+    return turned.change(misalignment=(angle, math.pi - towards), instruments=instruments)
 
 
 def _mirrored_layout(layout: Layout) -> Layout:
     """Dynamic tests as a mirror shows them, thermometers where they sit."""
     tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
     return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
-
-
-def _instruments(read: Instruments) -> Instruments:
-    return replace(read, displacement=tuple(map(_map, read.displacement)), force=tuple(map(_map, read.force)))
 
 
 def _map(one: SensorMap) -> SensorMap:

@@ -33,7 +33,7 @@ from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_cha
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
 from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
 from tpjb_ident.dynamic.results.gains import Pairs, channel_pairs, gain_doubts, swept_probes, with_probe_doubts
-from tpjb_ident.dynamic.results.identification import Identification, with_systematic
+from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult, lost_points, named_at_points
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions, check_finished
@@ -237,7 +237,8 @@ class _Points:
             systematic["mains on the cells"] = force_pickup_spread(data, self.mains_force)
         if not settings.keep_weights:
             by_method = {name: _counted_only(est) for name, est in by_method.items()}
-        with_both = {name: with_systematic(est, systematic) for name, est in by_method.items()}
+        covariance = np.sum(list(systematic.values()), axis=0)
+        with_both = {name: replace(est, systematic=covariance) for name, est in by_method.items()}
         bent = change_conditions(film, uncertain, with_both[settings.method], figures.amplitude, settings.clearance)
         bent += () if none is None else none.conditions()
         conditions = (used.conditions, self.findings.conditions(data), source.baseline.missing(data), bent)

@@ -99,28 +99,26 @@ def refuse_flat_channels(run: Run) -> None:
     """
     problems = []
     for quantity in ("force", "displacement"):
-        statistics = {name: _statistics(run, name) for name, c in run.channels.items() if c.quantity == quantity}
+        statistics: dict[str, ChannelStatistics] = {}
+        for name, channel in run.channels.items():
+            if channel.quantity == quantity:
+                statistics[name] = ChannelStatistics()
+                statistics[name].add(np.asarray(run.record(name).values))
         if any(_repeated(s) > NOISE_FREE for s in statistics.values() if not s.constant):
             # noise below the converter's step: standing still says nothing here
             continue
-        problems += [_problem(run, name, s) for name, s in statistics.items() if _stands_still(s)]
+        problems += [
+            _problem(run, name, s)
+            for name, s in statistics.items()
+            if s.longest_flat >= max(SHORTEST, TIMES_EXPECTED * s.expected_flat())
+        ]
     if problems:
         raise RigDataError(problems)
-
-
-def _statistics(run: Run, name: str) -> ChannelStatistics:
-    statistics = ChannelStatistics()
-    statistics.add(np.asarray(run.record(name).values))
-    return statistics
 
 
 def _repeated(statistics: ChannelStatistics) -> float:
     """Share of samples equal to the one before, apart from the longest stretch."""
     return (statistics.repeats - statistics.longest_flat + 1) / max(statistics.values - statistics.longest_flat, 1)
-
-
-def _stands_still(statistics: ChannelStatistics) -> bool:
-    return statistics.longest_flat >= max(SHORTEST, TIMES_EXPECTED * statistics.expected_flat())
 
 
 def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:

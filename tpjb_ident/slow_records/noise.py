@@ -27,11 +27,8 @@ PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
 FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
-
-
-def _flicker_gain() -> float:
-    """Power density [1/Hz] at 1 Hz of the sum of unit processes."""
-    return float(np.sum(4.0 * FLICKER_TIMES / (1.0 + (2.0 * np.pi * FLICKER_TIMES) ** 2)))
+# power density [1/Hz] at 1 Hz of the sum of unit processes
+_FLICKER_GAIN = float(np.sum(4.0 * FLICKER_TIMES / (1.0 + (2.0 * np.pi * FLICKER_TIMES) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -75,7 +72,7 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
             # variance of the average of an exponentially correlated process over x time constants
             np.fill_diagonal(term, 2.0 / x * (1.0 + np.expm1(-x) / x))
         kernel += term
-    return kernel / _flicker_gain()
+    return kernel / _FLICKER_GAIN
 
 
 @dataclass(frozen=True)
@@ -158,20 +155,16 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
         total += 0.5 * ((logs[2] - expected) / spread) ** 2
         return total + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 
+    corner = np.array([-0.5, -0.5, prior])
+    simplex = np.vstack([corner, corner + 1.4 * np.eye(3)])  # a factor of four in each level
     solution = optimize.minimize(
         objective,
         np.array([0.0, 0.0, prior]),
         method="Nelder-Mead",
-        options={"xatol": 0.05, "fatol": 0.05, "maxiter": 150, "initial_simplex": _simplex(prior)},
+        options={"xatol": 0.05, "fatol": 0.05, "maxiter": 150, "initial_simplex": simplex},
     )
     w, f, d = np.exp(solution.x)
     return NoiseModel(white=float(w * white), flicker=float(f * white), drift=float(d * unit))
-
-
-def _simplex(prior: float) -> FloatArray:
-    """Start of the search: a factor of four in each level."""
-    start = np.array([-0.5, -0.5, prior])
-    return np.vstack([start, start + 1.4 * np.eye(3)])
 
 
 def _white_level(series: NoiseSeries) -> float:

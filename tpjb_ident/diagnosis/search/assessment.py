@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_array
 
-from rigdata.arrays import FloatArray, IntArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.observations.folds import Fold
 from tpjb_ident.diagnosis.search.components import Component
 
@@ -126,13 +126,14 @@ class Assessment:
     def scores(self) -> FloatArray:
         """Log density of every fold given all others, (folds,) [nats]."""
         weighted = self.inverse @ self.linear.residual
-        return np.array([self._score(f.members, weighted) for f in self.folds])
-
-    def _score(self, rows: IntArray, weighted: FloatArray) -> float:
-        block = self.inverse[np.ix_(rows, rows)]
-        error = np.linalg.solve(block, weighted[rows])
-        log_det = float(np.linalg.slogdet(block)[1])
-        return 0.5 * (log_det - float(error @ weighted[rows]) - len(rows) * math.log(2 * math.pi))
+        out = []
+        for fold in self.folds:
+            rows = fold.members
+            block = self.inverse[np.ix_(rows, rows)]
+            error = np.linalg.solve(block, weighted[rows])
+            log_det = float(np.linalg.slogdet(block)[1])
+            out.append(0.5 * (log_det - float(error @ weighted[rows]) - len(rows) * math.log(2 * math.pi)))
+        return np.array(out)
 
     def unseen(self, fold: Fold) -> FloatArray:
         """Free numbers as all elements but a fold's tell them, (k,)."""

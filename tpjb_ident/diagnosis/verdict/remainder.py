@@ -75,7 +75,10 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     total = problem.basis.covariance(tolerances) + fitted.assessment.linear.spread
     residual = assessment.linear.residual
     rows = _groups(problem)
-    tests = [(float(chdtrc(len(at), _square(total, residual, at))), name) for name, at in rows]
+    tests = []
+    for name, at in rows:
+        square = residual[at] @ np.linalg.solve(total[np.ix_(at, at)], residual[at])
+        tests.append((float(chdtrc(len(at), square)), name))
     first = len(fitted.errors)
     remaining = 1.0 - np.diag(assessment.covariance)[first:]
     for nuisance, m, spread in zip(problem.nuisances, assessment.free[first:], remaining, strict=True):
@@ -83,10 +86,6 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
             tests.append((2.0 * float(ndtr(-abs(m) / np.sqrt(spread))), f"{nuisance.name} {nuisance.place}".strip()))
     p, where = min(tests)
     return Excess(min(1.0, p * len(tests)), where)
-
-
-def _square(total: FloatArray, residual: FloatArray, at: IntArray) -> float:
-    return float(residual[at] @ np.linalg.solve(total[np.ix_(at, at)], residual[at]))
 
 
 def _groups(problem: Problem) -> list[tuple[str, IntArray]]:

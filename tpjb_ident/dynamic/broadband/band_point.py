@@ -93,7 +93,8 @@ def read_point(
     """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
     remaining = []
-    chosen = _with_clocks(group, _spectra_settings(group, settings))
+    seconds = min(run.length / run.sample_rate for run in group.runs)
+    chosen = _with_clocks(group, SpectraSettings(group.band, seconds, settings.mains, settings.delays))
     for run in group.runs:
         try:
             spectra.append(run_spectra(run, housing_mass, chosen))
@@ -117,11 +118,6 @@ def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings
             continue
     reach = 2 * np.pi * group.band[1] * (settings.seconds or 0.0)
     return replace(settings, clocks=common_rates(clocks, reach))
-
-
-def _spectra_settings(group: BandGroup, settings: BandSettings) -> SpectraSettings:
-    seconds = min(run.length / run.sample_rate for run in group.runs)
-    return SpectraSettings(group.band, seconds, settings.mains, settings.delays)
 
 
 def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:

@@ -175,7 +175,7 @@ def coherence(rows: LineRows, fit: LineFit) -> FloatArray:
     flat = without_slopes(rows, fit)
     basis = np.linalg.qr(flat.D)[0]
     remaining = flat.F - basis @ (basis.conj().T @ flat.F)
-    n, spent = len(rows.D), _spent(rows)
+    n, spent = len(rows.D), 3 * rows.n_runs if rows.ends else 0
     power = np.mean(np.abs(flat.F) ** 2, axis=0) * n / max(n - spent, 1)
     noise = np.sum(np.abs(remaining) ** 2, axis=0) / max(n - spent - 2, 1)
     with np.errstate(invalid="ignore", divide="ignore"):  # no force at all has no coherence
@@ -194,7 +194,3 @@ def spectra(rows: LineRows) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
 
 def _order(rows: LineRows) -> int:
     return 0 if rows.repeated else 2
-
-
-def _spent(rows: LineRows) -> int:
-    return 3 * rows.n_runs if rows.ends else 0

@@ -111,17 +111,13 @@ def _angle(run: Run, n: int, rate: float) -> FloatArray | None:
     record = run.speed(0, n)
     if record is None or not np.isfinite(record.values).any():
         return None
-    values, _ = _bridged_speed(record.values)
+    gap = ~np.isfinite(record.values)
+    at = np.arange(len(gap))
+    values = np.interp(at, at[~gap], record.values[~gap])
     nominal = run.point.shaft_speed
     if not nominal > 0 or abs(float(np.median(values)) - nominal) > 0.05 * nominal:
         return None
     return np.asarray(np.cumsum(values) / rate)
-
-
-def _bridged_speed(values: FloatArray) -> tuple[FloatArray, int]:
-    gap = ~np.isfinite(values)
-    at = np.arange(len(values))
-    return np.interp(at, at[~gap], values[~gap]), int(gap.sum())
 
 
 def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:

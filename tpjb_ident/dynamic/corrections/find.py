@@ -20,7 +20,6 @@ from tpjb_ident.dynamic.corrections.mains import (
     MAINS_CORRECTED,
     MAINS_ON_LINE,
     MainsFit,
-    Pickup,
     corrected_condition,
     fit_mains,
     force_pickup,
@@ -110,7 +109,9 @@ def find_corrections(
         if hit and pickup is not None:
             data = _at_set_point(source.load(), miss, slope, turn)
             mains = fit_mains(data, pickup, _with_force_pickup(scatter, data, in_cells))
-        conditions = load_conditions(miss, common) + zero.conditions() + _mains_conditions(pickup, mains)
+        conditions = load_conditions(miss, common) + zero.conditions()
+        if pickup is not None and mains is not None:
+            conditions += (corrected_condition(pickup, mains),)
         result.append(Correction(miss, slope, turn, mains, conditions))
     return result
 
@@ -139,9 +140,3 @@ def _at_set_point(
 ) -> PointData:
     """The point's windows with forces as under the set load in its set direction."""
     return to_set_point(replace(data, F=data.F - turned_back(data, miss, turn)), miss, slope)
-
-
-def _mains_conditions(pickup: Pickup | None, mains: MainsFit | None) -> tuple[Condition, ...]:
-    if pickup is None or mains is None:
-        return ()
-    return (corrected_condition(pickup, mains),)

@@ -180,7 +180,7 @@ def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
             "no-repeats",
             "too few repeats per direction for a noise covariance: plain MM, not corrected for displacement noise",
         )
-        return _with_status(plain, (missing,))
+        return replace(plain, status=merged(plain.status, (missing,)))
     fit = eiv_fit(repeated, table.directions_differ)
     conditions = start.conditions
     if repeated.wandering:
@@ -212,10 +212,6 @@ def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correc
         return h, repeated[0], repeated[1], repeated[2]
     covariance, dof = homoscedastic(table.D, table.F - table.D @ h.T, weights, correction)
     return h, covariance, dof, np.nan
-
-
-def _with_status(result: DynamicStiffness, extra: tuple[Condition, ...]) -> DynamicStiffness:
-    return replace(result, status=merged(result.status, extra))
 
 
 def _result(

@@ -113,11 +113,6 @@ def r_matrix(D: ArrayLike, F: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     return R, force.reshape(-1)
 
 
-def _shared_block(R: ComplexArray, f: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """The block of R that both force equations share, and the forces beside it."""
-    return np.ascontiguousarray(R[0::2, 0:2]), f.reshape(-1, 2)
-
-
 def real_rows(R: ComplexArray, f: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Write a complex system as a real one twice the size, for solvers that know real numbers only.
 
@@ -139,7 +134,9 @@ def phasor_table(
 
     `D`, `F` (n, 2) [m], [N], `direction` (n,), `reference` (n, 2).
     """
-    displacement, force = _shared_block(*r_matrix(D, F))
+    R, f = r_matrix(D, F)
+    # the block of R that both force equations share, and the forces
+    displacement, force = np.ascontiguousarray(R[0::2, 0:2]), f.reshape(-1, 2)
     n = len(displacement)
     labels = np.arange(n) if direction is None else np.asarray(direction).ravel()
     if len(labels) != n:

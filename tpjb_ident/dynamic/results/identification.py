@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -251,11 +251,6 @@ def coefficient_columns(est: DynamicStiffness) -> dict[str, float]:
             row[f"{name}_random95"] = random[i] * factor
             row[f"{name}_systematic95"] = float(np.sqrt(max(half[i] ** 2 - random[i] ** 2, 0.0))) * factor
     return row
-
-
-def with_systematic(est: DynamicStiffness, parts: Mapping[str, FloatArray]) -> DynamicStiffness:
-    """The estimate with the sum of some systematic covariances (8, 8)."""
-    return replace(est, systematic=np.sum(list(parts.values()), axis=0) if parts else np.zeros((8, 8)))
 
 
 def _budget_rows(

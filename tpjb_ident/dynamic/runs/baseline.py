@@ -6,7 +6,7 @@ F = H_b D without oil; in the dynamic runs F_film = F - H_b D.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,8 @@ class Baseline:
     """Dynamic stiffness of the rig alone, over the frequencies at which it was measured."""
 
     estimates: tuple[DynamicStiffness, ...] = ()
-    conditions: tuple[Condition, ...] = field(default=())
+    #: where no run gives an answer
+    conditions: tuple[Condition, ...] = ()
 
     def at(self, omega: float) -> tuple[ComplexArray, FloatArray] | None:
         """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them."""
@@ -45,9 +46,11 @@ class Baseline:
         return data if rig is None else replace(data, F=data.F - data.D @ rig[0].T)
 
     def missing(self, data: PointData) -> tuple[Condition, ...]:
-        """Say where a campaign has a baseline, but not at a point's frequency."""
-        if not self.estimates or self.at(data.omega) is not None:
+        """Say where a campaign has baseline runs, but no answer of theirs at a point's frequency."""
+        if self.at(data.omega) is not None:
             return ()
+        if not self.estimates:
+            return self.conditions
         low, high = (est.omega / (2 * np.pi) for est in (self.estimates[0], self.estimates[-1]))
         text = f"measured from {low:g} to {high:g} Hz: at this excitation the rig's own stiffness is still inside"
         return (Condition("baseline-missing", text),)
