@@ -12,11 +12,13 @@ from scipy.stats import chi2
 from scipy.stats import t as student_t
 
 from tests.dynamic import phasor_cases
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.records.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.dynamic.records.windows import WindowSettings, line_design, plan_windows, variance_inflation
 from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
+from tpjb_ident.dynamic.runs.baseline import Baseline
 
 K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
 C = np.array([[4e5, 2e4], [-1e4, 6e5]])
@@ -391,3 +393,12 @@ def test_without_accelerometers_the_cells_gain_is_that_of_h():
     weights[3, 1] = 0.0
     again = apparent_change(data, replace(stiff(), weights=weights), draws)
     np.testing.assert_allclose(again, apparent_change(measured(2e7), stiff(), draws), atol=1e-3)
+
+
+def test_baseline_runs_without_an_answer_are_named_where_no_other_baseline_reaches():
+    failed = Condition("baseline-missing", "the baseline runs at 15 Hz give no answer: two directions are needed")
+    low, high = estimate(OMEGAS[1]), estimate(OMEGAS[2])
+    at = [SimpleNamespace(omega=float(omega)) for omega in OMEGAS]
+    assert [Baseline((), (failed,)).missing(point) for point in at] == [(failed,)] * len(at)
+    assert [bool(Baseline((low, high), (failed,)).missing(point)) for point in at] == [True, False, False, True]
+    assert Baseline().missing(at[0]) == ()
