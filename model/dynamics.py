@@ -157,11 +157,9 @@ class PadMatrices:
     """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12)."""
 
     number: int
-    #: (4, 4): film [N/m, N/rad, N m/rad]; damping the same times s.
-    stiffness: FloatArray
+    stiffness: FloatArray  #: (4, 4): film [N/m, N/rad, N m/rad]; damping the same times s.
     damping: FloatArray
-    #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
-    pad_mass: FloatArray
+    pad_mass: FloatArray  #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
     pad_damping: FloatArray
     pad_stiffness: FloatArray
     friction: tuple[float, float] = (0.0, math.inf)

@@ -27,8 +27,7 @@ class MeasuredPivot:
     Beyond the last point the curve goes on with its last tangent; `extrapolated` says when that is so.
     """
 
-    #: (n,) [N], and (n,) [m]: strictly increasing, from (0, 0).
-    load: FloatArray
+    load: FloatArray  #: (n,) [N], and (n,) [m]: strictly increasing, from (0, 0).
     deflection_points: FloatArray
     valid_from: float = 0.0
     valid_to: float = math.inf

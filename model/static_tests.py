@@ -25,10 +25,8 @@ class DryCurve:
     """A dry load-deflection curve as probes and cells read it."""
 
     pad: int
-    #: (n,): Component of the read force on the pad's direction [N].
-    load: FloatArray
-    #: (n,): Component of the read displacement on the pad's direction, from zero load [m].
-    deflection: FloatArray
+    load: FloatArray  #: (n,): Component of the read force on the pad's direction [N].
+    deflection: FloatArray  #: (n,): Component of the read displacement on the pad's direction, from zero load [m].
 
 
 def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
@@ -46,12 +44,9 @@ def dry_curve(setup: Setup, pad: int, load: FloatArray) -> DryCurve:
 class PolygonSides:
     """The clearance polygon as the probes read it: per pad the distance of its side from the bearing centre."""
 
-    #: (n_pads,): At zero push load [m].
-    clearance: FloatArray
-    #: (n_pads,): With the pivots and the structure given way under the push load [m].
-    pushed: FloatArray
-    #: (n_pads,): Direction of each side's normal [rad].
-    angle: FloatArray
+    clearance: FloatArray  #: (n_pads,): At zero push load [m].
+    pushed: FloatArray  #: (n_pads,): With the pivots and the structure given way under the push load [m].
+    angle: FloatArray  #: (n_pads,): Direction of each side's normal [rad].
 
 
 def polygon_sides(setup: Setup, push_load: float) -> PolygonSides:

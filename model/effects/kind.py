@@ -117,10 +117,8 @@ class EffectWords:
 
     finding: str
     physics: str
-    #: How it shows in measurements.
-    on_the_rig: str
-    #: Where to look first.
-    check: str
+    on_the_rig: str  #: How it shows in measurements.
+    check: str  #: Where to look first.
 
 
 @dataclass(frozen=True)

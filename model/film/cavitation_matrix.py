@@ -24,10 +24,8 @@ class FaceFlows(NamedTuple):
     #: (nt, nz + 1), (nt + 1, nz): Conductance rho h^3 / (12 mu) times length over distance [kg/s/Pa].
     along: FloatArray
     across: FloatArray
-    #: (nt, nz + 1): What the journal drags through a face along the arc that is full [kg/s].
-    couette: FloatArray
-    #: (nt, nz + 1): Film thickness at those faces [m].
-    height: FloatArray
+    couette: FloatArray  #: (nt, nz + 1): What the journal drags through a face along the arc that is full [kg/s].
+    height: FloatArray  #: (nt, nz + 1): Film thickness at those faces [m].
     #: (nz + 1,): What the journal drags over the leading edge at most [kg/s]: a gap that opens there is not
     #: filled.
     supply: FloatArray

@@ -32,18 +32,12 @@ GRADING = 0.5
 class CrossFilm(NamedTuple):
     """What one film holds across its thickness; n cells, from the pad to the journal."""
 
-    #: (n + 1,): Of the cells, eta = y / h from 0 at the pad to 1 at the journal.
-    edges: FloatArray
-    #: (nt + 1, nz + 1, n), degC
-    temperature: FloatArray
-    #: (nt + 1, nz + 1): Of the pad's face [degC].
-    face: FloatArray
-    #: (nt + 1, nz + 1, n): 1 / mu, as the pressure was solved with [1/(Pa s)].
-    fluidity: FloatArray
-    #: (nt + 1, nz + 1): 1 / f0, the viscosity that shears [Pa s].
-    shear: FloatArray
-    #: (nt + 1, nz + 1): e.
-    centre: FloatArray
+    edges: FloatArray  #: (n + 1,): Of the cells, eta = y / h from 0 at the pad to 1 at the journal.
+    temperature: FloatArray  #: (nt + 1, nz + 1, n), degC
+    face: FloatArray  #: (nt + 1, nz + 1): Of the pad's face [degC].
+    fluidity: FloatArray  #: (nt + 1, nz + 1, n): 1 / mu, as the pressure was solved with [1/(Pa s)].
+    shear: FloatArray  #: (nt + 1, nz + 1): 1 / f0, the viscosity that shears [Pa s].
+    centre: FloatArray  #: (nt + 1, nz + 1): e.
 
 
 class CrossOperator(NamedTuple):
@@ -54,14 +48,11 @@ class CrossOperator(NamedTuple):
     #: (nt, n, 5): What the earlier station adds: by the cell itself, the cells below and above, the lines before
     #: and after.
     before: FloatArray
-    #: (nt, nz + 1, 2): Exchange with the journal at the earlier and the later station [W/K].
-    journal: FloatArray
+    journal: FloatArray  #: (nt, nz + 1, 2): Exchange with the journal at the earlier and the later station [W/K].
     #: (nt, n): Dissipation [W], and what the balances take from it per kelvin, at the present temperature.
     dissipation: FloatArray
-    #: (nz + 1, cells): Heat carried over the trailing edge per kelvin [W/K].
-    carried: FloatArray
-    #: (nt, nz + 1, cells): Mass flow of the cells from station to station [kg/s].
-    flows: FloatArray
+    carried: FloatArray  #: (nz + 1, cells): Heat carried over the trailing edge per kelvin [W/K].
+    flows: FloatArray  #: (nt, nz + 1, cells): Mass flow of the cells from station to station [kg/s].
 
     @classmethod
     def place(cls, rows: int, lines: int, cells: int) -> CrossOperator:

@@ -37,8 +37,7 @@ class Branch:
     approach: FloatArray
     #: (n,): Rigid approach, a and b [m]; below the first rigid approach the pad has no loaded attitude.
     wedge: FloatArray
-    #: (n,), N
-    load: FloatArray
+    load: FloatArray  #: (n,), N
 
     def at(self, rigid_approach: float) -> tuple[float, float]:
         """Guess (a, b) at a rigid approach, all [m]."""
@@ -50,12 +49,9 @@ class Branch:
 class LoadedAttitude:
     """Attitudes that tilt freely, and their load, along the wedge."""
 
-    #: (n,): A(B).
-    curvature: FloatArray
-    #: (n,): B, rising from 0.
-    wedge: FloatArray
-    #: (n,): Radial force over mu U R^2 L / (Cp - a)^2.
-    load: FloatArray
+    curvature: FloatArray  #: (n,): A(B).
+    wedge: FloatArray  #: (n,): B, rising from 0.
+    load: FloatArray  #: (n,): Radial force over mu U R^2 L / (Cp - a)^2.
 
     def branch(self, clearance: float, scale: float, deflection: Callable[[float], float]) -> Branch:
         """The loaded attitudes of a pad; from an infinite approach on if it has none."""

@@ -14,37 +14,26 @@ from rigdata.arrays import BoolArray, FloatArray
 class FilmGrid(NamedTuple):
     """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric)."""
 
-    #: (nt + 1,): alpha, from the pivot, positive with rotation [rad].
-    angle: FloatArray
-    #: (nz + 1,): Axial coordinate from mid-length [m].
-    z: FloatArray
-    #: (nt + 1,): At the nodes.
-    cos: FloatArray
+    angle: FloatArray  #: (nt + 1,): alpha, from the pivot, positive with rotation [rad].
+    z: FloatArray  #: (nz + 1,): Axial coordinate from mid-length [m].
+    cos: FloatArray  #: (nt + 1,): At the nodes.
     sin: FloatArray
-    #: (nt,): At the faces between nodes.
-    cos_face: FloatArray
+    cos_face: FloatArray  #: (nt,): At the faces between nodes.
     sin_face: FloatArray
     dx: float
-    #: (nz,): Spacing across [m]; finer towards the edges, where the pressure bends most.
-    dz: FloatArray
-    #: (nz + 1,): Axial size of each control volume [m].
-    height: FloatArray
-    #: (nt + 1, nz + 1): Quadrature weights [m^2]; the mirrored half is counted.
-    area: FloatArray
+    dz: FloatArray  #: (nz,): Spacing across [m]; finer towards the edges, where the pressure bends most.
+    height: FloatArray  #: (nz + 1,): Axial size of each control volume [m].
+    area: FloatArray  #: (nt + 1, nz + 1): Quadrature weights [m^2]; the mirrored half is counted.
     first: int
 
 
 class FilmWork(NamedTuple):
     """Arrays that one film solution fills (mesh shape (nt + 1, nz + 1) unless said otherwise)."""
 
-    #: [Pa]
-    pressure: FloatArray
-    #: True where the film is ruptured.
-    ruptured: BoolArray
-    #: [degC]
-    temperature: FloatArray
-    #: [Pa s], [kg/m^3], frozen for the pressure solution.
-    viscosity: FloatArray
+    pressure: FloatArray  #: [Pa]
+    ruptured: BoolArray  #: True where the film is ruptured.
+    temperature: FloatArray  #: [degC]
+    viscosity: FloatArray  #: [Pa s], [kg/m^3], frozen for the pressure solution.
     density: FloatArray
     #: What the journal drags along over half the gap's flow U h / 2: 1, unless the viscosity changes
     #: across the film, see `model.film.cross_film`.
@@ -52,22 +41,14 @@ class FilmWork(NamedTuple):
     #: What a kelvin of film temperature loses to pad and journal, per station of length dx and
     #: control-volume height [W/K]; zero in the adiabatic baseline.
     exchange: FloatArray
-    #: What the film gains from them besides [W].
-    gained: FloatArray
-    #: h [m].
-    thickness: FloatArray
-    #: What is added to h: pad deformation, misalignment [m].
-    extra: FloatArray
-    #: (nt, nz + 1): Mass flow through the faces along the arc [kg/s].
-    flow_x: FloatArray
-    #: (nt + 1, nz): Mass flow through the faces across [kg/s].
-    flow_z: FloatArray
-    #: ((nt - 1) * unknowns, unknowns + 1): Factor of the matrix.
-    band: FloatArray
-    #: ((nt - 1) * unknowns,): Pressure at the unknowns.
-    unknown: FloatArray
-    #: ((nt - 1) * unknowns, 4): Its derivatives by a, b, da/dt, db/dt.
-    slopes: FloatArray
+    gained: FloatArray  #: What the film gains from them besides [W].
+    thickness: FloatArray  #: h [m].
+    extra: FloatArray  #: What is added to h: pad deformation, misalignment [m].
+    flow_x: FloatArray  #: (nt, nz + 1): Mass flow through the faces along the arc [kg/s].
+    flow_z: FloatArray  #: (nt + 1, nz): Mass flow through the faces across [kg/s].
+    band: FloatArray  #: ((nt - 1) * unknowns, unknowns + 1): Factor of the matrix.
+    unknown: FloatArray  #: ((nt - 1) * unknowns,): Pressure at the unknowns.
+    slopes: FloatArray  #: ((nt - 1) * unknowns, 4): Its derivatives by a, b, da/dt, db/dt.
 
 
 @lru_cache(maxsize=64)

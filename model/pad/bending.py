@@ -32,22 +32,14 @@ SHAPES = 12
 class PadDeformation:
     """How a pad's face moves outward under its film; n = (nt + 1)(nz + 1) film nodes, raveled."""
 
-    #: (n, n): Deformation by pressure [m/Pa].
-    compliance: FloatArray
-    #: (c, n): Temperatures of the pad's coarser nodes by those of the film.
-    to_coarse: FloatArray
-    #: (n, c): Deformation by them [m/K].
-    expansion: FloatArray
-    #: (n, c): Heat flux density into the pad by them [W/m^2/K].
-    flux: FloatArray
-    #: (nt + 1, nz + 1, m): In which the pad gives way most.
-    shapes: FloatArray
-    #: (m, n): Amplitudes of the shapes in a deformation.
-    amplitudes: FloatArray
-    #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
-    response: FloatArray
-    #: (2, unknowns): Radial and tangential force by that pressure [m^2].
-    weights: FloatArray
+    compliance: FloatArray  #: (n, n): Deformation by pressure [m/Pa].
+    to_coarse: FloatArray  #: (c, n): Temperatures of the pad's coarser nodes by those of the film.
+    expansion: FloatArray  #: (n, c): Deformation by them [m/K].
+    flux: FloatArray  #: (n, c): Heat flux density into the pad by them [W/m^2/K].
+    shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
+    amplitudes: FloatArray  #: (m, n): Amplitudes of the shapes in a deformation.
+    response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
+    weights: FloatArray  #: (2, unknowns): Radial and tangential force by that pressure [m^2].
 
 
 class SolvedFilm(NamedTuple):
@@ -62,8 +54,7 @@ class SolvedFilm(NamedTuple):
 class AxialTilt(NamedTuple):
     """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
 
-    #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
-    shape: FloatArray
+    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
     #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load
     #: [m^3].
     weights: FloatArray
@@ -76,15 +67,11 @@ class BendingStep:
     """One pad's part of a Newton step."""
 
     forces: FilmForces
-    #: (nt + 1, nz + 1): Wanted less present deformation, without the shapes [m].
-    mismatch: FloatArray
-    #: (m,): Change of the shapes' amplitudes at rest ...
-    amplitude: FloatArray
-    #: (m, 2): ... and per (a, b).
-    by_approach: FloatArray
+    mismatch: FloatArray  #: (nt + 1, nz + 1): Wanted less present deformation, without the shapes [m].
+    amplitude: FloatArray  #: (m,): Change of the shapes' amplitudes at rest ...
+    by_approach: FloatArray  #: (m, 2): ... and per (a, b).
     share: float
-    #: (3,): Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
-    axial_tilt: FloatArray
+    axial_tilt: FloatArray  #: (3,): Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:

@@ -16,8 +16,7 @@ from rigdata.arrays import FloatArray
 class Line:
     """Continuous Lagrange elements on an interval."""
 
-    #: (n_elements + 1,): Element ends, strictly increasing [m or rad].
-    breaks: FloatArray
+    breaks: FloatArray  #: (n_elements + 1,): Element ends, strictly increasing [m or rad].
     degree: int = 2
 
     def __post_init__(self) -> None:

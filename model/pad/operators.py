@@ -66,8 +66,7 @@ class ElasticSector:
     """
 
     mesh: SectorMesh
-    #: (n_theta, 3, n_r, n_z) of bool: Degrees of freedom whose displacement is zero.
-    fixed: BoolArray
+    fixed: BoolArray  #: (n_theta, 3, n_r, n_z) of bool: Degrees of freedom whose displacement is zero.
 
     @classmethod
     def held_at(cls, mesh: SectorMesh, nodes: BoolArray, even: bool = True) -> ElasticSector:
@@ -259,8 +258,7 @@ class PadOperators:
 
     theta: Line
     z: Line
-    #: (n_surface, n_surface): Outward displacement per outward nodal force [m/N].
-    compliance: FloatArray
+    compliance: FloatArray  #: (n_surface, n_surface): Outward displacement per outward nodal force [m/N].
     #: (n_surface, n_temperatures): Outward displacement per temperature rise of the face's bilinear nodes [m/K].
     expansion: FloatArray
     #: (n_surface, n_temperatures): Heat flux density from film into pad per temperature rise [W/m^2/K].

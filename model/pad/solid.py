@@ -25,10 +25,8 @@ from rigdata.arrays import FloatArray
 class AxisMap:
     """One axis of the map."""
 
-    #: (n_face, n_film): G: integrals of face functions times film functions.
-    gather: FloatArray
-    #: (n_film, n_face): M^-1 G^T: film values of a face function.
-    project: FloatArray
+    gather: FloatArray  #: (n_face, n_film): G: integrals of face functions times film functions.
+    project: FloatArray  #: (n_film, n_face): M^-1 G^T: film values of a face function.
 
 
 def plain_map(face: Line, film: Line) -> AxisMap:
@@ -60,8 +58,7 @@ class FilmMap:
 
     theta: AxisMap
     z: AxisMap
-    #: (n_coarse, n_film): Bilinear face values closest in the mean square to film values.
-    coarse_theta: FloatArray
+    coarse_theta: FloatArray  #: (n_coarse, n_film): Bilinear face values closest in the mean square to film values.
     coarse_z: FloatArray
 
     @classmethod
@@ -118,8 +115,7 @@ class PadSolid:
 
     geometry: PadGeometry
     density: MeshDensity
-    #: (n_theta,): Film nodes along the arc [rad from the pivot].
-    film_theta: FloatArray
+    film_theta: FloatArray  #: (n_theta,): Film nodes along the arc [rad from the pivot].
     #: (n_z,): Film nodes along the axis [m from the mid-plane]: 0 to L/2 for a symmetric film, whose mirror
     #: image is included in every result, or -L/2 to L/2.
     film_z: FloatArray

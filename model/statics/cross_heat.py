@@ -41,10 +41,8 @@ FACE_SHARE = 0.1
 class CrossAnswer:
     """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal."""
 
-    #: (nt + 1, n, 3): Of the cells [degC].
-    fields: FloatArray
-    #: (3, nt + 1, nz + 1): Of the pad's face [degC].
-    faces: FloatArray
+    fields: FloatArray  #: (nt + 1, n, 3): Of the cells [degC].
+    faces: FloatArray  #: (3, nt + 1, nz + 1): Of the pad's face [degC].
     outer: FilmAnswer
 
 

@@ -16,8 +16,7 @@ from rigdata.problem import Condition
 class Equilibrium:
     """A static solution."""
 
-    #: (2,): Journal centre from the bearing centre [m].
-    position: FloatArray
+    position: FloatArray  #: (2,): Journal centre from the bearing centre [m].
     films: tuple[PadFilm, ...]
     iterations: int
     force_residual: float

@@ -30,18 +30,15 @@ class PadFilm:
 
     number: int
     pad: Pad
-    #: (2,): Unit vectors at the pivot.
-    normal: FloatArray
+    normal: FloatArray  #: (2,): Unit vectors at the pivot.
     tangent: FloatArray
     preload_distance: float
     pivot_radius: float
     grid: FilmGrid
     work: FilmWork
     inlet: float
-    #: (nt + 1, nz + 1): The pad's deformation, part of `work.extra` [m].
-    bent: FloatArray
-    #: (unknowns,): The change of pressure from the one to the other [Pa].
-    pressure_change: FloatArray
+    bent: FloatArray  #: (nt + 1, nz + 1): The pad's deformation, part of `work.extra` [m].
+    pressure_change: FloatArray  #: (unknowns,): The change of pressure from the one to the other [Pa].
     deformation: PadDeformation | None = None
     step: BendingStep | None = None
     tilt: float = 0.0

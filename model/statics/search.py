@@ -31,12 +31,10 @@ class Search:
     """What an iteration carries along."""
 
     setup: Setup
-    #: (2,), N
-    load: FloatArray
+    load: FloatArray  #: (2,), N
     speed: float
     films: list[PadFilm] = field(init=False)
-    #: (2,): Journal [m].
-    position: FloatArray = field(default_factory=lambda: np.zeros(2))
+    position: FloatArray = field(default_factory=lambda: np.zeros(2))  #: (2,): Journal [m].
     limited: float = 0.0
     journal: float = math.nan
     relaxation: float = 1.0
@@ -46,8 +44,7 @@ class Search:
     warming: float = 0.0
     held: set[int] = field(default_factory=set)
     works: FilmWork = field(init=False)
-    #: (n, unknowns): Their changes of pressure.
-    shifts: FloatArray = field(init=False)
+    shifts: FloatArray = field(init=False)  #: (n, unknowns): Their changes of pressure.
 
     def __post_init__(self) -> None:
         self.lay_out()

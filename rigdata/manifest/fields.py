@@ -37,20 +37,17 @@ class Field:
     """One key of a table: what it holds, what it means, and its default."""
 
     key: str
-    #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `RAW`
-    kind: str
+    kind: str  #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `RAW`
     meaning: str
     example: str
     default: Any = None
     required: bool = False
     choices: tuple[str, ...] = ()
-    #: bounds in SI: from, to; `above` and `below` exclude their ends
-    low: float | None = None
+    low: float | None = None  #: bounds in SI: from, to; `above` and `below` exclude their ends
     high: float | None = None
     above: float | None = None
     below: float | None = None
-    #: what to do about a value out of bounds, where the bounds alone do not say it
-    remedy: str = ""
+    remedy: str = ""  #: what to do about a value out of bounds, where the bounds alone do not say it
 
     def holds(self, value: float) -> bool:
         """Whether a number is within the bounds."""

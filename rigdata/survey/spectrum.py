@@ -33,8 +33,7 @@ class Look:
     deviation: float
     low: float
     high: float
-    #: (m,) each: Hz, unit of the signal
-    frequency: FloatArray = field(repr=False)
+    frequency: FloatArray = field(repr=False)  #: (m,) each: Hz, unit of the signal
     amplitude: FloatArray = field(repr=False)
     lines: tuple[SpectralPeak, ...] = ()
 

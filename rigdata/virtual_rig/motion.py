@@ -61,10 +61,8 @@ class Motion(Protocol):
 class MotionLine:
     """One spectral line, phasors of exp(+i omega t)."""
 
-    #: rad/s
-    frequency: float
-    #: (2,) each: N, m, N, m/s^2
-    oil_force: ComplexArray
+    frequency: float  #: rad/s
+    oil_force: ComplexArray  #: (2,) each: N, m, N, m/s^2
     displacement: ComplexArray
     cell_force: ComplexArray
     acceleration: ComplexArray
@@ -78,16 +76,12 @@ class MotionLine:
 class SteadyMotion:
     """A mean state with spectral lines on it."""
 
-    #: (2,) each: m, N
-    position: FloatArray
+    position: FloatArray  #: (2,) each: m, N
     load: FloatArray
     lines: tuple[MotionLine, ...]
-    #: (n_pads,), degC
-    temperature: FloatArray
-    #: rad/s
-    speed: float
-    #: (n_orders,), runout of 1X, 2X, ... [m]
-    surface: ComplexArray
+    temperature: FloatArray  #: (n_pads,), degC
+    speed: float  #: rad/s
+    surface: ComplexArray  #: (n_orders,), runout of 1X, 2X, ... [m]
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
         """See `Motion`; (n, 2) at `time` (n,) [s]."""
@@ -111,13 +105,10 @@ class SteadyMotion:
 class SlowMotion:
     """A quasi-static test, given on a time grid: no accelerations, no rotation."""
 
-    #: (n,), s
-    time: FloatArray
-    #: (n, 2) each: m, N
-    position: FloatArray
+    time: FloatArray  #: (n,), s
+    position: FloatArray  #: (n, 2) each: m, N
     load: FloatArray
-    #: (n_pads,), degC
-    temperature: FloatArray
+    temperature: FloatArray  #: (n_pads,), degC
     speed: float = 0.0
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
@@ -138,8 +129,7 @@ class SlowMotion:
 class RunPhysics:
     """A run as it really was."""
 
-    #: (n,), s
-    time: FloatArray = field(repr=False)
+    time: FloatArray = field(repr=False)  #: (n,), s
     motion: Motion = field(repr=False)
     facts: Mapping[str, object]
 

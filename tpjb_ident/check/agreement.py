@@ -36,10 +36,8 @@ class RunResponse:
     """One dynamic run: force and displacement phasors."""
 
     seen: Observation
-    #: (2,) complex, N: X, Y
-    force: ComplexArray
-    #: (2,) complex: of the two displacement channels, SI
-    readings: ComplexArray
+    force: ComplexArray  #: (2,) complex, N: X, Y
+    readings: ComplexArray  #: (2,) complex: of the two displacement channels, SI
     channels: tuple[Channel, ...]
 
     @property

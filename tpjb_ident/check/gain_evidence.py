@@ -34,22 +34,15 @@ LEVER_KNOWN = 0.25
 class PointReadings:
     """Readings of the n runs of one operating point, SI."""
 
-    #: (n, 2) complex, m
-    probes: ComplexArray
-    #: (n, 2) complex, N
-    cells: ComplexArray
-    #: (n, 2) complex, N: housing mass times acceleration, X and Y
-    inertia: ComplexArray
-    #: (n, 2), m
-    probe_means: FloatArray
-    #: (n, 2), N
-    cell_means: FloatArray
-    #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
-    probe_plane: FloatArray
+    probes: ComplexArray  #: (n, 2) complex, m
+    cells: ComplexArray  #: (n, 2) complex, N
+    inertia: ComplexArray  #: (n, 2) complex, N: housing mass times acceleration, X and Y
+    probe_means: FloatArray  #: (n, 2), m
+    cell_means: FloatArray  #: (n, 2), N
+    probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     cell_plane: FloatArray
     centre: tuple[float | None, float | None] = (None, None)
-    #: (n, 4)
-    noise: FloatArray | None = None
+    noise: FloatArray | None = None  #: (n, 4)
 
     @property
     def displacement(self) -> ComplexArray:
@@ -66,12 +59,9 @@ class PointReadings:
 class Difference:
     """How one run differs from what the others foretell, with its covariance."""
 
-    #: (m,)
-    rest: FloatArray
-    #: (m, m): covariance that the others' scatter tells
-    noise: FloatArray
-    #: (m, m): covariance of what honest runs differ by beyond it
-    honest: FloatArray
+    rest: FloatArray  #: (m,)
+    noise: FloatArray  #: (m, m): covariance that the others' scatter tells
+    honest: FloatArray  #: (m, m): covariance of what honest runs differ by beyond it
     spare: int
 
     def evidence(self, pattern: FloatArray) -> Evidence:

@@ -39,14 +39,10 @@ _LONGEST = 2**16
 class RecordLines:
     """What the fit found, for m channels."""
 
-    #: (m,)
-    mean: FloatArray
-    #: (m,) complex: at the first of the frequencies; ``Re(phasor exp(i omega t))``
-    phasor: ComplexArray
-    #: (m,): amplitude that lines beside it reach by noise alone
-    floor: FloatArray
-    #: (m,): standard deviation of what is left
-    scatter: FloatArray
+    mean: FloatArray  #: (m,)
+    phasor: ComplexArray  #: (m,) complex: at the first of the frequencies; ``Re(phasor exp(i omega t))``
+    floor: FloatArray  #: (m,): amplitude that lines beside it reach by noise alone
+    scatter: FloatArray  #: (m,): standard deviation of what is left
 
 
 def fit_lines(

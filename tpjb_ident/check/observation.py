@@ -34,16 +34,14 @@ class Observation:
     run: Run
     channels: tuple[Channel, ...]
     lines: RecordLines | None = field(repr=False)
-    #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
-    spread: FloatArray = field(repr=False)
+    spread: FloatArray = field(repr=False)  #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
     other_line: float
     #: (n, m): thinned to a few thousand, SI; kept of dry and clearance runs only
     samples: FloatArray = field(repr=False)
     speed: float
     digest: str
     report: Reporter = field(repr=False)
-    #: (k, m) complex
-    band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)
+    band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)  #: (k, m) complex
 
     @property
     def phasors(self) -> ComplexArray:

@@ -37,8 +37,7 @@ class InconsistentChannels:
 
     quantity: str
     names: tuple[str, ...]
-    #: (m,): least changes of their gains that make them agree
-    gains: FloatArray = field(repr=False)
+    gains: FloatArray = field(repr=False)  #: (m,): least changes of their gains that make them agree
 
     def uncertainty(self) -> dict[str, float]:
         """Standard deviation of every channel's gain that comes from the difference."""

@@ -53,8 +53,7 @@ class Diagnosis:
     verdict: Verdict
     problem: Problem = field(repr=False)
     found: Search = field(repr=False)
-    #: (n,): what the model predicts with exactly the effects that are named
-    after: FloatArray = field(repr=False)
+    after: FloatArray = field(repr=False)  #: (n,): what the model predicts with exactly the effects that are named
 
     @property
     def observations(self) -> Observations:

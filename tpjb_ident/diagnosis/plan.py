@@ -37,10 +37,8 @@ class CampaignPlan:
     """What a layout can tell."""
 
     candidates: tuple[Candidate, ...]
-    #: (k,): whitened size of every candidate's typical step
-    detectable: FloatArray = field(repr=False)
-    #: (k, k)
-    separation: FloatArray = field(repr=False)
+    detectable: FloatArray = field(repr=False)  #: (k,): whitened size of every candidate's typical step
+    separation: FloatArray = field(repr=False)  #: (k, k)
 
     @property
     def floor(self) -> FloatArray:
@@ -122,10 +120,8 @@ class Signatures:
     """What every candidate does to the observation vector of a layout, beside what hides it."""
 
     observations: Observations
-    #: (n, m): columns per standard deviation
-    nuisances: FloatArray = field(repr=False)
-    #: (n, k): change by a typical size of every candidate
-    columns: FloatArray = field(repr=False)
+    nuisances: FloatArray = field(repr=False)  #: (n, m): columns per standard deviation
+    columns: FloatArray = field(repr=False)  #: (n, k): change by a typical size of every candidate
 
     def factor(self, free: bool = True) -> FloatArray:
         """Cholesky factor of the covariance, with or without nuisances."""

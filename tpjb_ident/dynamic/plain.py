@@ -46,14 +46,10 @@ class PlainPoint:
     """One operating point, solved as printed."""
 
     data: PointData = field(repr=False)
-    #: (2 n, 4) complex, m
-    R: ComplexArray = field(repr=False)
-    #: (2 n,) complex, N
-    f: ComplexArray = field(repr=False)
-    #: (2, 2) complex, N/m
-    h: ComplexArray
-    #: (8,), N/m: statsmodels' own, of Re and Im of h
-    standard_error: np.ndarray
+    R: ComplexArray = field(repr=False)  #: (2 n, 4) complex, m
+    f: ComplexArray = field(repr=False)  #: (2 n,) complex, N
+    h: ComplexArray  #: (2, 2) complex, N/m
+    standard_error: np.ndarray  #: (8,), N/m: statsmodels' own, of Re and Im of h
     status: tuple[str, ...]
 
 

@@ -79,13 +79,10 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
 class NoiseSeries:
     """One series from which noise is learnt."""
 
-    #: `time`, `duration` (m,), s: blocks
-    time: FloatArray
+    time: FloatArray  #: `time`, `duration` (m,), s: blocks
     duration: FloatArray
-    #: (m,), m: block averages
-    values: FloatArray
-    #: (m, p)
-    mean: FloatArray
+    values: FloatArray  #: (m,), m: block averages
+    mean: FloatArray  #: (m, p)
 
 
 class _Rotated:

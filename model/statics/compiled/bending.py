@@ -19,20 +19,15 @@ from rigdata.arrays import FloatArray, IntArray
 class BodyStack(NamedTuple):
     """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes."""
 
-    #: (pads,) of int: Body of every film; empty for rigid pads.
-    which: IntArray
+    which: IntArray  #: (pads,) of int: Body of every film; empty for rigid pads.
     #: (k, n, unknowns + c) of float32: Deformation by the pressure at the unknown nodes [m/Pa] and by the
     #: temperatures of the pad's coarser nodes [m/K]: half the memory, which is what the product waits for, at a
     #: ten-millionth of a deformation.
     answer: np.ndarray
-    #: (k, c, n) of float32: Those temperatures by the film's.
-    to_coarse: np.ndarray
-    #: (k, nt + 1, nz + 1, m)
-    shapes: FloatArray
-    #: (k, m, n)
-    amplitudes: FloatArray
-    #: (k, m, unknowns)
-    response: FloatArray
+    to_coarse: np.ndarray  #: (k, c, n) of float32: Those temperatures by the film's.
+    shapes: FloatArray  #: (k, nt + 1, nz + 1, m)
+    amplitudes: FloatArray  #: (k, m, n)
+    response: FloatArray  #: (k, m, unknowns)
     #: (k, 2, unknowns): See `model.pad.bending.PadDeformation`; the factor on the deformation is in `answer` and
     #: `response`.
     weights: FloatArray

@@ -22,8 +22,7 @@ EVERY = 4
 class Case(NamedTuple):
     """The numbers of one search."""
 
-    #: (2,), N
-    load: FloatArray
+    load: FloatArray  #: (2,), N
     running: Running
     hold: tuple[float, float]
     size: float

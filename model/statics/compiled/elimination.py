@@ -19,22 +19,14 @@ from rigdata.arrays import FloatArray
 class PadEquations(NamedTuple):
     """What a Newton step needs to know of the n pads that carry, in the (radial, tangential) frame of each."""
 
-    #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
-    frame: FloatArray
-    #: (n, 2): Of the film [N].
-    force: FloatArray
-    #: (n, 2, 2): Its derivatives by (a, b) [N/m].
-    stiffness: FloatArray
-    #: (n,): R_P [m].
-    pivot_radius: FloatArray
-    #: (n,): Moment that holds the tilt back, over R_P [N].
-    holding_force: FloatArray
-    #: (n, 2): Its derivatives by the tilt, k_theta / R_P [N/rad], and by the pad's load.
-    holding_slopes: FloatArray
-    #: (n,): delta(W) less the present deflection [m].
-    missing_deflection: FloatArray
-    #: (n,): d delta / d W [m/N].
-    pivot_compliance: FloatArray
+    frame: FloatArray  #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
+    force: FloatArray  #: (n, 2): Of the film [N].
+    stiffness: FloatArray  #: (n, 2, 2): Its derivatives by (a, b) [N/m].
+    pivot_radius: FloatArray  #: (n,): R_P [m].
+    holding_force: FloatArray  #: (n,): Moment that holds the tilt back, over R_P [N].
+    holding_slopes: FloatArray  #: (n, 2): Its derivatives by the tilt, k_theta / R_P [N/rad], and by the pad's load.
+    missing_deflection: FloatArray  #: (n,): delta(W) less the present deflection [m].
+    pivot_compliance: FloatArray  #: (n,): d delta / d W [m/N].
 
 
 @compiled

@@ -31,71 +31,47 @@ class GridStack(NamedTuple):
 class PadStack(NamedTuple):
     """What a search leaves as it is."""
 
-    #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
-    frame: FloatArray
-    #: (n,): Cp - Cb, plus running changes [m].
-    preload: FloatArray
-    #: (n,): R_P and Cp [m].
-    pivot_radius: FloatArray
+    frame: FloatArray  #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
+    preload: FloatArray  #: (n,): Cp - Cb, plus running changes [m].
+    pivot_radius: FloatArray  #: (n,): R_P and Cp [m].
     clearance: FloatArray
-    #: (n,), degC
-    inlet: FloatArray
-    #: (n, 2): Station before the pivot, and the pivot's place between it and the next one.
-    pivot: FloatArray
-    #: (n, 4): The pivots, see `model.statics.compiled.laws`.
-    laws: FloatArray
-    #: (n, 5, m): Measured ones.
-    curves: FloatArray
+    inlet: FloatArray  #: (n,), degC
+    pivot: FloatArray  #: (n, 2): Station before the pivot, and the pivot's place between it and the next one.
+    laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
+    curves: FloatArray  #: (n, 5, m): Measured ones.
     #: (n, 3, r): Curvature, wedge and load of the loaded attitudes, see
     #: `model.film.loaded_attitude.LoadedAttitude`.
     attitudes: FloatArray
-    #: (n,) of int: How many of the r there are.
-    rows: IntArray
+    rows: IntArray  #: (n,) of int: How many of the r there are.
 
 
 class PadState(NamedTuple):
     """What a search changes besides the films' arrays."""
 
-    #: (2,): Journal [m].
-    position: FloatArray
-    #: (n,): t [rad], eta [m].
-    tilt: FloatArray
+    position: FloatArray  #: (2,): Journal [m].
+    tilt: FloatArray  #: (n,): t [rad], eta [m].
     deflection: FloatArray
-    #: (n,) of bool: Carries nothing; has a pressure.
-    idle: BoolArray
+    idle: BoolArray  #: (n,) of bool: Carries nothing; has a pressure.
     solved: BoolArray
-    #: (n,) of int: How often the pad has taken up or shed its load.
-    changes: IntArray
-    #: (n, 4, r): Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
-    branch: FloatArray
-    #: (n,) of int: How many of the r there are; 0 before the first.
-    length: IntArray
-    #: (n, 2): (a, b) that the pressure was solved with [m].
-    wedge: FloatArray
-    #: (n, 2): As the pressure was solved, and at the temperature found since [N].
-    force: FloatArray
+    changes: IntArray  #: (n,) of int: How often the pad has taken up or shed its load.
+    branch: FloatArray  #: (n, 4, r): Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
+    length: IntArray  #: (n,) of int: How many of the r there are; 0 before the first.
+    wedge: FloatArray  #: (n, 2): (a, b) that the pressure was solved with [m].
+    force: FloatArray  #: (n, 2): As the pressure was solved, and at the temperature found since [N].
     corrected: FloatArray
-    #: (n, 2, 2): [N/m], [N s/m]
-    stiffness: FloatArray
+    stiffness: FloatArray  #: (n, 2, 2): [N/m], [N s/m]
     damping: FloatArray
-    #: (n,): Thinnest film [m].
-    least: FloatArray
-    #: (n,) of int: See `model.film.reynolds.FilmForces`.
-    steps: IntArray
-    #: (n,): Largest change of temperature that the last step asked for [K].
-    heating: FloatArray
-    #: (n, unknowns): See `model.statics.pad_film.PadFilm.pressure_change`.
-    shift: FloatArray
-    #: (n, 2): `corrected`, and ...
-    felt: FloatArray
-    #: (n, 2, 2): ... `stiffness` with the pad giving way: what journal and pivot feel.
-    felt_stiffness: FloatArray
+    least: FloatArray  #: (n,): Thinnest film [m].
+    steps: IntArray  #: (n,) of int: See `model.film.reynolds.FilmForces`.
+    heating: FloatArray  #: (n,): Largest change of temperature that the last step asked for [K].
+    shift: FloatArray  #: (n, unknowns): See `model.statics.pad_film.PadFilm.pressure_change`.
+    felt: FloatArray  #: (n, 2): `corrected`, and ...
+    felt_stiffness: FloatArray  #: (n, 2, 2): ... `stiffness` with the pad giving way: what journal and pivot feel.
     #: (n, nt + 1, nz + 1): Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty
     #: for rigid pads.
     bent: FloatArray
     mismatch: FloatArray
-    #: (n, shapes, 3): Change of their amplitudes at rest, and per metre of a and b.
-    amplitude: FloatArray
+    amplitude: FloatArray  #: (n, shapes, 3): Change of their amplitudes at rest, and per metre of a and b.
 
 
 def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:

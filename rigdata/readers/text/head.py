@@ -37,15 +37,11 @@ class Head:
     delimiter: str
     decimal: str
     decimal_certain: bool
-    #: Line of the names, from 1; 0 where no line names the columns.
-    header_line: int
-    #: First line of samples, from 1.
-    data_line: int
-    #: One per column, "" where there is none.
-    names: tuple[str, ...]
+    header_line: int  #: Line of the names, from 1; 0 where no line names the columns.
+    data_line: int  #: First line of samples, from 1.
+    names: tuple[str, ...]  #: One per column, "" where there is none.
     units: tuple[str, ...]
-    #: Columns of times of day, and of dates alone.
-    stamps: frozenset[int] = frozenset()
+    stamps: frozenset[int] = frozenset()  #: Columns of times of day, and of dates alone.
     dates: frozenset[int] = frozenset()
 
 

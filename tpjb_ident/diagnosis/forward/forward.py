@@ -36,16 +36,11 @@ class NoEquilibriumError(TpjbError):
 class SolvedPoint:
     """What a bearing alone does at one static point, before structure and instruments."""
 
-    #: (n, 2, 2) complex, N/m
-    h: ComplexArray
-    #: (2,), m
-    position: FloatArray
-    #: (2,), N: static load
-    force: FloatArray
-    #: (n_pads,), degC
-    temperature: FloatArray
-    #: (n_pads,), N
-    pad_load: FloatArray
+    h: ComplexArray  #: (n, 2, 2) complex, N/m
+    position: FloatArray  #: (2,), m
+    force: FloatArray  #: (2,), N: static load
+    temperature: FloatArray  #: (n_pads,), degC
+    pad_load: FloatArray  #: (n_pads,), N
 
     def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
         """As the structure and the instruments of a set-up show it."""

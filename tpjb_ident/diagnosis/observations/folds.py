@@ -25,8 +25,7 @@ class Fold:
     """Points that are left out together."""
 
     name: str
-    #: (m,): elements
-    members: IntArray = field(repr=False)
+    members: IntArray = field(repr=False)  #: (m,): elements
     beyond: bool = False
 
 

@@ -111,12 +111,9 @@ class Observations:
     """A campaign as one vector."""
 
     layout: Layout
-    #: (n,): SI; dry compliances as logarithms, loads as ratios to the set point
-    value: FloatArray
-    #: (n, n): random part, from identification
-    covariance: FloatArray = field(repr=False)
-    #: (n,): stated model tolerance of every element
-    sigma: FloatArray = field(repr=False)
+    value: FloatArray  #: (n,): SI; dry compliances as logarithms, loads as ratios to the set point
+    covariance: FloatArray = field(repr=False)  #: (n, n): random part, from identification
+    sigma: FloatArray = field(repr=False)  #: (n,): stated model tolerance of every element
     elements: tuple[Element, ...] = field(repr=False)
 
     def __len__(self) -> int:

@@ -24,10 +24,8 @@ class AmplitudePath:
     everywhere.
     """
 
-    #: (m,): amplitudes, counted from the neutral one, which is among them; rising
-    at: FloatArray
-    #: (n, 2 m): changes of the prediction there, then its derivatives
-    columns: FloatArray
+    at: FloatArray  #: (m,): amplitudes, counted from the neutral one, which is among them; rising
+    columns: FloatArray  #: (n, 2 m): changes of the prediction there, then its derivatives
 
     def weights(self, amplitudes: FloatArray) -> FloatArray:
         """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends."""

@@ -38,8 +38,7 @@ FOUND = 0.05
 class Basis:
     """What every assessment of a campaign shares; all in units of `total_sigma`."""
 
-    #: (n, n): covariance of identification
-    noise: FloatArray = field(repr=False)
+    noise: FloatArray = field(repr=False)  #: (n, n): covariance of identification
     components: tuple[Component, ...] = field(repr=False)
     folds: tuple[Fold, ...] = field(repr=False)
 
@@ -80,12 +79,9 @@ class Basis:
 class Linear:
     """A model, linear about where it was fitted; all in units of `total_sigma`."""
 
-    #: (n,)
-    residual: FloatArray = field(repr=False)
-    #: (n, k): J and N side by side
-    columns: FloatArray = field(repr=False)
-    #: (k,): standard deviations of their priors
-    width: FloatArray = field(repr=False)
+    residual: FloatArray = field(repr=False)  #: (n,)
+    columns: FloatArray = field(repr=False)  #: (n, k): J and N side by side
+    width: FloatArray = field(repr=False)  #: (k,): standard deviations of their priors
 
     @property
     def spread(self) -> FloatArray:
@@ -103,11 +99,9 @@ class Linear:
 class Assessment:
     """What a model is worth."""
 
-    #: (c,): t_k
-    scales: FloatArray
+    scales: FloatArray  #: (c,): t_k
     evidence: float
-    #: (n, n): of the whole covariance
-    inverse: FloatArray = field(repr=False)
+    inverse: FloatArray = field(repr=False)  #: (n, n): of the whole covariance
     linear: Linear = field(repr=False)
     folds: tuple[Fold, ...] = field(repr=False)
 

@@ -33,10 +33,8 @@ class Component:
     """One way to be wrong."""
 
     name: str
-    #: (m,)
-    rows: IntArray = field(repr=False)
-    #: (m, m)
-    matrix: FloatArray = field(repr=False)
+    rows: IntArray = field(repr=False)  #: (m,)
+    matrix: FloatArray = field(repr=False)  #: (m, m)
     lowest: float = LOWEST
     highest: float = 0.0
     made_of: tuple[int, ...] = ()

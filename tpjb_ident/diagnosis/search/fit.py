@@ -25,14 +25,12 @@ class InitialFit:
     """Where a model stands: where a fit begins, or a step leads."""
 
     candidates: tuple[Candidate, ...]
-    #: (k_i,): in the nearly linear forms
-    amplitudes: tuple[FloatArray, ...]
+    amplitudes: tuple[FloatArray, ...]  #: (k_i,): in the nearly linear forms
     #: (n, k): per unit of every amplitude, as known from nearby; steps correct it
     jacobian: FloatArray = field(repr=False)
     #: (m,): where nuisances stand while amplitudes move, in standard deviations
     nuisance: FloatArray = field(repr=False)
-    #: (n, m): per standard deviation of every nuisance
-    columns: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)  #: (n, m): per standard deviation of every nuisance
 
     @property
     def free(self) -> FloatArray:
@@ -59,8 +57,7 @@ class InitialFit:
 class Fit(InitialFit):
     """Effects fitted together, nuisances beside them."""
 
-    #: (n,): where the model stands, readings included
-    prediction: FloatArray = field(repr=False)
+    prediction: FloatArray = field(repr=False)  #: (n,): where the model stands, readings included
     assessment: Assessment = field(repr=False)
     converged: bool = field(default=False, repr=False)
 

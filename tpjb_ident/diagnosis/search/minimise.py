@@ -67,8 +67,7 @@ class Objective:
     """What a step is judged by."""
 
     basis: Basis
-    #: (c,): of the model's error
-    scales: FloatArray
+    scales: FloatArray  #: (c,): of the model's error
     slack: float = 1.0
 
     def assess(self, problem: Problem, start: InitialFit, y: FloatArray) -> Assessment:

@@ -24,11 +24,9 @@ class Problem:
     """A campaign beside a baseline."""
 
     observations: Observations
-    #: (n,): prediction of the baseline
-    base: FloatArray = field(repr=False)
+    base: FloatArray = field(repr=False)  #: (n,): prediction of the baseline
     nuisances: tuple[Nuisance, ...] = field(repr=False)
-    #: (n, m): what they do at the baseline, per standard deviation
-    columns: FloatArray = field(repr=False)
+    columns: FloatArray = field(repr=False)  #: (n, m): what they do at the baseline, per standard deviation
     pool: tuple[Candidate, ...] = field(repr=False)
 
     @functools.cached_property

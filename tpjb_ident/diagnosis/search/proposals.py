@@ -46,8 +46,7 @@ class Proposals:
     problem: Problem
     settings: DiagnoseSettings
     drawn: Fit
-    #: (n, k): derivatives of every candidate there
-    first: Columns = field(repr=False)
+    first: Columns = field(repr=False)  #: (n, k): derivatives of every candidate there
     paths: AmplitudePaths = field(repr=False)
 
     def extended(self, model: Fit, table: Columns) -> list[Fit]:

@@ -30,8 +30,7 @@ class Score:
 
     candidates: tuple[Candidate, ...]
     gain: float
-    #: (k,): at which they promise it
-    amplitudes: tuple[FloatArray, ...]
+    amplitudes: tuple[FloatArray, ...]  #: (k,): at which they promise it
 
 
 Columns = Mapping[Candidate, FloatArray]
@@ -42,10 +41,8 @@ AmplitudePaths = Mapping[Candidate, AmplitudePath]
 class Survey:
     """What every candidate does beside a model, for itself."""
 
-    #: (n, k)
-    secants: Columns
-    #: (n, k): the same at the model itself where the curvature is known
-    slopes: Columns
+    secants: Columns  #: (n, k)
+    slopes: Columns  #: (n, k): the same at the model itself where the curvature is known
     paths: AmplitudePaths
 
 

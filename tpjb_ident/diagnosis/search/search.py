@@ -31,8 +31,7 @@ class Search:
     model: Fit
     effects: Fit
     effect_gain: tuple[EffectGain, ...]
-    #: (n, k): what every candidate does at the baseline, per unit of its amplitudes
-    first: Columns = field(repr=False)
+    first: Columns = field(repr=False)  #: (n, k): what every candidate does at the baseline, per unit of its amplitudes
     singles: tuple[Fit, ...] = field(repr=False)
     rivals: tuple[tuple[Fit, ...], ...] = field(repr=False)
 

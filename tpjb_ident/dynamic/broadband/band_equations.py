@@ -42,14 +42,10 @@ class RunSums:
     Q = 2 m columns of phi, the two displacements of each power together.
     """
 
-    #: (q, q) complex: sum of zeta* phi^T
-    A: ComplexArray
-    #: (2, q) complex: sum of F zeta^H
-    B: ComplexArray
-    #: (q, 2) complex: sum of zeta* D^T: what a change of h does to B
-    A0: ComplexArray
-    #: (q, q) complex: sum of zeta* zeta^T, in the weight that the noise of one row has
-    Z: ComplexArray
+    A: ComplexArray  #: (q, q) complex: sum of zeta* phi^T
+    B: ComplexArray  #: (2, q) complex: sum of F zeta^H
+    A0: ComplexArray  #: (q, 2) complex: sum of zeta* D^T: what a change of h does to B
+    Z: ComplexArray  #: (q, q) complex: sum of zeta* zeta^T, in the weight that the noise of one row has
     residual: Callable[[FloatArray], ComplexArray]
     dof: float
 

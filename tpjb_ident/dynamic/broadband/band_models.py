@@ -33,19 +33,13 @@ class BandPart:
     """h in a part of the band, by the lines of that part alone; a model only says how h changes within it."""
 
     omega: float
-    #: (2, 2) complex, N/m
-    h: ComplexArray
-    #: (8, 8)
-    covariance: FloatArray = field(repr=False)
-    #: (8,)
-    dof: FloatArray = field(repr=False)
-    #: (n, 8), N/m: change in every draw of what lines share
-    moved: FloatArray = field(repr=False)
+    h: ComplexArray  #: (2, 2) complex, N/m
+    covariance: FloatArray = field(repr=False)  #: (8, 8)
+    dof: FloatArray = field(repr=False)  #: (8,)
+    moved: FloatArray = field(repr=False)  #: (n, 8), N/m: change in every draw of what lines share
     span: tuple[float, float]
-    #: (8,), N/m
-    bracket: FloatArray = field(repr=False)
-    #: (8,), N/m: h of the part less that of the model
-    off: FloatArray = field(repr=False)
+    bracket: FloatArray = field(repr=False)  #: (8,), N/m
+    off: FloatArray = field(repr=False)  #: (8,), N/m: h of the part less that of the model
 
 
 @dataclass(frozen=True)
@@ -53,14 +47,10 @@ class BandModel:
     """One model over the lines of a band."""
 
     model: str
-    #: (p,)
-    parameters: FloatArray
-    #: (p, p): random part
-    covariance: FloatArray = field(repr=False)
-    #: (p,): degrees of freedom of its variances
-    dof: FloatArray = field(repr=False)
-    #: (p, p): what all lines share
-    systematic: FloatArray = field(repr=False)
+    parameters: FloatArray  #: (p,)
+    covariance: FloatArray = field(repr=False)  #: (p, p): random part
+    dof: FloatArray = field(repr=False)  #: (p,): degrees of freedom of its variances
+    systematic: FloatArray = field(repr=False)  #: (p, p): what all lines share
     chi_square: float
     spare: int
     probability: float
@@ -97,10 +87,8 @@ class BandModel:
 class SharedErrors:
     """What lines share, as draws."""
 
-    #: (n_lines, n, 8), N/m: change of Re and Im of h at every line
-    lines: FloatArray
-    #: (n, n_runs): relative change of every run's force
-    runs: FloatArray
+    lines: FloatArray  #: (n_lines, n, 8), N/m: change of Re and Im of h at every line
+    runs: FloatArray  #: (n, n_runs): relative change of every run's force
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,7 @@ class BandLine:
     frequency: float
     by_method: dict[str, DynamicStiffness] = field(repr=False)
     method: str
-    #: (2,): of the force along X and Y with the displacements
-    coherence: FloatArray
+    coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
     n_rows: int
 
     @property

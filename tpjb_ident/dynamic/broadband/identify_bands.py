@@ -49,8 +49,7 @@ class IdentifiedBands:
     """What a campaign's broadband runs give."""
 
     results: tuple[BandResult, ...]
-    #: (n, 8 P), N/m
-    changes: FloatArray = field(repr=False)
+    changes: FloatArray = field(repr=False)  #: (n, 8 P), N/m
     conditions: tuple[Condition, ...] = ()
 
 

@@ -31,8 +31,7 @@ class LineEstimates:
     omega: float
     method: str
     fits: dict[str, LineFit] = field(repr=False)
-    #: (2,): of the force along X and Y with the displacements
-    coherence: FloatArray
+    coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
     n_rows: int
 
     @property

@@ -18,12 +18,9 @@ from rigdata.arrays import ComplexArray, FloatArray, IntArray
 class InconsistentRuns:
     """How far every run's force is from what h gives, along that force."""
 
-    #: (n_runs,) complex, N^2
-    left: ComplexArray
-    #: (n_runs, 2, 2) complex, N^2: sum of f f^H over the rows, f the force that h gives
-    force: ComplexArray
-    #: (n_runs,), N^4: of `left`, by the line's noise
-    variance: FloatArray
+    left: ComplexArray  #: (n_runs,) complex, N^2
+    force: ComplexArray  #: (n_runs, 2, 2) complex, N^2: sum of f f^H over the rows, f the force that h gives
+    variance: FloatArray  #: (n_runs,), N^4: of `left`, by the line's noise
 
     @property
     def power(self) -> FloatArray:
@@ -39,17 +36,13 @@ def _nothing_apart() -> InconsistentRuns:
 class LineFit:
     """Estimate of h at one line."""
 
-    #: (2, 2) complex
-    h: ComplexArray
-    #: (n_runs, 2, 2) complex, 1/m^2: sum of g g^H over the rows of each run
-    leverage: ComplexArray = field(repr=False)
+    h: ComplexArray  #: (2, 2) complex
+    leverage: ComplexArray = field(repr=False)  #: (n_runs, 2, 2) complex, 1/m^2: sum of g g^H over the rows of each run
     #: (n_runs, 2, 2) complex, N^2: covariance of the equation noise in one row of each run
     noise: ComplexArray = field(repr=False)
-    #: (n_runs,): complex degrees of freedom behind each
-    dof: FloatArray = field(repr=False)
+    dof: FloatArray = field(repr=False)  #: (n_runs,): complex degrees of freedom behind each
     condition: float
-    #: (k, 2, 2) complex
-    slopes: ComplexArray = field(repr=False)
+    slopes: ComplexArray = field(repr=False)  #: (k, 2, 2) complex
     strength: float = np.inf
     #: (n_runs, 2, 2) complex
     share: ComplexArray = field(default_factory=lambda: np.empty((0, 2, 2), complex), repr=False)

@@ -27,10 +27,8 @@ LEAST_LINES = 3
 class LinePlan:
     """Bins that belong to each line; no bin belongs to two, so that lines of a record err apart from each other."""
 
-    #: (k,)
-    bins: tuple[IntArray, ...]
-    #: (n_lines,), Hz
-    frequencies: FloatArray
+    bins: tuple[IntArray, ...]  #: (k,)
+    frequencies: FloatArray  #: (n_lines,), Hz
     half_width: float
 
 
@@ -39,18 +37,12 @@ class LineRows:
     """Rows of all runs at one line."""
 
     omega: float
-    #: (n, 2) complex, m
-    D: ComplexArray
-    #: (n, 2) complex, N
-    F: ComplexArray
-    #: (n, 2) complex
-    A: ComplexArray
-    #: (n, 2) complex: what the actuators were told, along X and Y, in units of its own
-    command: ComplexArray | None
-    #: (n,): place of the run that a row belongs to
-    run: IntArray
-    #: (n,)
-    place: FloatArray
+    D: ComplexArray  #: (n, 2) complex, m
+    F: ComplexArray  #: (n, 2) complex, N
+    A: ComplexArray  #: (n, 2) complex
+    command: ComplexArray | None  #: (n, 2) complex: what the actuators were told, along X and Y, in units of its own
+    run: IntArray  #: (n,): place of the run that a row belongs to
+    place: FloatArray  #: (n,)
     repeated: bool
     ends: bool
     step: float = 0.0

@@ -39,24 +39,16 @@ class RunSpectra:
     """Phasors of one run over the band."""
 
     phasors: RunPhasors
-    #: (n_windows, n_bins, 2) complex, m
-    D: ComplexArray
-    #: (n_windows, n_bins, 2) complex, N
-    F: ComplexArray
-    #: (n_windows, n_bins, 2) complex, m/s^2
-    A: ComplexArray
-    #: (n_windows, n_bins, 2) complex
-    command: ComplexArray | None
-    #: (n_bins,), Hz
-    frequencies: FloatArray
-    #: (n_bins,): bins that lines of shaft or mains may have spoiled
-    taken: BoolArray
+    D: ComplexArray  #: (n_windows, n_bins, 2) complex, m
+    F: ComplexArray  #: (n_windows, n_bins, 2) complex, N
+    A: ComplexArray  #: (n_windows, n_bins, 2) complex, m/s^2
+    command: ComplexArray | None  #: (n_windows, n_bins, 2) complex
+    frequencies: FloatArray  #: (n_bins,), Hz
+    taken: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
     disturbances: tuple[Disturbance, ...]
     period: float | None
-    #: (2,), N
-    mean_load: FloatArray
-    #: (2,), m
-    position: FloatArray
+    mean_load: FloatArray  #: (2,), N
+    position: FloatArray  #: (2,), m
     temperatures: dict[int, float]
     start: float = 0.0
 

@@ -27,12 +27,9 @@ class Samples:
     """One run in memory, SI."""
 
     rate: float
-    #: (2, n): X and Y by quantity; acceleration only where it is measured
-    values: dict[str, FloatArray]
-    #: (2, n): along X and Y, in units of its own
-    command: FloatArray | None
-    #: (n,), rad: of the shaft, by its tachometer or keyphasor
-    angle: FloatArray | None
+    values: dict[str, FloatArray]  #: (2, n): X and Y by quantity; acceleration only where it is measured
+    command: FloatArray | None  #: (2, n): along X and Y, in units of its own
+    angle: FloatArray | None  #: (n,), rad: of the shaft, by its tachometer or keyphasor
     conditions: tuple[Condition, ...] = ()
 
     @property

@@ -42,8 +42,7 @@ class RunScatter:
     """How runs differ."""
 
     size: float
-    #: (n, n_runs): standard normal numbers, one per run
-    draws: FloatArray
+    draws: FloatArray  #: (n, n_runs): standard normal numbers, one per run
     conditions: tuple[Condition, ...] = ()
 
     @property
@@ -65,8 +64,7 @@ class SharedSources:
 
     gains: GainDraws
     others: SystematicSources
-    #: (n, 2, 4): standard normal numbers for how K and C follow the load
-    load: FloatArray
+    load: FloatArray  #: (n, 2, 4): standard normal numbers for how K and C follow the load
 
     def conditions(self) -> tuple[Condition, ...]:
         """What to say of calibrations that the manifest does not state."""

@@ -47,8 +47,7 @@ class Correction:
     """Corrections of one operating point."""
 
     miss: LoadMiss
-    #: (2, 2) complex: dH/d(ln W), where the campaign tells it
-    slope: ComplexArray | None
+    slope: ComplexArray | None  #: (2, 2) complex: dH/d(ln W), where the campaign tells it
     turn: DirectionSensitivity | None
     mains: MainsFit | None
     conditions: tuple[Condition, ...]

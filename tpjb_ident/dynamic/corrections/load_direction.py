@@ -43,12 +43,9 @@ ROUNDING = 1e-9
 class RunRatios:
     """Force per displacement of a point's runs, one robust mean over each run's windows."""
 
-    #: (n_runs, 2) complex: displacement of unit length
-    shape: ComplexArray
-    #: (n_runs, 2) complex, N/m: oil force that goes with it
-    force: ComplexArray
-    #: (n_runs,), rad: how far the static load's direction was off
-    sideways: FloatArray
+    shape: ComplexArray  #: (n_runs, 2) complex: displacement of unit length
+    force: ComplexArray  #: (n_runs, 2) complex, N/m: oil force that goes with it
+    sideways: FloatArray  #: (n_runs,), rad: how far the static load's direction was off
     load: float
     direct: tuple[float, float]
     trusted: bool = True
@@ -58,10 +55,8 @@ class RunRatios:
 class DirectionSensitivity:
     """dH/d(direction) at one point."""
 
-    #: (2, 2) complex, N/m per rad
-    slope: ComplexArray
-    #: (8, 8), (N/m)^2: covariance that its own uncertainty leaves on H
-    left: FloatArray = field(repr=False)
+    slope: ComplexArray  #: (2, 2) complex, N/m per rad
+    left: FloatArray = field(repr=False)  #: (8, 8), (N/m)^2: covariance that its own uncertainty leaves on H
     #: (8, 8), (N/m per rad)^2: covariance of the slope itself
     doubt: FloatArray = field(repr=False, default_factory=lambda: np.zeros((8, 8)))
 

@@ -39,10 +39,8 @@ _PRIOR_DOF = 8.0
 class Pickup:
     """Mains pick-up of the displacement probes, known but for angles."""
 
-    #: (m, 2) complex
-    patterns: ComplexArray
-    #: (probes,), m: amplitude per probe
-    size: FloatArray
+    patterns: ComplexArray  #: (m, 2) complex
+    size: FloatArray  #: (probes,), m: amplitude per probe
     runs: int
 
 
@@ -66,12 +64,9 @@ def mains_pickup(lines: Sequence[ComplexArray | None], axes: FloatArray) -> Pick
 class MainsFit:
     """Pick-up of every run of a point, found together with H."""
 
-    #: (n_runs, 2) complex, m: X and Y share of the measured displacement at the best minimum
-    pickup: ComplexArray
-    #: (8,), N/m
-    shift: FloatArray
-    #: (8, 8), N^2/m^2: what not knowing the angles leaves in H
-    covariance: FloatArray
+    pickup: ComplexArray  #: (n_runs, 2) complex, m: X and Y share of the measured displacement at the best minimum
+    shift: FloatArray  #: (8,), N/m
+    covariance: FloatArray  #: (8, 8), N^2/m^2: what not knowing the angles leaves in H
     dof: float
     chi_square: float
 

@@ -20,10 +20,8 @@ class Minimum:
     """One local minimum."""
 
     cost: float
-    #: (n,): unknowns
-    x: FloatArray
-    #: (8, 8), N^2/m^2: of the entries of H
-    covariance: FloatArray
+    x: FloatArray  #: (n,): unknowns
+    covariance: FloatArray  #: (8, 8), N^2/m^2: of the entries of H
     log_volume: float
 
 
@@ -31,14 +29,10 @@ class Minimum:
 class MainsEquations:
     """F_g = H (D_g - sum_k patterns_k exp(i angle_gk)), for H (8 real numbers) and the angles."""
 
-    #: (g, 2) complex, m
-    D: ComplexArray
-    #: (g, 2) complex, N
-    F: ComplexArray
-    #: (m, 2) complex, m
-    patterns: ComplexArray
-    #: (g,), N: of a run's force residual
-    sigma: FloatArray
+    D: ComplexArray  #: (g, 2) complex, m
+    F: ComplexArray  #: (g, 2) complex, N
+    patterns: ComplexArray  #: (m, 2) complex, m
+    sigma: FloatArray  #: (g,), N: of a run's force residual
 
     @property
     def scale(self) -> float:

@@ -41,10 +41,8 @@ CONTRADICTS_TURN = 0.5
 class LoadMiss:
     """Relative deviation of each run's static load from its set point."""
 
-    #: (n_runs,)
-    size: FloatArray
-    #: (n_runs,), rad: the same across it
-    sideways: FloatArray
+    size: FloatArray  #: (n_runs,)
+    sideways: FloatArray  #: (n_runs,), rad: the same across it
     uncertainty: float = 0.0
     turn_uncertainty: float = 0.0
 

@@ -30,8 +30,7 @@ class GainDraws:
     and the covariance over all points carries the correlation.
     """
 
-    #: `displacement`, `force`, `acceleration` (n, 2, 2)
-    displacement: FloatArray
+    displacement: FloatArray  #: `displacement`, `force`, `acceleration` (n, 2, 2)
     force: FloatArray
     acceleration: FloatArray
     unstated: tuple[str, ...]
@@ -95,14 +94,10 @@ def apparent_change(data: PointData, stiffness: DynamicStiffness, draws: GainDra
 class SystematicSources:
     """Draws of what the manifest states."""
 
-    #: (m,), rad: stated axes of the channels of each quantity
-    axes: dict[str, FloatArray]
-    #: (n, m), rad
-    turns: dict[str, FloatArray]
-    #: (n, m), s
-    delays: dict[str, FloatArray]
-    #: (n,)
-    mass: FloatArray
+    axes: dict[str, FloatArray]  #: (m,), rad: stated axes of the channels of each quantity
+    turns: dict[str, FloatArray]  #: (n, m), rad
+    delays: dict[str, FloatArray]  #: (n, m), s
+    mass: FloatArray  #: (n,)
 
     def changes(self, data: PointData, stiffness: DynamicStiffness) -> dict[str, FloatArray]:
         """Change of the eight entries of H in every draw [N/m], (n, 8), by source."""

@@ -45,11 +45,9 @@ class Repeats:
     """Direction means and the noise of a single window, from good windows only."""
 
     means: DirectionMeans
-    #: (4, 4) complex: covariance of one window's (X, Y, Fx, Fy) about its direction
-    noise: ComplexArray
+    noise: ComplexArray  #: (4, 4) complex: covariance of one window's (X, Y, Fx, Fy) about its direction
     spare: float
-    #: (n,): final window weights
-    weights: FloatArray
+    weights: FloatArray  #: (n,): final window weights
     wandering: int = 0
 
 
@@ -57,15 +55,11 @@ class Repeats:
 class EivFit:
     """Result of the fit in the table's scale."""
 
-    #: (2, 2) complex
-    h: ComplexArray
-    #: (8, 8)
-    covariance: FloatArray
-    #: (8,)
-    dof: FloatArray
+    h: ComplexArray  #: (2, 2) complex
+    covariance: FloatArray  #: (8, 8)
+    dof: FloatArray  #: (8,)
     chi_square: float
-    #: (2,)
-    attenuation: FloatArray
+    attenuation: FloatArray  #: (2,)
 
 
 def repeats(table: PhasorTable, weights: FloatArray, rounds: int = 2) -> Repeats | None:

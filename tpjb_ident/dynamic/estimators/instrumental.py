@@ -21,11 +21,9 @@ from tpjb_ident.errors import ArgumentError
 class InstrumentalFit:
     """Result in the table's scale."""
 
-    #: (2, 2) complex
-    h: ComplexArray
+    h: ComplexArray  #: (2, 2) complex
     explained: PhasorTable
-    #: (n,)
-    weights: FloatArray
+    weights: FloatArray  #: (n,)
     conditions: tuple[Condition, ...]
 
 

@@ -115,10 +115,8 @@ def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
 class InitialFit:
     """A robust first answer."""
 
-    #: (q, 2) complex
-    coefficients: ComplexArray
-    #: (q, q) complex: residual covariance of the windows that belong together
-    scatter: ComplexArray
+    coefficients: ComplexArray  #: (q, 2) complex
+    scatter: ComplexArray  #: (q, q) complex: residual covariance of the windows that belong together
     exact: bool = False
 
 

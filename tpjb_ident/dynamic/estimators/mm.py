@@ -30,12 +30,9 @@ _MAX_ITERATIONS = 200
 class RobustFit:
     """Y = X B' with robust weights."""
 
-    #: (q, p) complex: B: y = B x per window
-    coefficients: ComplexArray
-    #: (q, q) complex
-    scatter: ComplexArray
-    #: (n,), 0, 1: in
-    weights: FloatArray
+    coefficients: ComplexArray  #: (q, p) complex: B: y = B x per window
+    scatter: ComplexArray  #: (q, q) complex
+    weights: FloatArray  #: (n,), 0, 1: in
     iterations: int
     conditions: tuple[Condition, ...]
 

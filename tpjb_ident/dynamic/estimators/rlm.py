@@ -50,12 +50,9 @@ NormValues = tuple[FloatArray, FloatArray, FloatArray]
 class RlmSolution:
     """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it."""
 
-    #: (p,)
-    params: FloatArray
-    #: (p, p): H1, scaled
-    covariance: FloatArray
-    #: (m,)
-    weights: FloatArray
+    params: FloatArray  #: (p,)
+    covariance: FloatArray  #: (p, p): H1, scaled
+    weights: FloatArray  #: (m,)
     scale: float
     iterations: int
     conditions: tuple[Condition, ...] = ()
@@ -141,14 +138,10 @@ def _mass_scale(model: Any, residual: FloatArray) -> float:
 class RlmFit:
     """H from two real robust regressions, one per force axis."""
 
-    #: (2, 2) complex
-    h: ComplexArray
-    #: (8, 8)
-    covariance: FloatArray
-    #: (8,)
-    dof: FloatArray
-    #: (n, 2)
-    weights: FloatArray
+    h: ComplexArray  #: (2, 2) complex
+    covariance: FloatArray  #: (8, 8)
+    dof: FloatArray  #: (8,)
+    weights: FloatArray  #: (n, 2)
     conditions: tuple[Condition, ...]
 
 

@@ -28,11 +28,9 @@ CLEAR = 1e-3
 class DirectionMeans:
     """What the directions say, each averaged over its good windows."""
 
-    #: `D`, `F` (g, 2) complex
-    D: ComplexArray
+    D: ComplexArray  #: `D`, `F` (g, 2) complex
     F: ComplexArray
-    #: (g,): effective number of windows behind each
-    count: FloatArray
+    count: FloatArray  #: (g,): effective number of windows behind each
 
     def __len__(self) -> int:
         return len(self.count)
@@ -87,15 +85,11 @@ def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: Complex
 class VarianceByDirection:
     """What every direction contributes to the estimating equations of h, and what their repeats say."""
 
-    #: (g, 4) complex: to the equations
-    score: ComplexArray
-    #: (g, 4, 4) complex: to their matrix
-    parts: ComplexArray
-    #: (4, 4) complex
-    repeat: ComplexArray
+    score: ComplexArray  #: (g, 4) complex: to the equations
+    parts: ComplexArray  #: (g, 4, 4) complex: to their matrix
+    repeat: ComplexArray  #: (4, 4) complex
     dof_repeat: float
-    #: (8, 8)
-    pooled: FloatArray | None = None
+    pooled: FloatArray | None = None  #: (8, 8)
 
 
 def spread_of(

@@ -29,12 +29,9 @@ FAR = 4.0
 class ZeroAmplitude:
     """How H changes with the square of the motion at one point."""
 
-    #: (2, 2) complex, N/m: G: by which H is larger at the runs' mean square motion than at none
-    change: ComplexArray
-    #: (n_runs,): square of every run's motion over its mean
-    square: FloatArray
-    #: (8, 8), (N/m)^2: covariance that the uncertainty of G leaves on H
-    left: FloatArray = field(repr=False)
+    change: ComplexArray  #: (2, 2) complex, N/m: G: by which H is larger at the runs' mean square motion than at none
+    square: FloatArray  #: (n_runs,): square of every run's motion over its mean
+    left: FloatArray = field(repr=False)  #: (8, 8), (N/m)^2: covariance that the uncertainty of G leaves on H
     share: float
 
     def apply(self, data: PointData) -> PointData:

@@ -46,10 +46,8 @@ class BalanceRun:
     """Means of one run at its excitation line."""
 
     frequency: float
-    #: (2,) complex, N
-    cells: ComplexArray
-    #: (2,) complex, m/s^2
-    acceleration: ComplexArray
+    cells: ComplexArray  #: (2,) complex, N
+    acceleration: ComplexArray  #: (2,) complex, m/s^2
     inertia: float
     mass: float = 0.0
     variance: float = 0.0

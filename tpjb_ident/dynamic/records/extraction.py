@@ -123,12 +123,9 @@ class _Work:
 class _Times:
     """Times of some windows."""
 
-    #: (n,), s: of every window
-    start: FloatArray
-    #: (n, length): of every sample, where they are not on an even grid
-    stamps: FloatArray | None
-    #: (m,): windows that are to be fitted by their stamps
-    uneven: IntArray
+    start: FloatArray  #: (n,), s: of every window
+    stamps: FloatArray | None  #: (n, length): of every sample, where they are not on an even grid
+    uneven: IntArray  #: (m,): windows that are to be fitted by their stamps
 
 
 def _times(time: FloatArray | None, first: int, stop: int, fitter: LineFitter) -> _Times:

@@ -30,12 +30,9 @@ _ROUNDS = 12
 class RobustLines:
     """A fit, and which samples it rests on."""
 
-    #: (q, n_columns): of every channel; NaN where too few samples are left
-    coefficients: FloatArray
-    #: (q,): robust standard deviation of the residuals
-    scale: FloatArray
-    #: (n,): samples neither missing nor glitched, of all channels together
-    kept: BoolArray
+    coefficients: FloatArray  #: (q, n_columns): of every channel; NaN where too few samples are left
+    scale: FloatArray  #: (q,): robust standard deviation of the residuals
+    kept: BoolArray  #: (n,): samples neither missing nor glitched, of all channels together
     lost: float
 
 

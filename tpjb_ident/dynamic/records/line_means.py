@@ -14,10 +14,8 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors
 class LineMean:
     """One line of a run."""
 
-    #: (2,) complex, m
-    displacement: ComplexArray
-    #: (2,) complex, N
-    force: ComplexArray
+    displacement: ComplexArray  #: (2,) complex, m
+    force: ComplexArray  #: (2,) complex, N
     displacement_error: float
     force_error: float
     shared: bool = False

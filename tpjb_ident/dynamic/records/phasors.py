@@ -73,14 +73,10 @@ class WaveBlocks:
 class PhasorBlock:
     """Phasors of one vector quantity in some windows of one run."""
 
-    #: (n_windows, n_lines, 2) complex: X and Y at every line, SI; NaN where a window gave none
-    phasors: ComplexArray
-    #: (n_windows, 2): mean of the quantity, SI
-    mean: FloatArray
-    #: (n_windows, 2): robust standard deviation of what the lines leave
-    noise: FloatArray
-    #: (n_windows,): share of the samples left out (glitches, missing values)
-    lost: FloatArray
+    phasors: ComplexArray  #: (n_windows, n_lines, 2) complex: X and Y at every line, SI; NaN where a window gave none
+    mean: FloatArray  #: (n_windows, 2): mean of the quantity, SI
+    noise: FloatArray  #: (n_windows, 2): robust standard deviation of what the lines leave
+    lost: FloatArray  #: (n_windows,): share of the samples left out (glitches, missing values)
 
 
 class LineFitter:

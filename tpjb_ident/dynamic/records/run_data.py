@@ -79,18 +79,15 @@ class RunPhasors:
     point: OperatingPoint
     direction: float | None
     lines: LineSet
-    #: (n,), s: start of every window
-    start: FloatArray
+    start: FloatArray  #: (n,), s: start of every window
     length: float
     displacement: PhasorBlock
     cell_force: PhasorBlock
     acceleration: PhasorBlock | None
     housing_mass: float
-    #: (n,)
-    speeds: FloatArray
+    speeds: FloatArray  #: (n,)
     conditions: tuple[Condition, ...] = ()
-    #: (n_lines,) complex
-    shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))
+    shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (n_lines,) complex
 
     @property
     def blocks(self) -> dict[str, PhasorBlock]:

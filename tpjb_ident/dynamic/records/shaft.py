@@ -28,10 +28,8 @@ LOOK = 2**17
 class ShaftCourse:
     """Shaft speed over a run, whatever windows it was found in: a second fit may cut the run otherwise."""
 
-    #: (n,), s: middle of the windows in which it was found
-    time: FloatArray
-    #: (n,)
-    speed: FloatArray
+    time: FloatArray  #: (n,), s: middle of the windows in which it was found
+    speed: FloatArray  #: (n,)
 
     def at(self, time: FloatArray) -> FloatArray:
         """Speed at `time` (m,) [s], [Hz]."""

@@ -30,14 +30,10 @@ class FrequencyFit:
     """One model over the frequencies of one load."""
 
     model: str
-    #: (2, 2), N/m
-    K: FloatArray
-    #: (2, 2), N s/m
-    C: FloatArray
-    #: (2, 2), kg
-    M: FloatArray
-    #: (p, p)
-    covariance: FloatArray = field(repr=False)
+    K: FloatArray  #: (2, 2), N/m
+    C: FloatArray  #: (2, 2), N s/m
+    M: FloatArray  #: (2, 2), kg
+    covariance: FloatArray = field(repr=False)  #: (p, p)
     chi_square: float
     dof: int
     n_frequencies: int

@@ -37,8 +37,7 @@ class Pairs:
     """The two probes and the two cells of a rig."""
 
     names: tuple[str, ...]
-    #: `probe_plane`, `cell_plane` (2, 2): from two readings to X and Y
-    probe_plane: FloatArray
+    probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from two readings to X and Y
     cell_plane: FloatArray
     centre: tuple[float | None, float | None]
 

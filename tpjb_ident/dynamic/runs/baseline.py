@@ -25,8 +25,7 @@ class Baseline:
     """Dynamic stiffness of the rig alone, over the frequencies at which it was measured."""
 
     estimates: tuple[DynamicStiffness, ...] = ()
-    #: where no run gives an answer
-    conditions: tuple[Condition, ...] = ()
+    conditions: tuple[Condition, ...] = ()  #: where no run gives an answer
 
     def at(self, omega: float) -> tuple[ComplexArray, FloatArray] | None:
         """H (2, 2) and its covariance (8, 8) at `omega` [rad/s], linear between frequencies; None outside them."""

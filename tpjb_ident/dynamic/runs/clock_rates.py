@@ -27,8 +27,7 @@ MIN_WINDOWS = 4
 class RateSamples:
     """Rate differences that single runs show."""
 
-    #: `force`, `acceleration` (n, 3), rad
-    force: FloatArray
+    force: FloatArray  #: `force`, `acceleration` (n, 3), rad
     acceleration: FloatArray
 
 

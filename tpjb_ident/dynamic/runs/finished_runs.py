@@ -39,15 +39,12 @@ class RunDigest:
     point: OperatingPoint
     excitations: tuple[float, ...]
     conditions: tuple[Condition, ...]
-    #: (2,), N
-    mean_load: FloatArray
-    #: (2,) complex, m: displacement at the mains line, where it stands apart
-    mains: ComplexArray | None
+    mean_load: FloatArray  #: (2,), N
+    mains: ComplexArray | None  #: (2,) complex, m: displacement at the mains line, where it stands apart
     temperatures: dict[int, float]
     harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
     sample_rate: float = 0.0
-    #: (2,) complex, N: oil force at the mains line, where it stands apart
-    mains_force: ComplexArray | None = None
+    mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     seen: tuple[Observation, ...] = field(default=(), repr=False)
 
 

@@ -23,17 +23,12 @@ class PointData:
     point: OperatingPoint
     runs: tuple[RunPhasors, ...]
     lines: tuple[int, ...]
-    #: (n, 2) complex, m
-    D: ComplexArray
-    #: (n, 2) complex, N
-    F: ComplexArray
-    #: (n, 2) complex, m/s^2
-    A: ComplexArray
-    #: (n,): windows of one run are repeats of one excitation
-    run_index: IntArray
+    D: ComplexArray  #: (n, 2) complex, m
+    F: ComplexArray  #: (n, 2) complex, N
+    A: ComplexArray  #: (n, 2) complex, m/s^2
+    run_index: IntArray  #: (n,): windows of one run are repeats of one excitation
     found: float = 0.0
-    #: (n_runs,) complex
-    shaft: ComplexArray | None = None
+    shaft: ComplexArray | None = None  #: (n_runs,) complex
 
     @property
     def omega(self) -> float:
