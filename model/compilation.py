@@ -46,7 +46,7 @@ KERNELS = (
     "statics/compiled/step.py",
 )
 #: Sums may be reordered, but NaN and infinity keep their meaning.
-OPTIONS: dict[str, Any] = {
+_OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
     "nogil": True,
@@ -61,7 +61,7 @@ _NO_PLACE = (
 _inner: list[Callable[..., Any]] = []
 
 
-class Kernel:
+class _Kernel:
     """A loop that is compiled at its first call, or taken from the disk; inside other loops it is part of them."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -91,8 +91,8 @@ def _compiler() -> Any:
     if folder.lower() not in ("", "off") and "NUMBA_CACHE_DIR" not in os.environ:  # as pad solutions are
         numba.config.CACHE_DIR = str(Path(folder) / "compiled")  # type: ignore[attr-defined]
 
-    @numba.extending.typeof_impl.register(Kernel)
-    def type_of(kernel: Kernel, context: Any) -> Any:
+    @numba.extending.typeof_impl.register(_Kernel)
+    def type_of(kernel: _Kernel, context: Any) -> Any:
         return numba.typeof(kernel.dispatcher)
 
     return numba
@@ -139,12 +139,12 @@ def _cache_type() -> Any:
 def _register_inner_loops() -> None:
     numba = _compiler()
     while _inner:
-        numba.extending.register_jitable(**OPTIONS)(_inner.pop())
+        numba.extending.register_jitable(**_OPTIONS)(_inner.pop())
 
 
 def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
     try:
-        dispatcher = numba.njit(cache=True, **OPTIONS)(function)
+        dispatcher = numba.njit(cache=True, **_OPTIONS)(function)
     except RuntimeError as error:
         if "cannot cache" not in str(error):
             raise
@@ -163,7 +163,7 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
 
 def _without_cache(numba: Any, function: Callable[..., Any]) -> Any:
     _register_inner_loops()
-    return numba.njit(**OPTIONS)(function)
+    return numba.njit(**_OPTIONS)(function)
 
 
 def inner(function: Function) -> Function:
@@ -177,5 +177,5 @@ def inner(function: Function) -> Function:
 
 def compiled(function: Function) -> Function:
     """Compile with numba, cached on disk under the stamp of all kernels: a way in from Python."""
-    kernel: Any = Kernel(function)
+    kernel: Any = _Kernel(function)
     return kernel  # type: ignore[no-any-return]

@@ -26,9 +26,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
 #: Turns of pressure and deformation, and the share of the deformation at which they end.
-MOST_TURNS, SETTLED = 40, 1e-7
+_MOST_TURNS, _SETTLED = 40, 1e-7
 #: Halvings of the amplitude with which a pivot with friction vibrates.
-HALVINGS = 60
+_HALVINGS = 60
 
 
 def flexing_impedance(
@@ -84,10 +84,10 @@ class _Bend:
         body, factor = self.body, self.factor
         closed = np.eye(len(body.response)) - factor * (body.response @ (self.still + 1j * omega * self.moving))
         pressure, bent = rigid, np.zeros((*self.film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
-        for _ in range(MOST_TURNS):
+        for _ in range(_MOST_TURNS):
             wanted = factor * (body.compliance @ _everywhere(self.film, pressure))
             missing = wanted - bent.reshape(wanted.shape)
-            if not np.abs(missing).max() > SETTLED * np.abs(wanted).max():
+            if not np.abs(missing).max() > _SETTLED * np.abs(wanted).max():
                 return pressure
             asked = body.amplitudes @ missing
             bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
@@ -145,7 +145,7 @@ def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: fl
     # tilted as far as the contact gives, it would take more than there is
     held = np.abs(pad_impedance + stick) * low >= drive
     high = np.maximum(2.0 * low, 2.0 * drive / np.maximum(np.abs(pad_impedance), 1e-30) + 2.0 * low)
-    for _ in range(HALVINGS):
+    for _ in range(_HALVINGS):
         middle = np.sqrt(low * high)
         short = np.abs(pad_impedance + describing(middle, stick, slip)) * middle < drive
         low, high = np.where(short, middle, low), np.where(short, high, middle)
@@ -174,7 +174,7 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
     smooth = setup.change(friction=0.0) if setup.friction else setup
     hold = tilt_hold(smooth, film.tilt, load)
     friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
-    frame, moments = pad_frames(film, hold.arm)
+    frame, moments = _pad_frames(film, hold.arm)
     offset = mass_centre_offset(setup, film)
     coupling = -pad.mass * offset  # the centre moves outward by eta - b tilt
     return PadMatrices(
@@ -188,7 +188,7 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
     )
 
 
-def pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
+def _pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
     """J = d(a, b)/d(x, y, theta, eta), (2, 4), and what the film's forces do in these directions."""
     frame = np.array(
         [
@@ -252,7 +252,7 @@ def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray,
     """One pad of Eq. (10) whose pivot sticks or slides, X and Y excited one at a time."""
     out = z[:, :2, :2].copy()
     internal = slice(2, 2 + film.shape[1])
-    loose = broken_loose(pad, z, film, vibration)
+    loose = _broken_loose(pad, z, film, vibration)
     for axis in range(2):
         pads = film.copy()
         pads[:, 0, 0] += loose[:, axis] - pad.friction[0]
@@ -261,7 +261,7 @@ def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray,
     return out
 
 
-def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
+def _broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
     """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
     stick, slip = pad.friction
     pad_impedance, drive = film[:, 0, 0] - stick, z[:, 2, :2]
@@ -271,7 +271,7 @@ def broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibratio
     return friction_impedance(np.repeat(pad_impedance[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
 
 
-def axial_inertia(setup: Setup, film: PadFilm) -> float:
+def _axial_inertia(setup: Setup, film: PadFilm) -> float:
     """Moment of inertia of a pad about the axis across it through its pivot [kg m^2], of a sector of a ring."""
     pad = film.pad
     inner = setup.bearing.journal_radius + pad.pad_clearance
@@ -296,10 +296,10 @@ def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray)
 
 
 def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:
-    """`pad_frames` of a pad as it stands."""
+    """`_pad_frames` of a pad as it stands."""
     assert film.forces is not None
     smooth = setup.change(friction=0.0) if setup.friction else setup
-    return pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
+    return _pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
 
 
 def _shape_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
@@ -309,7 +309,7 @@ def _shape_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: 
     axial = None
     if setup.pads_follow:
         assert film.forces is not None
-        axial = axial_tilt_of(setup, film, film.work.pressure, film.forces), axial_inertia(setup, film)
+        axial = axial_tilt_of(setup, film, film.work.pressure, film.forces), _axial_inertia(setup, film)
     flexing = flexing_impedance(film, equilibrium.position, omega, factor, axial)
     return np.asarray(moments.T @ flexing @ frame, dtype=np.complex128)
 
@@ -346,7 +346,7 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
             continue
         internal = slice(2, 3 if math.isinf(pad.pad_stiffness[1, 1]) else 4)
         z, film_part = _impedances([pad], omega, internal, None)
-        free = np.abs(broken_loose(pad, z[0], film_part[0], setup.vibration)) < pad.friction[0]
+        free = np.abs(_broken_loose(pad, z[0], film_part[0], setup.vibration)) < pad.friction[0]
         (loose if free.any() else held).append(film.number)
     names = []
     if held:

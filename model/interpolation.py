@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 
 #: Steps of `bracketed_root`; each halves the bracket at least every third time.
-MOST_STEPS = 200
+_MOST_STEPS = 200
 
 
 def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -57,7 +57,7 @@ def bracketed_root(function: Callable[[float], float], low: float, high: float, 
     if at_low * at_high > 0.0:
         raise ValueError(f"no change of sign between {low:g} and {high:g}")
     last = low
-    for _ in range(MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         middle = 0.5 * (low + high)
         value = function(middle)
         scale = max(abs(value), abs(at_low), abs(at_high))

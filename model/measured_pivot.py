@@ -12,12 +12,12 @@ from model.interpolation import monotone_cubics
 from rigdata.arrays import FloatArray
 
 
-class PivotCurveError(ModelError):
+class _PivotCurveError(ModelError):
     """A measured load-deflection curve that no pivot has."""
 
 
 #: Least part of a measured give that a pivot keeps when a housing is taken off it.
-LEAST_SHARE = 0.02
+_LEAST_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value: a curve equals itself only
@@ -38,19 +38,19 @@ class MeasuredPivot:
     def __post_init__(self) -> None:
         load, points = np.asarray(self.load, float), np.asarray(self.deflection_points, float)
         if load.ndim != 1 or load.shape != points.shape or len(load) < 2:
-            raise PivotCurveError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
+            raise _PivotCurveError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
         if not (np.all(np.isfinite(load)) and np.all(np.isfinite(points))):
-            raise PivotCurveError("a pivot curve must be finite")
+            raise _PivotCurveError("a pivot curve must be finite")
         if np.any(np.diff(load) <= 0) or np.any(np.diff(points) <= 0):
-            raise PivotCurveError("a pivot curve must rise strictly in load and deflection")
+            raise _PivotCurveError("a pivot curve must rise strictly in load and deflection")
         with np.errstate(over="ignore"):  # an infinite slope is refused in the next line
             slopes = np.diff(points) / np.diff(load)
         if not np.all((slopes > 1e-100) & (slopes < 1e100)):
-            raise PivotCurveError("a pivot curve must have slopes that are numbers")
+            raise _PivotCurveError("a pivot curve must have slopes that are numbers")
         if load[0] != 0.0 or points[0] != 0.0:
             load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
             if load[1] <= 0 or points[1] <= 0:
-                raise PivotCurveError("a pivot curve must start at or above zero load and deflection")
+                raise _PivotCurveError("a pivot curve must start at or above zero load and deflection")
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "deflection_points", points)
         object.__setattr__(self, "_coefficients", monotone_cubics(load, points))
@@ -93,13 +93,13 @@ class MeasuredPivot:
     def without_housing(self, compliance: float) -> MeasuredPivot:
         """Return the pivot alone, where a housing of this compliance [m/N] is modelled apart from it.
 
-        What is left keeps at least `LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
+        What is left keeps at least `_LEAST_SHARE` of the measured give: a housing softer than the curve it is part of
         cannot be taken off it. A curve that holds no housing is returned as it is; of one that does, more than one
         part of the structure may be taken off.
         """
         if not self.includes_housing:
             return self
         deflections = np.diff(self.deflection_points)
-        alone = np.maximum(deflections - compliance * np.diff(self.load), LEAST_SHARE * deflections)
+        alone = np.maximum(deflections - compliance * np.diff(self.load), _LEAST_SHARE * deflections)
         points = np.concatenate([[0.0], np.cumsum(alone)])
         return replace(self, deflection_points=points)

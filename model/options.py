@@ -10,7 +10,7 @@ from model.growth import Growth
 
 #: Names of the models of a rupturing film.
 CAVITATION = tuple(FILM_MODELS)
-TURBULENCE = ("none", "ng-pan")
+_TURBULENCE = ("none", "ng-pan")
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Options:
 
     def __post_init__(self) -> None:
         check_known("cavitation", self.cavitation, FILM_MODELS)
-        check_known("turbulence", self.turbulence, TURBULENCE)
+        check_known("turbulence", self.turbulence, _TURBULENCE)
         if self.turbulence != "none" and self.cavitation != "swift-stieber":
             raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")
         if self.perturbed_heat and (self.cavitation, self.turbulence) != ("swift-stieber", "none"):

@@ -26,12 +26,12 @@ from rigdata.problem import Condition
 from rigdata.units import UnitError, to_si
 
 #: No shaker excites faster [rad/s]; beyond, squares overflow.
-FASTEST = 1e9
+_FASTEST = 1e9
 #: Loads below do not push [N].
-NO_LOAD = 1e-200
+_NO_LOAD = 1e-200
 
 
-class OperatingPointError(ModelError):
+class _OperatingPointError(ModelError):
     """A load, direction, speed or excitation that no bearing can have."""
 
 
@@ -113,18 +113,18 @@ def _mesh(mesh: Any) -> Mesh:
 
 def _number(value: Any, dimension: str, name: str) -> float:
     if isinstance(value, bool):
-        raise OperatingPointError(f"{name} must be a number, got {value!r}")
+        raise _OperatingPointError(f"{name} must be a number, got {value!r}")
     try:
         return float(_in_si(value, dimension, name))
     except TypeError as error:
-        raise OperatingPointError(f"{name} must be a number, got {value!r}") from error
+        raise _OperatingPointError(f"{name} must be a number, got {value!r}") from error
 
 
 def _in_si(value: Any, dimension: str, name: str) -> Any:
     try:
         return to_si(value, dimension, name)
     except UnitError as error:
-        raise OperatingPointError(str(error)) from error
+        raise _OperatingPointError(str(error)) from error
 
 
 def predict_setup(
@@ -134,10 +134,10 @@ def predict_setup(
     try:
         omega = np.asarray(excitation, float)
     except TypeError as error:
-        raise OperatingPointError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
+        raise _OperatingPointError(f"excitation must be numbers [rad/s], got {excitation!r}") from error
     _check_point(load, load_direction, speed, omega)
     # A load near the smallest float is none: its quotients would not be numbers.
-    pushing = load if load > NO_LOAD else 0.0
+    pushing = load if load > _NO_LOAD else 0.0
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
     setup, equilibrium = solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
@@ -190,15 +190,15 @@ def solve_as_it_runs(
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
     if not (math.isfinite(load) and load >= 0):
-        raise OperatingPointError(
+        raise _OperatingPointError(
             f"load must be zero or positive [N], got {load!r}; give its direction as load_direction"
         )
     if not math.isfinite(direction):
-        raise OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
+        raise _OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
     if not (math.isfinite(speed) and speed > 0):
-        raise OperatingPointError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
-    if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < FASTEST)):
-        raise OperatingPointError(
-            f"excitation must be a positive number below {FASTEST:g} rad/s or a 1-D array of them, "
+        raise _OperatingPointError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
+    if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < _FASTEST)):
+        raise _OperatingPointError(
+            f"excitation must be a positive number below {_FASTEST:g} rad/s or a 1-D array of them, "
             f"got {np.array2string(omega, threshold=4, precision=3)}"
         )

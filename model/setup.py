@@ -16,13 +16,13 @@ from model.options import Options
 from model.pivots import PivotLaw
 from rigdata.arrays import FloatArray
 
-THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
+_THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 #: Those with pads that deform.
-BENDING = ("tehd", "thd")
+_BENDING = ("tehd", "thd")
 
 #: lambda of `thermal="thd"` where the effect `hot_oil_carryover` says nothing: the groove's flow balance alone, what a
 #: pad leaves is there for the next one and the supply makes up for the rest.
-GROOVE_MIXING = 1.0
+_GROOVE_MIXING = 1.0
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Setup:
     grown: bool = False
 
     def __post_init__(self) -> None:
-        check_known("thermal", self.thermal, THERMAL)
+        check_known("thermal", self.thermal, _THERMAL)
         if self.thermal == "thd" and (self.options.cavitation, self.options.turbulence) != ("swift-stieber", "none"):
             raise OptionError('thermal "thd" is for laminar films that rupture by swift-stieber; take "adiabatic"')
         if self.thermal == "thd" and self.options.perturbed_heat:
@@ -162,7 +162,7 @@ class Setup:
     @property
     def mixing(self) -> float:
         """Share lambda of the oil leaving a pad that is there for the next: `carryover`, or all of it (`thd`)."""
-        return self.carryover or (GROOVE_MIXING if self.thermal == "thd" else 0.0)
+        return self.carryover or (_GROOVE_MIXING if self.thermal == "thd" else 0.0)
 
     @property
     def structure(self) -> FloatArray:
@@ -173,7 +173,7 @@ class Setup:
     @property
     def flexible_pads(self) -> bool:
         """Whether pads deform."""
-        return self.thermal in BENDING or self.bending != 0.0
+        return self.thermal in _BENDING or self.bending != 0.0
 
     @property
     def pads_follow(self) -> bool:
@@ -185,7 +185,7 @@ class Setup:
         """Factor on the computed deformation (1 for ``tehd`` and ``thd`` with nothing else said)."""
         if self.bending:
             return self.bending
-        return 1.0 if self.thermal in BENDING else 0.0
+        return 1.0 if self.thermal in _BENDING else 0.0
 
     @property
     def growth(self) -> Growth | None:

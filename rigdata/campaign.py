@@ -22,7 +22,7 @@ from rigdata.run import Run
 from rigdata.safe_path import inside
 
 MANIFEST_NAME = "campaign.toml"
-HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+_HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
 
 
@@ -177,7 +177,7 @@ def _kind_of(source: Path) -> str:
     if source.is_dir():
         if (source / MANIFEST_NAME).exists():
             return "folder"
-        inside_it = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in HDF5_SUFFIXES][:3]
+        inside_it = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in _HDF5_SUFFIXES][:3]
         hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
         cure = f"Give the folder that holds {MANIFEST_NAME}{hint}; `tpjb init FOLDER` drafts one for records"
         raise refuse(str(source), "", f"the folder has no {MANIFEST_NAME}", cure)

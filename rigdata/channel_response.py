@@ -13,8 +13,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.units import UnitError, parse_quantity
 
-FAMILIES = ("bessel", "butterworth")
-SIDES = ("low", "high")
+_FAMILIES = ("bessel", "butterworth")
+_SIDES = ("low", "high")
 _MAX_ORDER = 12
 _SAY = 'Write for instance "bessel 4 low 800 Hz": bessel or butterworth, order, low or high, corner frequency'
 
@@ -43,7 +43,7 @@ class AnalogFilter:
 def parse_filter(text: str) -> AnalogFilter:
     """Read ``"bessel 4 low 800 Hz"``."""
     parts = text.split(None, 3)
-    if len(parts) != 4 or parts[0].lower() not in FAMILIES or parts[2].lower() not in SIDES:
+    if len(parts) != 4 or parts[0].lower() not in _FAMILIES or parts[2].lower() not in _SIDES:
         raise UnitError(f"{text[:60]!r} is no filter. {_SAY}")
     if not (parts[1].isdecimal() and 1 <= int(parts[1]) <= _MAX_ORDER):
         raise UnitError(f"order {parts[1][:20]!r} is not a whole number from 1 to {_MAX_ORDER}. {_SAY}")

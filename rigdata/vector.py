@@ -33,7 +33,7 @@ def inverse_directions(axes: tuple[float, ...]) -> FloatArray:
     return np.asarray(inverse)
 
 
-def vector_plan(channels: Sequence[Channel]) -> tuple[FloatArray, FloatArray]:
+def _vector_plan(channels: Sequence[Channel]) -> tuple[FloatArray, FloatArray]:
     """Matrix (2, m) and shift (2,) that turn raw readings into X and Y [SI]: ``matrix @ readings + shift``."""
     inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
     inverse = np.where(np.abs(inverse) < 1e-12, 0.0, inverse)  # cos 90 deg is not quite zero, but a pass over the data
@@ -69,7 +69,7 @@ def _complete(values: FloatArray) -> bool:
 def _product(channels: Sequence[Channel], readings: Sequence[FloatArray] | FloatArray) -> FloatArray:
     """``matrix @ readings + shift``, row by row: 20 times quicker than a product per sample."""
     rows = np.empty((2, len(readings[0])))
-    for row, weights, offset in zip(rows, *vector_plan(channels), strict=True):
+    for row, weights, offset in zip(rows, *_vector_plan(channels), strict=True):
         first, *further = np.flatnonzero(weights).tolist()
         np.multiply(readings[first], weights[first], out=row)
         for index in further:

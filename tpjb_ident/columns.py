@@ -16,7 +16,7 @@ UNITS = {
     "frequency": ("Hz", 1.0),
     "share": ("%", 0.01),
 }
-SYMBOLS = {quantity: symbol for quantity, (symbol, _) in UNITS.items()}
+_SYMBOLS = {quantity: symbol for quantity, (symbol, _) in UNITS.items()}
 
 
 class Column(NamedTuple):
@@ -35,7 +35,7 @@ class Column(NamedTuple):
     @property
     def heading(self) -> str:
         """Title with the unit."""
-        return self.title.format_map(SYMBOLS)
+        return self.title.format_map(_SYMBOLS)
 
     def cell(self, value: Any) -> str:
         """Write a value of this column: a number, several, words, or None."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Rows of a table in a notebook.
-MOST_ROWS = 30
+_MOST_ROWS = 30
 #: Unit in a column's name: the unit that people read, and its size.
 _DISPLAYED = {**{kind.suffix: (kind.display_unit, kind.display_scale) for kind in KINDS.values()}, "N": ("kN", 1e3),
               "m": ("µm", 1e-6)}  # fmt: skip
@@ -50,7 +50,7 @@ class Presented:
 
     def _repr_html_(self) -> str:
         sentences = "".join(f"<p>{html.escape(line)}</p>" for line in self.summary().splitlines())
-        return f"{sentences}{_in_display_units(self.to_dataframe()).to_html(index=False, max_rows=MOST_ROWS)}"
+        return f"{sentences}{_in_display_units(self.to_dataframe()).to_html(index=False, max_rows=_MOST_ROWS)}"
 
 
 def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:

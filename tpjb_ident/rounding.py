@@ -6,7 +6,7 @@ import math
 
 MINUS = "\N{MINUS SIGN}"
 #: An interval that reaches this many times further to one side than to the other is told by its ends.
-ASKEW = 1.5
+_ASKEW = 1.5
 
 
 def counted(number: int, thing: str) -> str:
@@ -43,7 +43,7 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
         return f"{value / scale:.4g}".replace("-", MINUS)
     digits = max(0, 1 - math.floor(math.log10(half)))
     below, above = value - low, high - value
-    if max(below, above) > ASKEW * min(below, above):  # as where a bound cuts it off
+    if max(below, above) > _ASKEW * min(below, above):  # as where a bound cuts it off
         return f"{plain(value / scale, digits)} ({plain(low / scale, digits)} to {plain(high / scale, digits)})"
     return f"{plain(value / scale, digits)} ± {plain(half, digits)}"
 

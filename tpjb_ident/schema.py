@@ -89,19 +89,19 @@ def _coefficients(endings: tuple[str, ...], *kinds: Coefficient) -> tuple[Column
     return tuple(Column(kind.column("{e}"), kind.quantity, kind.unit, kind.meaning, endings) for kind in kinds)
 
 
-STATIC = (
+_STATIC = (
     Column("static_load_N", "force", "N", "static load, set point, per bearing"),
     Column("static_load_direction_deg", "angle", "deg", "where it pushes the shaft, counter-clockwise from x"),
     Column("shaft_speed_Hz", "frequency", "Hz", "set point of the shaft speed"),
 )
-POINT = (*STATIC, Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"))
-MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")
-QUALITY = Column("quality", "text", "", 'named conditions, "ok" if there are none')
-RUN = Column("run", "text", "", "id of the run")
+_POINT = (*_STATIC, Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"))
+_MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")
+_QUALITY = Column("quality", "text", "", 'named conditions, "ok" if there are none')
+_RUN = Column("run", "text", "", "id of the run")
 PAD = Column("pad", "count", "", "number of the pad, from 1")
-STATUS = Column("status", "text", "", "named conditions of the solution or the curve")
-CONVERGED = Column("converged", "truth value", "", "whether the model's solution converged")
-PIVOTS = Column("pivots", "text", "", "pivot model: rigid, kirk, kirk-secant or measured")
+_STATUS = Column("status", "text", "", "named conditions of the solution or the curve")
+_CONVERGED = Column("converged", "truth value", "", "whether the model's solution converged")
+_PIVOTS = Column("pivots", "text", "", "pivot model: rigid, kirk, kirk-secant or measured")
 
 
 def _position(endings: tuple[str, ...]) -> tuple[Column, ...]:
@@ -109,15 +109,15 @@ def _position(endings: tuple[str, ...]) -> tuple[Column, ...]:
 
 
 _ESTIMATES = (
-    *POINT,
-    MEASURED_LOAD,
+    *_POINT,
+    _MEASURED_LOAD,
     *_coefficients(_ALL, STIFFNESS, DAMPING),
     Column("method", "text", "", "estimator"),
     Column("n_records", "count", "", "runs that took part"),
     Column("n_windows", "count", "", "record windows that took part"),
     Column("condition_number", "number", "", "of the displacement directions"),
     Column("outlier_fraction", "share", "", "windows without weight"),
-    QUALITY,
+    _QUALITY,
     Column("quality_detail", "text", "", "the same with what was found"),
     Column("n_windows_rejected", "count", "", "windows without weight"),
     Column("coherence", "share", "", "force explained by the displacement, the smaller axis"),
@@ -133,7 +133,7 @@ _ESTIMATES = (
     Column("temperature_N_K", "temperature", "K", "mean film temperature of pad N"),
 )
 _BAND = (
-    *STATIC,
+    *_STATIC,
     Column("excitation", "text", "", "multisine, sweep, random or impact, as the manifest states it"),
 )
 _FRF = (
@@ -149,7 +149,7 @@ _FRF = (
     Column("n_averages", "count", "", "periods, or bins of a transform, that the line was averaged from"),
     Column("resolution_Hz", "frequency", "Hz", "width of the line"),
     Column("condition_number", "number", "", "of the displacement directions"),
-    QUALITY,
+    _QUALITY,
 )
 _CLEARANCE = (
     PAD,
@@ -158,31 +158,31 @@ _CLEARANCE = (
     Column("pad_angle_deg", "angle", "deg", "where the pad stands by the bearing file"),
     Column("fitted_angle_deg", "angle", "deg", "where its side of the polygon stands", ("_se",)),
     Column("push_load_N", "force", "N", "load of the sweep"),
-    STATIC[2],
+    _STATIC[2],
     Column("temperature_K", "temperature", "K", "mean temperature during the sweep"),
-    RUN,
+    _RUN,
 )
 _LOCUS = (
-    *STATIC,
-    MEASURED_LOAD,
+    *_STATIC,
+    _MEASURED_LOAD,
     Column("static_load_direction_measured_deg", "angle", "deg", "direction that the cells show"),
     *_position(("_se",)),
-    RUN,
+    _RUN,
 )
 #: Columns of every table by file name.
 TABLES: dict[str, tuple[Column, ...]] = {
     "coefficients": _ESTIMATES,
     "estimators": _ESTIMATES,
     "windows": (
-        RUN,
+        _RUN,
         Column("time_s", "time", "s", "start of the window in its run"),
         Column("excitation_direction_deg", "angle", "deg", "direction of the excitation"),
         Column("weight", "share", "", "final robust weight"),
         Column("reason", "text", "", "what gave it away"),
-        *POINT,
+        *_POINT,
     ),
     "frequency_fits": (
-        *STATIC,
+        *_STATIC,
         Column("model", "text", "", "K-C or K-C-M"),
         Column("supported", "text", "", "the simplest model that the load's data do not refuse"),
         Column("n_frequencies", "count", "", "excitation frequencies"),
@@ -209,10 +209,10 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("probability", "share", "", "of a chi-square as large by chance"),
         Column("largest_misfit", "share", "", "of h, noise taken off: what using the model costs"),
         *_coefficients(("_lo", "_hi", "_se", "_dof"), STIFFNESS, DAMPING, MASS),
-        QUALITY,
+        _QUALITY,
     ),
     "budget": (
-        *POINT,
+        *_POINT,
         Column("coefficient", "text", "", "kxx .. kyy, cxx .. cyy"),
         Column("unit", "text", "", "of its uncertainty"),
         Column("source", "text", "", "what makes it uncertain"),
@@ -222,7 +222,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("dof", "count", "", "degrees of freedom; infinite where it is stated or known"),
     ),
     "plain": (
-        *POINT,
+        *_POINT,
         *_coefficients(("_se",), STIFFNESS, DAMPING),
         Column("norm", "text", "", "of statsmodels' RLM"),
         Column("window_s", "time", "s", "length of a window"),
@@ -255,13 +255,13 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("includes_housing", "truth value", "", "the curve holds the housing's seat"),
         Column("relative_calibration", "share", "", "standard error of the whole curve's scale"),
         Column("runs", "text", "", "runs that took part"),
-        STATUS,
+        _STATUS,
     ),
     "locus": _LOCUS,
     "clearance": _CLEARANCE,
     "clearance_runs": _CLEARANCE,
     "clearance_pairs": (
-        RUN,
+        _RUN,
         Column("against", "text", "", "run that it is held against"),
         Column("compared", "text", "", "push load (only that differs) or condition"),
         PAD,
@@ -270,7 +270,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column(TANGENT, "stiffness", "N/m", "of the pivot between the two push loads", ("_se",)),
     ),
     "prediction": (
-        *POINT,
+        *_POINT,
         *_coefficients((), STIFFNESS, DAMPING),
         *_position(()),
         Column("padN_load_N", "force", "N", "load of pad N"),
@@ -292,25 +292,25 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("sommerfeld", "count", "", "S = mu N D L / W (R / Cb)^2 of the oil that enters"),
         Column("eccentricity_ratio", "share", "", "distance of the shaft from the bearing centre / mean Cb"),
         Column("attitude_angle_deg", "angle", "deg", "from the load's direction to the shaft, with rotation"),
-        CONVERGED,
+        _CONVERGED,
         Column("idle_pads", "text", "", "pads that carry nothing"),
         Column("mesh_error", "share", "", "estimated error of the direct coefficients from the mesh"),
-        STATUS,
+        _STATUS,
     ),
     "comparison": (
-        PIVOTS,
-        *POINT,
-        MEASURED_LOAD,
+        _PIVOTS,
+        *_POINT,
+        _MEASURED_LOAD,
         *_coefficients(_AGAINST, STIFFNESS, DAMPING),
         Column("x_m_predicted", "length", "m", "x of the shaft centre, predicted"),
         Column("y_m_predicted", "length", "m", "y of it"),
-        CONVERGED,
+        _CONVERGED,
         Column("pivot_extrapolated", "truth value", "", "a pad presses its pivot harder than the dry test did"),
-        QUALITY,
-        STATUS,
+        _QUALITY,
+        _STATUS,
     ),
     "locus_comparison": (
-        PIVOTS,
+        _PIVOTS,
         *_LOCUS,
         Column("x_m_predicted", "length", "m", "x of the shaft centre, predicted"),
         Column("y_m_predicted", "length", "m", "y of it"),

@@ -40,7 +40,7 @@ from rigdata.arrays import BoolArray, FloatArray
 
 
 @inner
-def jfo_slopes(
+def _jfo_slopes(
     grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, sharp: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows.
@@ -166,9 +166,9 @@ def _flows(work: FilmWork, faces: FaceFlows) -> None:
             work.flow_z[i, j] = -faces.across[i, j] * (p[i, j + 1] - p[i, j])
 
 
-MAX_STEPS = 4000
+_MAX_STEPS = 4000
 #: How many steps in a row may fail to lower the number of nodes on the wrong side before they change one at a time.
-PATIENCE = 8
+_PATIENCE = 8
 
 
 def solve_film_jfo(
@@ -210,7 +210,7 @@ def _conserve(
     steps = _pivot(grid, work, faces, (band, x))
     _read(work, x, grid.first)
     if steps > 0:
-        weight, slopes = jfo_slopes(grid, work, faces, x, sharp)
+        weight, slopes = _jfo_slopes(grid, work, faces, x, sharp)
         _leave_behind(grid, work, faces, slopes)
         _integrate(grid, work, weight, slopes, (force, stiffness, damping))
     return steps, force, stiffness, damping
@@ -230,8 +230,8 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
     """Solve F(x) = 0 by block principal pivoting; returns the number of factorisations, -2 if it did not settle."""
     band, x = space
     ruptured, first = work.ruptured, grid.first
-    fewest, patience = ruptured.size + 1, PATIENCE
-    for step in range(1, MAX_STEPS + 1):
+    fewest, patience = ruptured.size + 1, _PATIENCE
+    for step in range(1, _MAX_STEPS + 1):
         assemble_columns(band, faces, ruptured, first)
         factorise_columns(band)
         _drag(faces, ruptured, first, x)
@@ -242,7 +242,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
         if wrong + changed == 0:
             return step
         if wrong + changed < fewest:
-            fewest, patience = wrong + changed, PATIENCE
+            fewest, patience = wrong + changed, _PATIENCE
         else:
             patience -= 1
         if changed == 0 or patience >= 0:

@@ -24,12 +24,12 @@ from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
 #: Least share of its Couette flow that a cell is taken to carry downstream.
-LEAST_FLOW = 1e-3
+_LEAST_FLOW = 1e-3
 #: Net flow over the leading edge, as a share of the Couette flow, below which the heat balance there is said to be off.
-LEAST_NET_FLOW = 0.2
+_LEAST_NET_FLOW = 0.2
 #: Share of the net flow over the leading edge that may run back beside it before the same is said: with 0.15 a
 #: twentieth of the heat is missing in the balance, with 0.2 a seventh.
-MOST_BACK = 0.15
+_MOST_BACK = 0.15
 
 
 @compiled
@@ -88,10 +88,10 @@ def _make_less(temperature: FloatArray, thinning: float, dissipation: FloatArray
 def _flow_back(grid: FilmGrid, work: FilmWork, speed: float, flows: FloatArray) -> float:
     """See what `cross_operator` returns; `flows` of the cells over the leading edge."""
     net = np.sum(flows)
-    back = max(0.0, -np.sum(np.minimum(flows, 0.0)) - MOST_BACK * net) / max(net, 1e-300)
+    back = max(0.0, -np.sum(np.minimum(flows, 0.0)) - _MOST_BACK * net) / max(net, 1e-300)
     for j in range(flows.shape[0]):
         dragged = 0.25 * speed * (work.thickness[0, j] * work.density[0, j] + work.thickness[1, j] * work.density[1, j])
-        back = max(back, 1.0 - work.flow_x[0, j] / (LEAST_NET_FLOW * dragged * grid.height[j]))
+        back = max(back, 1.0 - work.flow_x[0, j] / (_LEAST_NET_FLOW * dragged * grid.height[j]))
     return back
 
 
@@ -203,7 +203,7 @@ def _box(
     for j in range(lines):
         h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
         station = conductivity * grid.dx * grid.height[j] / h
-        least = 0.25 * LEAST_FLOW * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
+        least = 0.25 * _LEAST_FLOW * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
         _upward(flows, sideways, grid.first, i, j, up[j])
         for m in range(cells):
             wide, at = edges[m + 1] - edges[m], 0.5 * (edges[m + 1] + edges[m])

@@ -24,9 +24,9 @@ from model.film.slopes import change_by_oil
 from rigdata.arrays import FloatArray
 
 #: Cells across the film: the temperatures of pad and film move by less than 0.2 K with twice as many.
-CELLS = 6
+_CELLS = 6
 #: Share of Chebyshev's spacing in that of the cells, the rest is uniform: thinner cells where the walls are.
-GRADING = 0.5
+_GRADING = 0.5
 
 
 class CrossFilm(NamedTuple):
@@ -68,11 +68,11 @@ class CrossOperator(NamedTuple):
         )
 
 
-def cross_film(work: FilmWork, temperature: float, cells: int = CELLS) -> CrossFilm:
+def cross_film(work: FilmWork, temperature: float, cells: int = _CELLS) -> CrossFilm:
     """Lay out a film of one temperature."""
     shape = work.temperature.shape
     uniform = np.arange(cells + 1) / cells
-    edges = GRADING * 0.5 * (1.0 - np.cos(np.pi * uniform)) + (1.0 - GRADING) * uniform
+    edges = _GRADING * 0.5 * (1.0 - np.cos(np.pi * uniform)) + (1.0 - _GRADING) * uniform
     return CrossFilm(
         edges,
         np.full((*shape, cells), temperature),

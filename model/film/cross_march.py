@@ -12,9 +12,9 @@ from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
 #: GMRES steps at most; what they leave contracts with the rest.
-STEPS = 12
+_STEPS = 12
 #: An answer beyond this is none [K^2].
-BOUNDLESS = 1e30
+_BOUNDLESS = 1e30
 
 
 @compiled
@@ -153,18 +153,18 @@ def conduct(
     flux, to_coarse, guess = pad
     rhs = np.dot(to_coarse, missing.copy().ravel())
     limit, size, shape = tolerance * tolerance * np.dot(rhs, rhs), rhs.size, missing.shape
-    steps, images, faces = np.empty((STEPS, size)), np.empty((STEPS, size)), np.empty((STEPS, *shape))
-    fields, heat_flow = np.empty((STEPS, *answer[0].shape)), np.empty(STEPS)
-    gram, projections, residual = np.empty((STEPS, STEPS)), np.empty(STEPS), rhs
+    steps, images, faces = np.empty((_STEPS, size)), np.empty((_STEPS, size)), np.empty((_STEPS, *shape))
+    fields, heat_flow = np.empty((_STEPS, *answer[0].shape)), np.empty(_STEPS)
+    gram, projections, residual = np.empty((_STEPS, _STEPS)), np.empty(_STEPS), rhs
     weights: Any = np.empty(0)
-    for k in range(STEPS):
+    for k in range(_STEPS):
         steps[k] = np.dot(guess, residual)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))
         heat_flow[k] = _conducted(film, operator, np.dot(flux, steps[k]), fields[k], faces[k])
         images[k] = steps[k] - np.dot(to_coarse, faces[k].ravel())
         gram[k, : k + 1] = np.dot(images[: k + 1], images[k])
         gram[: k + 1, k] = gram[k, : k + 1]
-        if not gram[k, k] < BOUNDLESS:
+        if not gram[k, k] < _BOUNDLESS:
             return np.nan
         gram[k, k] *= 1.0 + 1e-13  # images that hardly differ are of no use to each other
         projections[k] = np.dot(images[k], rhs)

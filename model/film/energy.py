@@ -21,9 +21,9 @@ from rigdata.arrays import FloatArray
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat
 #: carried along, and with less than this the temperature there runs away. Bearings as they are run stay above it.
-LEAST_FLOW = 0.2
+_LEAST_FLOW = 0.2
 #: Below, an oil does not thin [1/K].
-LEAST_THINNING = 1e-6
+_LEAST_THINNING = 1e-6
 
 
 @compiled
@@ -77,9 +77,9 @@ def _march_lines(
             dragged = h[i, j] * density[i, j] + h[i + 1, j] * density[i + 1, j]
             couette = 0.25 * running.speed * dragged * grid.height[j]
             flow = flow_x[i, j]
-            if flow < LEAST_FLOW * couette:
+            if flow < _LEAST_FLOW * couette:
                 limited = max(limited, 1.0 - flow / couette)
-                flow = LEAST_FLOW * couette
+                flow = _LEAST_FLOW * couette
             # factors of (T[j-1] - T[j]) and (T[j+1] - T[j]); half of them act at i, half at i + 1
             low = high = 0.0
             if j > 0:
@@ -152,7 +152,7 @@ def heat_by_drag(
             h = wedge[0] - wedge[1] * grid.cos_face[i - 1] - wedge[2] * grid.sin_face[i - 1]
             along += grid.dx / h**2
         rise = 2.0 * fluid * speed / heat * along  # of oil that does not thin
-        work.temperature[i] = inlet + (np.log(1.0 + oil[1] * rise) / oil[1] if oil[1] > LEAST_THINNING else rise)
+        work.temperature[i] = inlet + (np.log(1.0 + oil[1] * rise) / oil[1] if oil[1] > _LEAST_THINNING else rise)
 
 
 @compiled

@@ -25,7 +25,7 @@ from model.film.slopes import keep_ruptured, net_inflow
 from rigdata.arrays import ComplexArray, FloatArray
 
 #: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
-MOST_TURNS, SETTLED = 60, 1e-7
+_MOST_TURNS, _SETTLED = 60, 1e-7
 
 
 class _Change(NamedTuple):
@@ -53,7 +53,7 @@ def heat_impedance(
         )
         settled = False
         answer = np.zeros(work.unknown.shape[0], dtype=np.complex128)
-        for _ in range(MOST_TURNS):
+        for _ in range(_MOST_TURNS):
             for i in range(1, nt):
                 for j in range(grid.first, nz):
                     k = (i - 1) * (nz - grid.first) + j - grid.first
@@ -63,7 +63,7 @@ def heat_impedance(
             asked, size = _step_and_size(new, change.warmer)
             change.warmer[:] = new
             _pressure(grid, work, running, omega, new, answer)
-            if asked < SETTLED * size:
+            if asked < _SETTLED * size:
                 settled = True
                 break
         for i in range(1, nt):

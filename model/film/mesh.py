@@ -87,7 +87,7 @@ def film_grid(
 
 
 #: How much finer the axial mesh is at the edges: the spacing there is 1 - GRADING of the mean.
-GRADING = 0.5
+_GRADING = 0.5
 
 
 def _graded(nz: int, symmetric: bool) -> FloatArray:
@@ -96,7 +96,7 @@ def _graded(nz: int, symmetric: bool) -> FloatArray:
         half = _graded(nz // 2, True)
         return np.concatenate([-half[:0:-1], half])
     share = np.arange(nz + 1) / nz
-    return share * (1.0 + GRADING - GRADING * share)
+    return share * (1.0 + _GRADING - _GRADING * share)
 
 
 def _parabolic_weights(z: FloatArray) -> FloatArray:

@@ -29,7 +29,7 @@ from model.film.slopes import derivatives, rupture_line
 from rigdata.arrays import BoolArray, FloatArray
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
-MAX_ACTIVE_SET_STEPS = 2000
+_MAX_ACTIVE_SET_STEPS = 2000
 
 
 class FilmForces(NamedTuple):
@@ -163,7 +163,7 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
     nt, nz = gx.shape[0], gz.shape[1]
     first = grid.first
     width = nz - first
-    for step in range(1, MAX_ACTIVE_SET_STEPS + 1):
+    for step in range(1, _MAX_ACTIVE_SET_STEPS + 1):
         assemble(work.band, gx, gz, ruptured, first)
         factorise(work.band)
         x = work.unknown

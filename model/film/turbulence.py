@@ -29,18 +29,18 @@ from rigdata.arrays import FloatArray
 #: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
 ALONG, ACROSS, SHEAR = (0.0136, 0.90), (0.0043, 0.96), (0.0012, 0.94)
 #: Local Reynolds numbers between which turbulence comes in.
-TRANSITION = (500.0, 1000.0)
+_TRANSITION = (500.0, 1000.0)
 
 
 @compiled
 def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, float]:
     """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it."""
-    if not reynolds > TRANSITION[0]:
+    if not reynolds > _TRANSITION[0]:
         return 0.0, 0.0
-    share = min(1.0, (reynolds - TRANSITION[0]) / (TRANSITION[1] - TRANSITION[0]))
+    share = min(1.0, (reynolds - _TRANSITION[0]) / (_TRANSITION[1] - _TRANSITION[0]))
     developed = factor * reynolds**exponent
     comes = share * share * (3.0 - 2.0 * share)
-    rate = 6.0 * share * (1.0 - share) * reynolds / (TRANSITION[1] - TRANSITION[0])
+    rate = 6.0 * share * (1.0 - share) * reynolds / (_TRANSITION[1] - _TRANSITION[0])
     return developed * comes, developed * (exponent * comes + rate)
 
 

@@ -23,7 +23,7 @@ from model.pad.mesh import PadGeometry
 from rigdata.arrays import FloatArray
 
 #: Stations on the dry arc ahead of a film that starts late.
-DRY_STATIONS = 8
+_DRY_STATIONS = 8
 #: Shapes that take part in the Newton step: with 8 it takes two iterations more, with 16 none less.
 SHAPES = 12
 
@@ -89,7 +89,7 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     angle, z, area = (np.frombuffer(raw, dtype=float) for raw in (angles, zs, areas))
     ahead = 0
     if angle[0] - geometry.leading > 1e-9:  # a starved film: the dry arc ahead of it carries nothing
-        ahead = DRY_STATIONS
+        ahead = _DRY_STATIONS
         angle = np.concatenate([np.linspace(geometry.leading, angle[0], ahead + 1)[:-1], angle])
     solid = solid_of(geometry, angle, z, operators=pad_operators_between if cooled else pad_operators)
     wet = slice(ahead * len(z), None)

@@ -16,7 +16,7 @@ from model.pad.store import load_arrays, save_arrays, storage_key
 from rigdata.arrays import BoolArray, FloatArray
 
 #: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
-NODES = 8
+_NODES = 8
 #: Largest convection between the nodes [W/m^2/K]; above it a pad is solved for its own.
 LARGEST = 1e4
 
@@ -348,7 +348,7 @@ def pad_operators_between(geometry: PadGeometry, density: MeshDensity, even: boo
         return pad_operators(geometry, density, even)
     through = geometry.backing.conductivity / geometry.backing_thickness
     last = LARGEST / (LARGEST + through)
-    nodes = 0.5 * last * (1.0 - np.cos(np.pi * np.arange(NODES) / (NODES - 1)))
+    nodes = 0.5 * last * (1.0 - np.cos(np.pi * np.arange(_NODES) / (_NODES - 1)))
     convections = tuple(float(h) for h in through * nodes / (1.0 - nodes))
     at_nodes = _operators_at_nodes(replace(geometry, back_convection=0.0), density, even, convections)
     x = geometry.back_convection / (geometry.back_convection + through)

@@ -29,14 +29,14 @@ class AxisMap:
     project: FloatArray  #: (n_film, n_face): M^-1 G^T: film values of a face function.
 
 
-def plain_map(face: Line, film: Line) -> AxisMap:
+def _plain_map(face: Line, film: Line) -> AxisMap:
     """Map of two bases on the same interval."""
     points, weights = _points(face.breaks, film.breaks, face.degree)
     gather = face.tabulate(points).T @ (weights[:, None] * film.tabulate(points))
     return AxisMap(gather, _solve(film, gather.T))
 
 
-def mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
+def _mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
     """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part."""
     points, weights = _points(face.breaks, np.unique(np.abs(film.breaks)), face.degree)
     sign = 1.0 if even else -1.0
@@ -67,12 +67,12 @@ class FilmMap:
         coarse = tuple(Line(line.breaks, 1) for line in face)
 
         def axial(line: Line) -> AxisMap:
-            return plain_map(line, film[1]) if even is None else mirror_map(line, film[1], even)
+            return _plain_map(line, film[1]) if even is None else _mirror_map(line, film[1], even)
 
         return cls(
-            theta=plain_map(face[0], film[0]),
+            theta=_plain_map(face[0], film[0]),
             z=axial(face[1]),
-            coarse_theta=_solve(coarse[0], plain_map(coarse[0], film[0]).gather),
+            coarse_theta=_solve(coarse[0], _plain_map(coarse[0], film[0]).gather),
             coarse_z=_solve(coarse[1], axial(coarse[1]).gather),
         )
 

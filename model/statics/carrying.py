@@ -92,10 +92,10 @@ def _keeps_its_load(setup: Setup, film: PadFilm, inside: float) -> bool:
     """
     if inside > 0.0 or film.forces is None or (inside < -_edge(film) and not setup.friction):
         return inside > 0.0
-    return is_stable(setup, film)
+    return _is_stable(setup, film)
 
 
-def is_stable(setup: Setup, film: PadFilm) -> bool:
+def _is_stable(setup: Setup, film: PadFilm) -> bool:
     """Whether film and pivot push a pad back from a small change of tilt and deflection.
 
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
@@ -115,7 +115,7 @@ def leave_unstable(setup: Setup, films: list[PadFilm], position: FloatArray) -> 
     """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
     found = False
     for film in films:
-        if film.forces is None or setup.rotational_stiffness > 0 or is_stable(setup, film):
+        if film.forces is None or setup.rotational_stiffness > 0 or _is_stable(setup, film):
             continue
         found = True
         film.load_changes += 1

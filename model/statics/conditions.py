@@ -18,14 +18,14 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
 #: Below this film the surfaces touch: three times the combined roughness, 1 um, of ground journal and bored pad [m].
-THINNEST_FILM = 3e-6
+_THINNEST_FILM = 3e-6
 #: Above this pressure tin babbitt yields, cold (0.2 % proof stress of SnSb8Cu4, ISO 4381) [Pa].
-HIGHEST_PRESSURE = 45e6
+_HIGHEST_PRESSURE = 45e6
 #: Above this local Reynolds number rho U h / mu a film begins to leave the laminar regime.
-LAMINAR = 1000.0
+_LAMINAR = 1000.0
 #: The exponential mu(T) of Eq. (4), fitted about 40 to 100 degC, leaves the Walther line of an ISO VG 46 oil by a third
 #: at 20 and at 122 degC [degC].
-OIL_DATA = (20.0, 120.0)
+_OIL_DATA = (20.0, 120.0)
 #: Above this film temperature tin babbitt creeps; machines are tripped at pad temperatures of 115 to 130 [degC].
 HOTTEST_FILM = 150.0
 
@@ -36,7 +36,7 @@ SINGULAR = Condition("singular", "error", "a Newton step has no solution")
 UNSUPPORTED = Condition(
     "no pads against the load", "error", "no set of pivots can balance the load, wherever the journal goes"
 )
-STICK_AND_SLIP = "friction holds them where their film loses its load, and without load there is no friction"
+_STICK_AND_SLIP = "friction holds them where their film loses its load, and without load there is no friction"
 FLOW_BACK = Condition(
     "flow back at a leading edge", "warning", "a pressure peak pushes oil back; the heat balance there is limited"
 )
@@ -57,7 +57,7 @@ def idle(pads: Sequence[int]) -> Condition:
 
 def overloaded(pads: Sequence[int]) -> Condition:
     """Pads whose film no bearing has, numbers from 1."""
-    limits = f"{1e6 * THINNEST_FILM:g} um, {HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
+    limits = f"{1e6 * _THINNEST_FILM:g} um, {_HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
     return Condition(
         f"overloaded pads {_listed(pads)}", "warning", f"thinnest film, pressure or heat beyond {limits}", tuple(pads)
     )
@@ -79,7 +79,7 @@ def undecided(pads: Sequence[int]) -> Condition:
     )  # fmt: skip
 
 
-def alternating(pads: Sequence[int]) -> Condition:
+def _alternating(pads: Sequence[int]) -> Condition:
     """Pads that went on taking up and shedding their load, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
@@ -90,19 +90,19 @@ def stick_and_slip(pads: Sequence[int]) -> Condition:
     """Pads that swing between sticking and sliding, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} neither stick nor slide at rest", "error",
-        STICK_AND_SLIP, tuple(pads),
+        _STICK_AND_SLIP, tuple(pads),
     )  # fmt: skip
 
 
 def held_off(status: Sequence[Condition]) -> tuple[int, ...]:
     """Pads of `stick_and_slip` in a status."""
-    return tuple(pad for c in status if c.detail == STICK_AND_SLIP for pad in c.pads)
+    return tuple(pad for c in status if c.detail == _STICK_AND_SLIP for pad in c.pads)
 
 
 def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:
     """Names the pads that went on taking up and shedding their load, if any did."""
     pads = [f.number for f in films if f.load_changes >= MAX_LOAD_CHANGES]
-    return (alternating(pads),) if pads else ()
+    return (_alternating(pads),) if pads else ()
 
 
 def _listed(pads: Sequence[int]) -> str:
@@ -128,8 +128,8 @@ def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
         for f in films
         if not f.idle
         and (
-            float(f.work.thickness.min()) < THINNEST_FILM
-            or float(f.work.pressure.max()) > HIGHEST_PRESSURE
+            float(f.work.thickness.min()) < _THINNEST_FILM
+            or float(f.work.pressure.max()) > _HIGHEST_PRESSURE
             or float(f.work.temperature.max()) > HOTTEST_FILM
         )
     ]
@@ -137,17 +137,17 @@ def overloaded_pads(films: Sequence[PadFilm]) -> list[int]:
 
 def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:
     """Named regimes beyond what the equations hold for: pads in each other's way, films not laminar, oil too hot."""
-    names = misfits(setup)
+    names = _misfits(setup)
     reynolds = largest_reynolds(films, surface_speed)
-    if reynolds > LAMINAR and setup.options.turbulence == "none":
-        detail = f"above Re {LAMINAR:.0f} turbulence, which is off unless asked for, carries and heats"
+    if reynolds > _LAMINAR and setup.options.turbulence == "none":
+        detail = f"above Re {_LAMINAR:.0f} turbulence, which is off unless asked for, carries and heats"
         names.append(Condition(f"film not laminar: Re {reynolds:.0f}", "warning", detail))
     carrying = [f for f in films if f.forces is not None]
-    low = min((float(f.work.temperature.min()) for f in carrying), default=OIL_DATA[0])
-    high = max((float(f.work.temperature.max()) for f in carrying), default=OIL_DATA[1])
-    if low < OIL_DATA[0] or high > OIL_DATA[1]:
-        beyond = low if low < OIL_DATA[0] else high
-        detail = "mu(T) of Eq. (4) holds from {:g} to {:g} degC".format(*OIL_DATA)
+    low = min((float(f.work.temperature.min()) for f in carrying), default=_OIL_DATA[0])
+    high = max((float(f.work.temperature.max()) for f in carrying), default=_OIL_DATA[1])
+    if low < _OIL_DATA[0] or high > _OIL_DATA[1]:
+        beyond = low if low < _OIL_DATA[0] else high
+        detail = "mu(T) of Eq. (4) holds from {:g} to {:g} degC".format(*_OIL_DATA)
         names.append(Condition(f"oil beyond its data: {beyond:.0f} degC", "warning", detail))
     return names
 
@@ -164,7 +164,7 @@ def largest_reynolds(films: Sequence[PadFilm], surface_speed: float) -> float:
     return max((n for n in numbers if math.isfinite(n)), default=math.nan)
 
 
-def misfits(setup: Setup) -> list[Condition]:
+def _misfits(setup: Setup) -> list[Condition]:
     """Pads that stand in each other's way, or in the journal's, in a bearing built in code (a file is refused)."""
     pads = setup.bearing.pads
     names = []

@@ -30,11 +30,11 @@ from model.statics.pad_film import PadFilm
 from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
-CONDUCTION_TOLERANCE = 0.03
+_CONDUCTION_TOLERANCE = 0.03
 #: And to this one where the last step has changed a temperature by more than so much [K]: all else is far off, too.
-ROUGH_TOLERANCE, ROUGH = 0.15, 3.0
+_ROUGH_TOLERANCE, _ROUGH = 0.15, 3.0
 #: Share of a film's thickness through which heat gets from the pad's face into the oil that carries it away.
-FACE_SHARE = 0.1
+_FACE_SHARE = 0.1
 
 
 @dataclass
@@ -61,7 +61,7 @@ def settle_cross_temperatures(
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     start = journal if math.isfinite(journal) else setup.inlet_temperature
     answers: list[CrossAnswer | None] = []
-    back, around = 0.0, housing_oil(films)
+    back, around = 0.0, _housing_oil(films)
     for film in order:
         answer, share = _answer(setup, film, surface_speed, (start, around), operator)
         answers.append(answer)
@@ -70,7 +70,7 @@ def settle_cross_temperatures(
     change = 0.0
     for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
         hotter = inlet - film.inlet
-        film.inlet += limited_share(hotter, limits) * hotter
+        film.inlet += _limited_share(hotter, limits) * hotter
         film.temperature_change = abs(hotter)
         change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
         if part is None or film.cross is None:
@@ -79,7 +79,7 @@ def settle_cross_temperatures(
         asked = (part.fields @ weights).reshape(film.cross.temperature.shape) - film.cross.temperature
         face = np.tensordot(weights, part.faces, 1) - film.cross.face
         film.temperature_change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
-        share = limited_share(film.temperature_change, limits)
+        share = _limited_share(film.temperature_change, limits)
         film.cross.temperature[:] += share * asked
         film.cross.face[:] += share * face
         film.outlet = float(np.dot(part.outer.outlet, weights))
@@ -87,17 +87,17 @@ def settle_cross_temperatures(
     return change, back, journal
 
 
-def limited_share(change: float, limits: tuple[float, float]) -> float:
+def _limited_share(change: float, limits: tuple[float, float]) -> float:
     """Share of a change of temperature that is made."""
     return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
 
 
-def housing_oil(films: Sequence[PadFilm]) -> float:
+def _housing_oil(films: Sequence[PadFilm]) -> float:
     """Temperature of the oil that the pads stand in [degC]: what the grooves hold, on the mean."""
     return sum(f.inlet for f in films) / len(films)
 
 
-def pad_heat(film: PadFilm, around: float) -> FloatArray:
+def _pad_heat(film: PadFilm, around: float) -> FloatArray:
     """Heat flux density from the film into its pad, (nt + 1, nz + 1) [W/m^2]."""
     assert film.cross is not None
     return _into_pad(film, film.cross.face - around)
@@ -132,7 +132,7 @@ def _answer(
     oil = setup.bearing.oil
     heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
     back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
-    taken = pad_heat(film, around)
+    taken = _pad_heat(film, around)
     fields = np.zeros((taken.shape[0], operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
     sources = operator.dissipation
@@ -146,10 +146,10 @@ def _answer(
     pad = film.deformation
     if pad is not None and 0.0 < np.abs(missing).max() < BOUNDLESS:
         solved = (film.grid, film.work, cross.edges, oil.conductivity)
-        resistance = FACE_SHARE * float(film.work.thickness.mean()) / oil.conductivity
+        resistance = _FACE_SHARE * float(film.work.thickness.mean()) / oil.conductivity
         body = (pad.flux, pad.to_coarse, _settled(pad, round(math.log2(resistance))))
-        far = film.temperature_change > ROUGH
-        tolerance = ROUGH_TOLERANCE if far else CONDUCTION_TOLERANCE
+        far = film.temperature_change > _ROUGH
+        tolerance = _ROUGH_TOLERANCE if far else _CONDUCTION_TOLERANCE
         more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
         kept[0] += more if math.isfinite(more) else 0.0
     weight = operator.carried / operator.carried.sum()

@@ -33,12 +33,12 @@ from model.statics.pad_flow import flow_weighted, outlet_temperature, through_fl
 from rigdata.arrays import FloatArray
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
-NUSSELT = 3.0
+_NUSSELT = 3.0
 #: Conduction is solved to this share in every step of the equilibrium; what is left contracts with the rest.
-CONDUCTION_TOLERANCE = 0.01
-KRYLOV_STEPS = 12
+_CONDUCTION_TOLERANCE = 0.01
+_KRYLOV_STEPS = 12
 #: Share of the oil in the grooves that is fresh after a turn, at least.
-LEAST_FRESH = 1e-3
+_LEAST_FRESH = 1e-3
 
 
 def couples_heat(setup: Setup) -> bool:
@@ -53,7 +53,7 @@ def settle_temperatures(
 ) -> tuple[float, float, float]:
     """Temperatures of all films for their present flows; writes them, and the inlets."""
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
-    heat = FilmHeat(setup, surface_speed, journal if math.isfinite(journal) else setup.inlet_temperature)
+    heat = _FilmHeat(setup, surface_speed, journal if math.isfinite(journal) else setup.inlet_temperature)
     parts = [heat.answers(film) for film in order]
     answers = [None if p is None else _film_answer(setup, f, p) for f, p in zip(order, parts, strict=True)]
     inlets, journal = balance_heat(setup, order, answers)
@@ -72,7 +72,7 @@ def settle_temperatures(
 
 
 @dataclass
-class FilmHeat:
+class _FilmHeat:
     """The energy equation of one film after the other, with its pad and journal."""
 
     setup: Setup
@@ -127,7 +127,7 @@ class FilmHeat:
             self._march(film, fields, -taken[None])
             return np.asarray(t - fields[0].ravel())
 
-        return np.asarray(minimal_residual(coupled, alone.ravel(), CONDUCTION_TOLERANCE)).reshape(shape)
+        return np.asarray(minimal_residual(coupled, alone.ravel(), _CONDUCTION_TOLERANCE)).reshape(shape)
 
     def _march(self, film: PadFilm, fields: FloatArray, sources: FloatArray) -> None:
         oil = self.setup.bearing.oil
@@ -137,13 +137,13 @@ class FilmHeat:
 
 
 def minimal_residual(apply: Callable[[FloatArray], FloatArray], right: FloatArray, tolerance: float) -> FloatArray:
-    """Solve apply(x) = right by GMRES, in at most `KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
+    """Solve apply(x) = right by GMRES, in at most `_KRYLOV_STEPS` steps, to a share `tolerance` of the right-hand side.
 
     NaN where `apply` grows beyond `BOUNDLESS`.
     """
     size = float(np.linalg.norm(right))
     basis, images = [right / size], []
-    for _ in range(KRYLOV_STEPS):
+    for _ in range(_KRYLOV_STEPS):
         image = apply(basis[-1])
         if not np.abs(image).max() < BOUNDLESS:
             return np.full_like(right, math.nan)
@@ -169,7 +169,7 @@ def _journal_exchange(setup: Setup, film: PadFilm) -> FloatArray:
     if not setup.options.isothermal_journal:
         return np.zeros_like(film.work.thickness)
     station = film.grid.dx * film.grid.height[None, :]
-    return np.asarray(NUSSELT * setup.bearing.oil.conductivity / film.work.thickness * station)
+    return np.asarray(_NUSSELT * setup.bearing.oil.conductivity / film.work.thickness * station)
 
 
 class FilmAnswer(NamedTuple):
@@ -192,7 +192,7 @@ def _film_answer(setup: Setup, film: PadFilm, part: FloatArray) -> FilmAnswer:
 def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer | None]) -> tuple[FloatArray, float]:
     """Inlet temperature of every pad, and the journal's that keeps no heat: gives inlets (n,) [degC]."""
     n, supply = len(order), setup.inlet_temperature
-    shares = mixing_shares(order, setup.mixing)
+    shares = _mixing_shares(order, setup.mixing)
     matrix, right = np.eye(n + 1), np.full(n + 1, supply)
     kept = np.zeros(3)  # what the journal takes up: by fresh oil, by its own temperature
     by_inlet = np.zeros(n)
@@ -215,7 +215,7 @@ def balance_heat(setup: Setup, order: list[PadFilm], parts: Sequence[FilmAnswer 
     return answer[:n], float(answer[n])
 
 
-def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
+def _mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
     """Share s of what a pad drinks that comes from the pad before it, for the pads in the order of rotation."""
     if fraction == 0.0:
         return [0.0] * len(order)
@@ -225,5 +225,5 @@ def mixing_shares(order: list[PadFilm], fraction: float) -> list[float]:
         hot = fraction * flows[k - 1][1]
         shares.append(1.0 if not hot < entering else max(0.0, hot / entering))
     # where nothing leaks (all pads idle, on the way) heat would go round for ever
-    most = (1.0 - LEAST_FRESH) ** (1.0 / len(shares))
-    return [min(s, most) for s in shares] if math.prod(shares) > 1.0 - LEAST_FRESH else shares
+    most = (1.0 - _LEAST_FRESH) ** (1.0 / len(shares))
+    return [min(s, most) for s in shares] if math.prod(shares) > 1.0 - _LEAST_FRESH else shares

@@ -38,7 +38,7 @@ from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.
-SWINGING = 0.3
+_SWINGING = 0.3
 
 
 def iterate(search: Search) -> Equilibrium:
@@ -87,7 +87,7 @@ def _swinging(search: Search, tilts: FloatArray) -> tuple[Condition, ...]:
     """Names the pads with friction that the last step moved most."""
     if not search.setup.friction:
         return ()
-    most = SWINGING * float(np.abs(tilts).max())
+    most = _SWINGING * float(np.abs(tilts).max())
     pads = [f.number for f, tilt in zip(search.films, tilts.tolist(), strict=True) if abs(tilt) >= most]
     return (conditions.stick_and_slip(pads),)
 

@@ -14,7 +14,7 @@ from rigdata.arrays import FloatArray
 def newton_step(setup: Setup, load: FloatArray, films: list[PadFilm]) -> tuple[float, FloatArray, FloatArray]:
     """Solve the linearised equilibrium once: `load` (2,) [N]; gives shift (2,) [m], moves (n_pads, 2) [rad]."""
     carrying = [f for f in films if f.forces is not None]
-    residual, shift, moves = eliminate(load, pad_equations(setup, carrying))
+    residual, shift, moves = eliminate(load, _pad_equations(setup, carrying))
     if setup.friction:
         _stop_at_untilted(carrying, moves)
     every = np.zeros((len(films), 2))
@@ -29,7 +29,7 @@ def _stop_at_untilted(carrying: list[PadFilm], moves: FloatArray) -> None:
             move[0] = -film.tilt
 
 
-def pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
+def _pad_equations(setup: Setup, carrying: list[PadFilm]) -> PadEquations:
     """Gather the equations of the pads that carry."""
     n = len(carrying)
     rows = PadEquations(

@@ -23,7 +23,7 @@ from model.statics.pad_film import PadFilm, pad_films
 from rigdata.arrays import FloatArray
 
 #: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
-NEW_TABLE = 1e-3
+_NEW_TABLE = 1e-3
 
 
 @dataclass
@@ -111,7 +111,7 @@ class Search:
                 assembled_clearance=pad.assembled_clearance - taken,
             )
             film.closing = 0.0
-            if film.branch is not None and abs(taken) > NEW_TABLE * pad.pad_clearance:
+            if film.branch is not None and abs(taken) > _NEW_TABLE * pad.pad_clearance:
                 film.branch = None
 
     def start_from(self, start: Equilibrium) -> bool:

@@ -20,7 +20,7 @@ from model.statics.search import Search
 from rigdata.arrays import FloatArray
 
 #: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
-FIRST_SHARE, LEAST_STEP = 0.25, 0.02
+_FIRST_SHARE, _LEAST_STEP = 0.25, 0.02
 
 
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
@@ -88,10 +88,10 @@ def _raise_heat(search: Search, failed: Equilibrium) -> Equilibrium:
 
 
 def _raise(search: Search, put: Callable[[float], None]) -> tuple[Equilibrium | None, float]:
-    """Raise what `put` sets a share of from `FIRST_SHARE` to 1; the equilibrium there, and the share reached."""
-    reached, step = 0.0, FIRST_SHARE
+    """Raise what `put` sets a share of from `_FIRST_SHARE` to 1; the equilibrium there, and the share reached."""
+    reached, step = 0.0, _FIRST_SHARE
     last: Equilibrium | None = None
-    while reached < 1.0 and step > LEAST_STEP:
+    while reached < 1.0 and step > _LEAST_STEP:
         share = min(1.0, reached + step)
         put(share)
         search.lay_out()

@@ -22,14 +22,14 @@ _PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([^.\s]+)")
 Path = tuple[str | int, ...]
 #: Frequencies of the mains in any country [Hz].
 MAINS_FREQUENCIES = (50.0, 60.0)
-QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
+_QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
 KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
 #: How a dynamic run is excited.
-EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
-BRANCHES = ("up", "down", "cycle")
+_EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
+_BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
-RAW = ("table", "list", "sign", "calibration")
+_RAW = ("table", "list", "sign", "calibration")
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Field:
     """One key of a table: what it holds, what it means, and its default."""
 
     key: str
-    kind: str  #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `RAW`
+    kind: str  #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `_RAW`
     meaning: str
     example: str
     default: Any = None
@@ -93,7 +93,7 @@ CSV = (
 )
 CHANNEL = (
     Field("like", "text", "a sensor of the same type: its entries but axis, pad and position", '"L1H"'),
-    Field("quantity", "choice", "what the column holds", '"displacement"', required=True, choices=QUANTITIES),
+    Field("quantity", "choice", "what the column holds", '"displacement"', required=True, choices=_QUANTITIES),
     Field("axis", "angle", "direction of the positive quantity, counter-clockwise from +X", '"45 deg"'),
     Field("unit", "text", "of the readings; V, mA, mV/V, or an engineering unit if already converted", '"V"'),
     Field("sensitivity", "calibration", "reading per quantity; of a bridge: mV/V at full scale", '"7.78 mV/um"'),
@@ -130,13 +130,13 @@ RUN = (
     Field("static_load_direction", "angle", "where it pushes the shaft; down is -90 deg", '"-90 deg"', -math.pi / 2),
     Field("excitation_frequency", "speed", "of a sine", '"25 Hz"', default=0.0, above=0.0),
     Field("excitation_direction", "angle", "of the force", '"54 deg"'),
-    Field("excitation", "choice", "its course in time", '"sweep"', default="sine", choices=EXCITATIONS),
+    Field("excitation", "choice", "its course in time", '"sweep"', default="sine", choices=_EXCITATIONS),
     Field("excitation_band", "text", "in place of the frequency, where it is no sine", '"5..120 Hz"'),
     Field("pad", "whole", "number of the pad that a dry test loads, without quotes", "1", low=1, high=100),
-    Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=BRANCHES),
+    Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=_BRANCHES),
     Field("sample_rate", "frequency", "of this run", '"500 Hz"', above=0.0),
 )
-TABLES = {
+_TABLES = {
     "": TOP, "[housing]": HOUSING, "[acquisition]": ACQUISITION, "[csv]": CSV,
     "[channels.NAME]": CHANNEL, "[[runs]]": RUN,
 }  # fmt: skip
@@ -151,7 +151,7 @@ def draft_line(fields: tuple[Field, ...], key: str, value: str) -> str:
 def markdown() -> str:
     """The tables of all keys, as docs/campaigns.md shows them."""
     lines = []
-    for title, fields in TABLES.items():
+    for title, fields in _TABLES.items():
         lines += [f"**`{title or 'top of the file'}`**", "", "| key | holds | example | meaning |", "|---|---|---|---|"]
         for field in fields:
             if field.meaning:
@@ -267,7 +267,7 @@ class Table:
                 remedy = f'Add {key} = "..."' if is_text else f"Add {key}, a {field.kind} with its unit"
                 self.error(key, f"{key} is missing", remedy)
             return field.default
-        if field.kind in RAW:
+        if field.kind in _RAW:
             return value
         if field.kind == "whole":
             checked: Any = self._whole_number(field, value)

@@ -14,11 +14,11 @@ from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES
 from rigdata.manifest.runs import RunEntry, read_runs
 from rigdata.problem import Problem, RigDataError, refuse
 
-SCHEMA = "tpjb-rig/1"
+_SCHEMA = "tpjb-rig/1"
 #: Larger manifests are refused before they are parsed [bytes].
 MAX_MANIFEST = 4 * 2**20
 #: Longer lines, and lines with more dots outside quotes, are refused.
-MAX_LINE, MAX_DOTS = 40_000, 100
+_MAX_LINE, _MAX_DOTS = 40_000, 100
 _QUOTED = re.compile(r'"[^"\\]*"|\'[^\']*\'')
 
 
@@ -57,8 +57,8 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     findings = Findings(file, key_lines(text))
     top = Table(data, (), findings)
     header = top.read(TOP, "the manifest")
-    if header["schema"] not in (None, SCHEMA):
-        message = f"schema is {header['schema']!r}, not {SCHEMA!r}"
+    if header["schema"] not in (None, _SCHEMA):
+        message = f"schema is {header['schema']!r}, not {_SCHEMA!r}"
         findings.error(("schema",), message, "Export in the format tpjb-rig/1")
     channels = read_channels(top.subtable("channels"), findings, files)
     runs = read_runs(data.get("runs"), findings)
@@ -91,7 +91,7 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
         raise refuse(file, "", f"the manifest is larger than {MAX_MANIFEST >> 20} MB", "Is it the right file?")
     for number, line in enumerate(text.split("\n"), start=1):
         # Dotted keys nest as deeply as they are long, and parsing them takes the square of it.
-        if len(line) > MAX_LINE or (line.count(".") > MAX_DOTS and _QUOTED.sub("", line).count(".") > MAX_DOTS):
+        if len(line) > _MAX_LINE or (line.count(".") > _MAX_DOTS and _QUOTED.sub("", line).count(".") > _MAX_DOTS):
             message = "the line is far too long, or nests far too deeply"
             raise refuse(file, f"line {number}", message, "Shorten or break it")
     cure = "Repair the TOML at this place"

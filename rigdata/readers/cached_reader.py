@@ -19,14 +19,14 @@ from rigdata.readers.base import rate_of_time
 from rigdata.readers.series import Columns
 
 #: Parsed columns cached by a campaign before the oldest run is let go [bytes].
-CACHE_BYTES = 96 * 2**20
+_CACHE_BYTES = 96 * 2**20
 _Value = TypeVar("_Value")
 
 
 class ReadingCache:
     """Tables and heads of a campaign's files, the last used ones, up to a number of bytes."""
 
-    def __init__(self, limit: int = CACHE_BYTES) -> None:
+    def __init__(self, limit: int = _CACHE_BYTES) -> None:
         self._limit = limit
         self._entries: OrderedDict[tuple[object, ...], Any] = OrderedDict()
         self._lock = threading.Lock()

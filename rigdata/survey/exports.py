@@ -15,7 +15,7 @@ from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.catman import time_column
 from rigdata.readers.text.head import find_head
 
-MOST_FILES = 5000
+_MOST_FILES = 5000
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def records_below(folder: Path) -> list[Path]:
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if path.suffix.lower() in suffixes and path.is_file() and not hidden:
             records.append(path)
-        if len(records) > MOST_FILES:
-            raise refuse(str(folder), "", f"holds more than {MOST_FILES} records", "Give a folder below")
+        if len(records) > _MOST_FILES:
+            raise refuse(str(folder), "", f"holds more than {_MOST_FILES} records", "Give a folder below")
     return records
 
 

@@ -23,7 +23,7 @@ from rigdata.virtual_rig.truth import VirtualRigError
 
 Progress = Callable[[int, int, str], None]
 _Records = Iterable[tuple[SimulatedRun, tuple[Fault, ...]]]
-UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
+_UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
 
 
 def write_campaign(
@@ -183,7 +183,7 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout, fault
         units.append(sensor.unit)
         columns.append(readings.columns[sensor.name])
         # decimals that keep a hundredth of a converter step
-        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or UNQUANTISED_BITS))) + 2
+        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or _UNQUANTISED_BITS))) + 2
         forms.append(f"%.{max(0, decimals)}f")
     count = 0 if _has("empty_file", faults) else len(readings.time)
     tail = layout.delimiter if layout.trailing_delimiter else ""

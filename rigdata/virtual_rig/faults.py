@@ -50,15 +50,15 @@ KINDS: dict[str, tuple[Place, str]] = {
     "empty_file": ("file", "the run's file holds no samples"),
 }
 
-NEEDS_CHANNEL = {k for k, (place, _) in KINDS.items() if place in ("sensor", "record")} - {
+_NEEDS_CHANNEL = {k for k, (place, _) in KINDS.items() if place in ("sensor", "record")} - {
     "time_gap",
     "time_jitter",
 } | {"missing_channel", "duplicate_column", "short_channel"}
-NEEDS_VALUE = {
+_NEEDS_VALUE = {
     "scaled", "delayed", "rotated", "offset", "crosstalk", "glitch",
     "wrong_pad", "wrong_direction", "wrong_frequency", "wrong_load",
 }  # fmt: skip
-NEEDS_OTHER = {"swapped", "duplicate_run"}
+_NEEDS_OTHER = {"swapped", "duplicate_run"}
 CSV_ONLY = {"duplicate_column", "truncated_line"}
 HDF5_ONLY = {"short_channel"}
 NEEDS_TIME = {"time_jitter"}
@@ -82,7 +82,7 @@ class Fault:
             hint = f"; did you mean {near!r}?" if near else f"; there are {', '.join(KINDS)}"
             raise VirtualRigError(f"no fault {self.kind!r}{hint}")
         for needed, kinds in (
-            ("channel", NEEDS_CHANNEL), ("value", NEEDS_VALUE), ("other", NEEDS_OTHER),
+            ("channel", _NEEDS_CHANNEL), ("value", _NEEDS_VALUE), ("other", _NEEDS_OTHER),
         ):  # fmt: skip
             if self.kind in kinds and getattr(self, needed) is None:
                 raise VirtualRigError(f"fault {self.kind!r} needs {needed}: {KINDS[self.kind][1]}")

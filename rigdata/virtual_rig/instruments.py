@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.virtual_rig.truth import VirtualRigError, hz
 
-STANDARD_GRAVITY = 9.80665
+_STANDARD_GRAVITY = 9.80665
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Sensor:
     def accelerometer(cls, name: str, axis: float) -> Sensor:
         """Accelerometer of 10 mV/g on a converter of 0.05 V."""
         calibration = (("sensitivity", "10 mV/g"),)
-        return cls(name, "acceleration", "V", 10.0 * 1e-3 / STANDARD_GRAVITY, axis, span=0.05, calibration=calibration)
+        return cls(name, "acceleration", "V", 10.0 * 1e-3 / _STANDARD_GRAVITY, axis, span=0.05, calibration=calibration)
 
     @classmethod
     def thermometer(cls, name: str, pad: int) -> Sensor:

@@ -49,7 +49,7 @@ class Hdf5Layout:
 
 Layout = CsvLayout | Hdf5Layout
 
-LAYOUTS: dict[str, Layout] = {
+_LAYOUTS: dict[str, Layout] = {
     "hdf5": Hdf5Layout(),
     "csv": CsvLayout(),
     "csv-german": CsvLayout(
@@ -87,9 +87,9 @@ def layout_named(layout: str | Layout) -> Layout:
     """Layout by its name; one that is already a layout is returned as it is."""
     if not isinstance(layout, str):
         return layout
-    if layout not in LAYOUTS:
-        raise VirtualRigError(f"no layout {layout!r}; there are {', '.join(LAYOUTS)}")
-    return LAYOUTS[layout]
+    if layout not in _LAYOUTS:
+        raise VirtualRigError(f"no layout {layout!r}; there are {', '.join(_LAYOUTS)}")
+    return _LAYOUTS[layout]
 
 
 def manifest_text(

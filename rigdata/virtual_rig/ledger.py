@@ -19,7 +19,7 @@ from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
 from rigdata.virtual_rig.sensing import felt_direction
 
-PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
+_PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 
 
 @dataclass(frozen=True)
@@ -122,14 +122,14 @@ def _set_point(point: OperatingPoint) -> dict[str, object]:
 
 def _pivot_curve(rig: VirtualRig, pad: int) -> dict[str, object]:
     # tangents by central differences over 0.1 % of the load: error about 1e-7 for smooth laws
-    low, high = PIVOT_LOADS * (1 - 1e-3), PIVOT_LOADS * (1 + 1e-3)
+    low, high = _PIVOT_LOADS * (1 - 1e-3), _PIVOT_LOADS * (1 + 1e-3)
     rise = rig.truth.deflection(pad, high) - rig.truth.deflection(pad, low)
     with np.errstate(divide="ignore"):  # a rigid pivot is infinitely stiff
         stiffness = (high - low) / rise
     return {
         "pad": pad,
-        "force_N": PIVOT_LOADS.tolist(),
-        "deflection_m": rig.truth.deflection(pad, PIVOT_LOADS).tolist(),
+        "force_N": _PIVOT_LOADS.tolist(),
+        "deflection_m": rig.truth.deflection(pad, _PIVOT_LOADS).tolist(),
         "stiffness_N_per_m": stiffness.tolist(),
     }
 

@@ -19,8 +19,8 @@ from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector
 
-SETTLING = 0.1  # time constant of an overshoot [s]
-UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one
+_SETTLING = 0.1  # time constant of an overshoot [s]
+_UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one
 
 
 class Motion(Protocol):
@@ -73,7 +73,7 @@ class MotionLine:
 
 
 @dataclass(frozen=True)
-class SteadyMotion:
+class _SteadyMotion:
     """A mean state with spectral lines on it."""
 
     position: FloatArray  #: (2,) each: m, N
@@ -102,7 +102,7 @@ class SteadyMotion:
 
 
 @dataclass(frozen=True)
-class SlowMotion:
+class _SlowMotion:
     """A quasi-static test, given on a time grid: no accelerations, no rotation."""
 
     time: FloatArray  #: (n,), s
@@ -161,7 +161,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     for frequency, force in forces:
         h = truth.h(replace(stiffness_point, excitation=frequency))
         lines.append(answer(frequency, force, h, instruments))
-    motion = SteadyMotion(
+    motion = _SteadyMotion(
         position=truth.centre(steady),
         load=load_vector(actual),
         lines=tuple(lines),
@@ -222,7 +222,7 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     )
 
 
-def _facts(actual: OperatingPoint, motion: SteadyMotion) -> dict[str, object]:
+def _facts(actual: OperatingPoint, motion: _SteadyMotion) -> dict[str, object]:
     lines = []
     for line in motion.lines:
         phasors = {"oil_force_N": _parts(line.oil_force), "displacement_m": _parts(line.displacement)}
@@ -256,14 +256,14 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
     off = _either_sign(rng, flaws.direction)
     side = _either_sign(rng, flaws.side)
     side_start = flaws.side_start * rng.standard_normal()
-    gap = rng.uniform(*flaws.contact_gap) if toward[1] > UPPER else 0.0
+    gap = rng.uniform(*flaws.contact_gap) if toward[1] > _UPPER else 0.0
     on_pivot = held_back(load * np.cos(off), flaws.friction)
     deflection = truth.deflection(test.pad, on_pivot)
     missing = gap * np.exp(-load / flaws.contact_load)
     radial = truth.clearance[pad] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
     direction = run.direction + off
-    motion = SlowMotion(time, position, np.outer(load, _unit(direction)), truth.cold_temperatures)
+    motion = _SlowMotion(time, position, np.outer(load, _unit(direction)), truth.cold_temperatures)
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
@@ -294,7 +294,7 @@ def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
     for start, stop, step, target in held:
         inside = (time >= start) & (time < stop)
         since = time[inside] - start
-        load[inside] += test.overshoot * step * np.exp(-since / SETTLING)
+        load[inside] += test.overshoot * step * np.exp(-since / _SETTLING)
         load[inside] += test.load_drift * target * since
     return time, load
 
@@ -332,7 +332,7 @@ def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int)
     direction = sweep.start + 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
     load = push * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-    return RunPhysics(time, SlowMotion(time, position, load, truth.cold_temperatures), {"push_N": push})
+    return RunPhysics(time, _SlowMotion(time, position, load, truth.cold_temperatures), {"push_N": push})
 
 
 def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:

@@ -150,9 +150,9 @@ class Noise:
 
 
 #: What random streams are for; a change in one leaves all others as they were.
-PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign")
+_PURPOSES = ("physics", "noise", "mains", "glitches", "dry", "faults", "campaign")
 
 
 def stream(seed: int, run: str, purpose: str) -> np.random.Generator:
     """Generator for one run (by its id) and purpose; the same for the same arguments, on every machine."""
-    return np.random.default_rng([seed, crc32(run.encode()), PURPOSES.index(purpose)])
+    return np.random.default_rng([seed, crc32(run.encode()), _PURPOSES.index(purpose)])

@@ -11,7 +11,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 Branch = Literal["up", "down", "cycle"]
-DOWNWARD = -pi / 2
+_DOWNWARD = -pi / 2
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class RigPlan:
 
 
 def operating_points(
-    pairs: Iterable[tuple[float, float]], direction: float = DOWNWARD, speed: float = hz(22.0)
+    pairs: Iterable[tuple[float, float]], direction: float = _DOWNWARD, speed: float = hz(22.0)
 ) -> tuple[OperatingPoint, ...]:
     """Make set points of (load [N], excitation [Hz]) at one load direction [rad] and speed [rad/s]."""
     return tuple(OperatingPoint(load, direction, speed, hz(frequency)) for load, frequency in pairs)
@@ -204,7 +204,7 @@ def operating_points(
 
 def locus_points(count: int, load: float = 5000.0) -> tuple[OperatingPoint, ...]:
     """Give `count` directions of one load [N], evenly all around, counter-clockwise from straight down, at 22 Hz."""
-    return tuple(OperatingPoint(load, DOWNWARD + 2 * pi * i / count, hz(22.0)) for i in range(count))
+    return tuple(OperatingPoint(load, _DOWNWARD + 2 * pi * i / count, hz(22.0)) for i in range(count))
 
 
 def _unexcited(point: OperatingPoint) -> tuple[float, float, float]:

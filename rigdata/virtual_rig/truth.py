@@ -20,7 +20,7 @@ from rigdata.problem import RigError
 
 PointLaw = Callable[[OperatingPoint], Any]
 
-FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
+_FIVE_PADS = tuple(np.radians([-90.0, -18.0, 54.0, 126.0, 198.0]).tolist())
 
 
 class VirtualRigError(RigError):
@@ -35,7 +35,7 @@ class RigTruth:
     position: PointLaw = field(repr=False)
     temperature: PointLaw = field(repr=False)
     pivot_deflection: Callable[[int, FloatArray], Any] = field(repr=False)
-    pivot_angles: tuple[float, ...] = FIVE_PADS
+    pivot_angles: tuple[float, ...] = _FIVE_PADS
     clearance: tuple[float, ...] = (80e-6,) * 5
     bearing_name: str = "bearing.toml"
     bearing_text: str = field(default="", repr=False)
@@ -59,7 +59,7 @@ class RigTruth:
         """Make a truth with one K and C at all points: a linear bearing."""
         stiffness = np.array(k, dtype=float)
         damping = np.array(c, dtype=float)
-        angles = fields.get("pivot_angles", FIVE_PADS)
+        angles = fields.get("pivot_angles", _FIVE_PADS)
         pivots = np.broadcast_to(np.asarray(pivot_stiffness, dtype=float), (len(angles),))
         base = cls(
             stiffness=lambda point: stiffness + 1j * point.excitation * damping,

@@ -3,7 +3,7 @@
 Two probes and two cells serve all runs of a point. If one of them reads g times the truth in one run, the part
 1 - 1/g of its own reading is too much there, at the excitation line and in the mean alike. Both parts are estimated
 from the run against the others, by generalised least squares: noise is what the others scatter by, and beside it stands
-what honest runs differ by (`HONEST`): a bearing that answers a little softer or less damped in one run, a load that
+what honest runs differ by (`_HONEST`): a bearing that answers a little softer or less damped in one run, a load that
 misses its set point and moves the shaft as well.
 """
 
@@ -18,7 +18,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand.
-HONEST = 0.01
+_HONEST = 0.01
 #: Least scatter that runs are credited with: phasors and mean loads as a share, mean positions [m].
 _LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
 #: Runs whose scatter has up to this many times the variance of their records' noise differ by that noise: 5 % of all
@@ -143,7 +143,7 @@ def dynamic_difference(
     variance = noise * size**2 * (1 + leverage(unit, run_displacement / size))
     variance += (_LEAST_PHASOR * float(np.linalg.norm(force[run]))) ** 2
     changes = _bearing_changes(stiffness, run_displacement)
-    honest = changes @ np.diag(HONEST**2 + _bearing_wander(readings, agreeing, stiffness)) @ changes.T
+    honest = changes @ np.diag(_HONEST**2 + _bearing_wander(readings, agreeing, stiffness)) @ changes.T
     return Difference(_stacked(force[run] - stiffness @ run_displacement), variance * np.eye(4), honest, spare)
 
 
@@ -226,7 +226,7 @@ def static_difference(
     load_variance, place_variance = (float(np.sum(x**2)) / spare for x in (misses, wander))
     noise = more * (load_variance * by_load @ by_load.T + place_variance * by_place @ by_place.T)
     least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
-    honest = (HONEST * size) ** 2 * by_load @ by_load.T + least
+    honest = (_HONEST * size) ** 2 * by_load @ by_load.T + least
     residual = np.concatenate(
         [
             readings.probe_means[run] - readings.probe_means[rows].mean(axis=0),

@@ -20,7 +20,7 @@ _BESIDE = (5, 7, 9, 11, 15)
 #: Samples that tell the scale of what a fit leaves.
 _SCALED = 4096
 #: Lines of a band that are looked at, the strongest of as many parts of it.
-BAND_LINES = 8
+_BAND_LINES = 8
 #: Bins to either side of a disturbing line that are left alone.
 _CLEAR_OF = 5
 #: Noise is looked at from this many times the band's top on.
@@ -147,10 +147,10 @@ def band_lines(
         free &= np.abs(frequency - line * np.maximum(np.round(frequency / line), 1)) > _CLEAR_OF * frequency[1]
     inside = np.flatnonzero(free & (frequency >= run.band[0]) & (frequency <= run.band[1]))
     above = free & (frequency > _ABOVE * run.band[1]) & (frequency < 0.45 * run.sample_rate)
-    if len(inside) < BAND_LINES or above.sum() < BAND_LINES:
+    if len(inside) < _BAND_LINES or above.sum() < _BAND_LINES:
         return none
     power = np.sum(np.abs(spectrum[:, list(force)]) ** 2, axis=1)
-    chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, BAND_LINES)]
+    chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, _BAND_LINES)]
     return np.asarray(spectrum[chosen]), np.median(np.abs(spectrum[above]), axis=0)
 
 

@@ -20,7 +20,7 @@ from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
-BLOCK = 2**19
+_BLOCK = 2**19
 _FITTED = 2**16
 _DECIMATED = 4000
 #: Samples that tell the quantiles of a channel, and whether it has noise.
@@ -112,7 +112,7 @@ def _over_band(
 
 def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
     try:
-        time = run.time(0, min(length, BLOCK))
+        time = run.time(0, min(length, _BLOCK))
         check_clock(report, time)
     except RigDataError as error:
         report.take(error.problems)
@@ -126,8 +126,8 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
     statistics = {name: ChannelStatistics() for name in channels}
     digests = {n: hashlib.sha256() for n, c in channels.items() if c.quantity in {"displacement", "force"}}
     first: dict[str, FloatArray] = {}
-    for start in range(0, length, BLOCK):
-        blocks = _read_block(report, run, channels, start, min(start + BLOCK, length))
+    for start in range(0, length, _BLOCK):
+        blocks = _read_block(report, run, channels, start, min(start + _BLOCK, length))
         channels = {n: channels[n] for n in blocks}
         for name, block in blocks.items():
             statistics[name].add(block)

@@ -21,14 +21,14 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited
 
 #: Gain uncertainty of a channel for which the manifest states none, as `[tolerances] probe_gain` has it.
-USUAL_GAIN = 0.005
+_USUAL_GAIN = 0.005
 #: Differences of so many standard deviations of the stated uncertainties are told.
-CLEAR = 3.0
+_CLEAR = 3.0
 #: A difference that stands this many standard errors above the scatter of the runs is no noise.
-SEEN = 4.0
-MIN_RUNS = 3
+_SEEN = 4.0
+_MIN_RUNS = 3
 #: From a rectangle's half-width, shared by the two channels of a pair, to the standard deviation of each.
-RECTANGLE = math.sqrt(2.0 / 3.0)
+_RECTANGLE = math.sqrt(2.0 / 3.0)
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class InconsistentChannels:
 
     def uncertainty(self) -> dict[str, float]:
         """Standard deviation of every channel's gain that comes from the difference."""
-        return {n: RECTANGLE * abs(float(g)) for n, g in zip(self.names, self.gains, strict=True) if g}
+        return {n: _RECTANGLE * abs(float(g)) for n, g in zip(self.names, self.gains, strict=True) if g}
 
     def sentence(self) -> str:
         """Say which channel reads more than the others, and by how much."""
@@ -76,7 +76,7 @@ def inconsistent_channels(runs: Sequence[Observation]) -> tuple[InconsistentChan
 def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> InconsistentChannels | None:
     """Judge the phasors (n, m) of one set of channels: one of every sine, several of an excitation over a band."""
     along = directions([float(c.axis or 0.0) for c in channels])
-    if len(phasors) < MIN_RUNS or np.linalg.matrix_rank(along) < 2:
+    if len(phasors) < _MIN_RUNS or np.linalg.matrix_rank(along) < 2:
         return None
     outside = np.linalg.svd(along)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
     vectors = phasors @ np.linalg.pinv(along).T
@@ -90,9 +90,9 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
     gains = inverse @ target
     spread = float(np.sum((target - real @ gains) ** 2)) / max(len(target) - np.linalg.matrix_rank(real), 1)
     noise = np.sqrt(np.diag(inverse @ inverse.T) * spread)
-    stated = np.array([USUAL_GAIN if c.uncertainty is None else c.uncertainty for c in channels])
+    stated = np.array([_USUAL_GAIN if c.uncertainty is None else c.uncertainty for c in channels])
     allowed = np.sqrt(np.diag((inverse @ real) @ np.diag(stated**2) @ (inverse @ real).T))
-    if not (np.abs(gains) > np.maximum(CLEAR * allowed, SEEN * noise)).any():
+    if not (np.abs(gains) > np.maximum(_CLEAR * allowed, _SEEN * noise)).any():
         return None
     return InconsistentChannels(quantity, tuple(c.name for c in channels), -np.asarray(gains))
 

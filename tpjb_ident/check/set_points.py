@@ -21,7 +21,7 @@ _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 _SPEED_STILL = 2 * math.pi * 0.5
 _LINE_OVER_FLOOR = 8.0
 #: A mean force below this share of the set point is none, if it is not clearly there.
-NO_STATIC = (0.002, 0.02)
+_NO_STATIC = (0.002, 0.02)
 
 
 def plane_of(channels: Sequence[Channel]) -> FloatArray:
@@ -80,7 +80,7 @@ def without_static_part(ratios: ComplexArray) -> bool:
         return False
     mean = abs(complex(ratios.mean()))
     error = float(np.sqrt(np.mean(np.abs(ratios - ratios.mean()) ** 2) / max(len(ratios) - 1, 1)))
-    return bool(mean < NO_STATIC[0] or (mean < NO_STATIC[1] and mean < 4 * error))
+    return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and mean < 4 * error))
 
 
 def _check_static_load(observation: Observation, mean: NDArray[Any], ratio: float) -> None:

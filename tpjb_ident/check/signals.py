@@ -12,7 +12,7 @@ from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 
 #: Quantities without which a run of that kind says nothing.
-NEEDED = {
+_NEEDED = {
     "dynamic": ("displacement", "force", "acceleration"),
     "dry_pivot": ("displacement", "force"),
     "locus": ("displacement", "force"),
@@ -27,7 +27,7 @@ _MIN_CYCLES = 5.0
 
 def needed(run: Run, channel: Channel) -> bool:
     """Whether `run` cannot be used without `channel`."""
-    return channel.quantity in NEEDED[run.kind]
+    return channel.quantity in _NEEDED[run.kind]
 
 
 def check_signal(

@@ -28,7 +28,7 @@ _SAME_PAD = 25.0
 _AT_PAD = 12.0
 #: Numbers of pads that bearings have.
 _PADS = range(3, 13)
-Shown = tuple[Observation, float]
+_Shown = tuple[Observation, float]
 
 
 def _planes(observation: Observation) -> tuple[FloatArray, FloatArray] | None:
@@ -194,7 +194,7 @@ def _judge_gain(observation: Observation, gain: FloatArray) -> None:
     observation.report.say(f"signs {names}{hint}", "error" if hint else "warning", f"channels {names}", text, cure)
 
 
-def _check_labels(directions: Sequence[Shown]) -> None:
+def _check_labels(directions: Sequence[_Shown]) -> None:
     """Name runs whose pad number contradicts another run's.
 
     Two runs that contradict each other do not tell which of them is wrong. The others do: pads stand evenly around the
@@ -214,12 +214,12 @@ def _check_labels(directions: Sequence[Shown]) -> None:
         _tell(suspect, partner, odd.get(id(suspect[0])) if len(struck) == 1 else None)
 
 
-def _contradict(first: Shown, second: Shown) -> bool:
+def _contradict(first: _Shown, second: _Shown) -> bool:
     near = angle_between(first[1], second[1]) < _SAME_PAD
     return near != (first[0].run.pad == second[0].run.pad)
 
 
-def _tell(suspect: Shown, partner: Shown, belongs: int | None) -> None:
+def _tell(suspect: _Shown, partner: _Shown, belongs: int | None) -> None:
     """Name a contradiction, at the run that is wrong where that is known."""
     observation, shows = suspect
     text = f"pad {observation.run.pad} is loaded toward {shows:.0f} deg"
@@ -235,7 +235,7 @@ def _tell(suspect: Shown, partner: Shown, belongs: int | None) -> None:
         observation.report.say("pad", "error", "pad", text, cure)
 
 
-def _odd_ones(directions: Sequence[Shown]) -> dict[int, int]:
+def _odd_ones(directions: Sequence[_Shown]) -> dict[int, int]:
     """Runs (by identity) that the evenly spaced arrangement of all others leaves over, with the pad that they load.
 
     Empty where fewer than three runs agree on one arrangement, or where two arrangements serve as many.

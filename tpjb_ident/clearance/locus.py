@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run
 
 
-DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
-BLOCK = 0.1  # [s], for learning the noise
-NOISE_RUNS = 8  # that noise is learnt from, spread over the test
-SAME_DIRECTION = math.radians(1.0)
-LOAD_MISS = 0.05  # relative, between set point and measured load
-DIRECTION_MISS = math.radians(5.0)
+_DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+_BLOCK = 0.1  # [s], for learning the noise
+_NOISE_RUNS = 8  # that noise is learnt from, spread over the test
+_SAME_DIRECTION = math.radians(1.0)
+_LOAD_MISS = 0.05  # relative, between set point and measured load
+_DIRECTION_MISS = math.radians(5.0)
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ def _read(run: Run) -> _Record:
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
     steady = place - design[:, 1:] @ mean[1:, :2]
-    label = np.floor((time - time[0]) / BLOCK).astype(int)
+    label = np.floor((time - time[0]) / _BLOCK).astype(int)
     count = np.bincount(label)
     usual = np.median(count[count > 0])
     parts = [label == k for k in np.flatnonzero(count > 0.5 * usual)]
@@ -244,14 +244,14 @@ def _turning(time: FloatArray, speed: float) -> FloatArray:
 def _noise(records: list[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
     series = []
-    for record in records[:: max(1, len(records) // NOISE_RUNS)]:
+    for record in records[:: max(1, len(records) // _NOISE_RUNS)]:
         time, m = record.block_time, len(record.block_time)
-        series += [NoiseSeries(time, np.full(m, BLOCK), values, np.ones((m, 1))) for values in record.blocks.T]
+        series += [NoiseSeries(time, np.full(m, _BLOCK), values, np.ones((m, 1))) for values in record.blocks.T]
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
-        return NoiseModel(scatter * BLOCK, scatter, DRIFT_RATE)
-    return estimate_noise(series, DRIFT_RATE)
+        return NoiseModel(scatter * _BLOCK, scatter, _DRIFT_RATE)
+    return estimate_noise(series, _DRIFT_RATE)
 
 
 def _drift(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -> tuple[FloatArray, float]:
@@ -281,7 +281,7 @@ def _drift(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
     turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
     same = first.static_load == second.static_load and first.shaft_speed == second.shaft_speed
-    return same and turn < SAME_DIRECTION
+    return same and turn < _SAME_DIRECTION
 
 
 def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[Condition, ...]:
@@ -294,7 +294,7 @@ def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: F
     for p in points:
         load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
         turn = abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi))
-        if load_miss > LOAD_MISS or turn > DIRECTION_MISS:
+        if load_miss > _LOAD_MISS or turn > _DIRECTION_MISS:
             missed.append(p.run)
     if missed:
         status.append(Condition("load-off-set-point", ", ".join(missed)))

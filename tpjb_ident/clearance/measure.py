@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign, Run
     from rigdata.operating_point import OperatingPoint
 
-FEWEST_BLOCKS = 4  # per pad
-SAME_TEMPERATURE = 4.0  # [K]
-IRREGULAR = 3.0  # standard errors
-UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
-GAIN_ERRORS = 4.0  # standard errors, of few sides
-DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
+_FEWEST_BLOCKS = 4  # per pad
+_SAME_TEMPERATURE = 4.0  # [K]
+_IRREGULAR = 3.0  # standard errors
+_UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
+_GAIN_ERRORS = 4.0  # standard errors, of few sides
+_DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
 
 @dataclass(frozen=True, repr=False)
@@ -186,7 +186,7 @@ def measure_run(
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles = np.asarray(pivot_angles, dtype=float)
     contact = read_sweep(run, angles)
-    reached = np.bincount(contact.pad, minlength=len(angles)) >= FEWEST_BLOCKS
+    reached = np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS
     if reached.sum() < 3:
         what = f"clearance run {run.id} reaches {int(reached.sum())} of {len(angles)} pads"
         raise RigDataError(Problem("error", run.file, "record", what, "Check pad angles and channels", run=run.id))
@@ -244,7 +244,7 @@ def _gains_differ(run: Run, polygon: ClearancePolygon) -> tuple[Condition, ...]:
     first, second = probes
     axes = (float(first.axis or 0.0), float(second.axis or 0.0))
     ratio, se = gain_ratio(polygon.angles, polygon.fitted_angle - polygon.angles, polygon.fitted_angle_se, axes)
-    if not abs(ratio) > max(UNEQUAL, GAIN_ERRORS * se):
+    if not abs(ratio) > max(_UNEQUAL, _GAIN_ERRORS * se):
         return ()
     share = f"{100 * abs(ratio):.1f} % (se {100 * se:.1f} %)"
     more = "more" if ratio > 0 else "less"
@@ -284,7 +284,7 @@ def coldest_run(runs: Sequence[Run]) -> Run:
     temperatures = [_mean_temperature(run) for run in slow]
     coldest = min((t for t in temperatures if np.isfinite(t)), default=np.nan)
     # a temperature that nobody measured does not rule a sweep out
-    cold = [run for run, t in zip(slow, temperatures, strict=True) if not t > coldest + SAME_TEMPERATURE]
+    cold = [run for run, t in zip(slow, temperatures, strict=True) if not t > coldest + _SAME_TEMPERATURE]
     return min(cold, key=lambda run: run.point.static_load)
 
 
@@ -295,31 +295,31 @@ def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -
         status.append(Condition("pads-not-reached", missing))
     if np.isnan(fit.scale):
         status.append(Condition("give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"))
-    elif abs(fit.scale - 1.0) > max(IRREGULAR * fit.scale_se, DISAGREES):
+    elif abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES):
         detail = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
         status.append(Condition("pivots-disagree", detail))
     spread = np.abs(clearance - np.nanmedian(clearance))
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
-    deviating = np.flatnonzero(spread > np.maximum(IRREGULAR * se, 0.5e-6))
+    deviating = np.flatnonzero(spread > np.maximum(_IRREGULAR * se, 0.5e-6))
     if len(deviating):
         offsets = 1e6 * (clearance - np.nanmedian(clearance))
         listed = ", ".join(f"pad #{k + 1} {offsets[k]:+.1f} µm" for k in deviating)
         status.append(Condition("irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"))
     turn = np.nanmean(fit.tilt)
-    if abs(turn) > IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
+    if abs(turn) > _IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
         status.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))
     if fit.misfit > 4.0:
         status.append(Condition("misfit", "the scatter exceeds the noise"))
     return tuple(status)
 
 
-RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
+_RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 
 
 def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> tuple[float, FloatArray, FloatArray]:
     """Secant between two push loads of the same bearing: mean load [N], stiffness (n,) [N/m] and its standard error."""
     rise = heavy.push_load - light.push_load
-    if rise <= RISE * light.push_load:
+    if rise <= _RISE * light.push_load:
         loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
         raise ArgumentError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
     # each about its own centre: a zero that drifted between the runs is no deflection
@@ -345,7 +345,7 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
         change, change_se = clearance_change(base, polygon)
         light, heavy = sorted((base, polygon), key=lambda p: p.push_load)
         # one speed and one temperature, or nobody knows better
-        warmer = abs(base.temperature - polygon.temperature) > SAME_TEMPERATURE
+        warmer = abs(base.temperature - polygon.temperature) > _SAME_TEMPERATURE
         same = base.point.shaft_speed == polygon.point.shaft_speed and not warmer
         columns: dict[str, object] = {
             "run": polygon.run,
@@ -355,7 +355,7 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
             "change_m": change,
             "change_m_se": change_se,
         }
-        if same and heavy.push_load - light.push_load > RISE * light.push_load:
+        if same and heavy.push_load - light.push_load > _RISE * light.push_load:
             load, stiffness, stiffness_se = radial_stiffness(light, heavy)
             columns |= {"load_N": load, TANGENT: stiffness, f"{TANGENT}_se": stiffness_se}
         frames.append(pd.DataFrame(columns))

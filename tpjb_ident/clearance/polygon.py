@@ -39,15 +39,15 @@ from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 CentreRule = Literal["least-absolute", "least-squares"]
-EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
-DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
-TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
-SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
-SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
-CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
-CLIP = 5.0  # robust standard deviations
-SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
-ONE_SIGMA = 0.6826895
+_EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
+_DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
+_TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
+_SCALE_SPREAD = 0.05  # prior of g about 1: the dry tests know the pivots better than a sweep of 200 N
+_SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
+_CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
+_CLIP = 5.0  # robust standard deviations
+_SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
+_ONE_SIGMA = 0.6826895
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def find_centre(
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
-    error = EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
+    error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
     weights = np.ones(len(angles))
     solution: FloatArray = np.zeros(3)
     gain = np.zeros((3, len(angles)), dtype=float)
@@ -176,7 +176,7 @@ def fit_sides(
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
     deflection = _pivot_deflection(curves or (), used.pad, used.load)
-    whitener = _whitener(used, angles, noise, SLIDING * deflection * used.alone)
+    whitener = _whitener(used, angles, noise, _SLIDING * deflection * used.alone)
     system = _System(used, place, whitener, np.flatnonzero(reached), len(angles), noise)
     return _solve_unknown(system) if curves is None else _solve_known(system, curves)
 
@@ -211,7 +211,7 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
             centre = np.median(residual[good])
             spread = 1.4826 * np.median(np.abs(residual[good] - centre))
             # ten nanometres: what 16 bits resolve, so that a noise-free record keeps its averages
-            updated = np.abs(residual - centre) < CLIP * max(float(spread), 1e-8)
+            updated = np.abs(residual - centre) < _CLIP * max(float(spread), 1e-8)
             if np.array_equal(updated, good):
                 break
             good = updated
@@ -226,7 +226,7 @@ def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:
         members = contact.pad == k
         mean = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
         series.append(NoiseSeries(contact.time[members], contact.duration[members], contact.along[members], mean))
-    return estimate_noise(series, DRIFT_RATE)
+    return estimate_noise(series, _DRIFT_RATE)
 
 
 def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, unsure: FloatArray) -> FloatArray:
@@ -256,12 +256,12 @@ def _solve_known(system: _System, curves: Sequence[PivotCurve]) -> SideFit:
     shape = full[pad] * (np.cbrt(w) ** 2 - w)
     design = np.column_stack([system.design, shape, deflection])
     prior, mean = np.zeros(design.shape[1]), np.zeros(design.shape[1])
-    prior[-2:] = SHAPE_SPREAD**-2, SCALE_SPREAD**-2
+    prior[-2:] = _SHAPE_SPREAD**-2, _SCALE_SPREAD**-2
     mean[-1] = 1.0
     beta, covariance, misfit = _least_squares(system, design, prior, mean)
     deflection_se = np.zeros(system.count)
     for curve in curves:
-        lo, hi = curve.secant_band(push, ONE_SIGMA)
+        lo, hi = curve.secant_band(push, _ONE_SIGMA)
         deflection_se[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(hi / lo))
     sides = _sides(system, beta, covariance, misfit)
     # an error of a curve shifts its side by the share of the deflection that the sweep's averages carry on the mean
@@ -284,7 +284,7 @@ def _solve_unknown(system: _System) -> SideFit:
     w = np.maximum(system.contact.load, 0.0) / system.contact.push
     design = np.column_stack([system.design, system.of_pad * w[:, None], np.cbrt(w) ** 2 - w])
     prior = np.zeros(design.shape[1])
-    prior[-1] = CURVATURE_SPREAD**-2
+    prior[-1] = _CURVATURE_SPREAD**-2
     beta, covariance, misfit = _least_squares(system, design, prior, np.zeros(design.shape[1]))
     sides = _sides(system, beta, covariance, misfit)
     r = len(system.pads)
@@ -300,7 +300,7 @@ def _least_squares(
     """Generalised least squares with a Gaussian prior: values, covariance, whitened misfit."""
     r = len(system.pads)
     prior = prior.copy()
-    prior[r : 2 * r] = TILT_SPREAD**-2
+    prior[r : 2 * r] = _TILT_SPREAD**-2
     unit = np.max(np.abs(design), axis=0)
     x = system.whitener @ (design / unit)
     y = system.whitener @ system.contact.along

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from rigdata.campaign import Run
 
 
-BLOCK = 0.1  # [s]; five mains periods
-CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
-SHORTEST = 5  # samples in a piece
-MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
-LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
-TURN_NEEDED = 2.0 * np.pi * 0.97
+_BLOCK = 0.1  # [s]; five mains periods
+_CONTACT_DEPTH = 1.0e-6  # [m]: a pad counts as touched within this of its farthest position, plus its deflection
+_SHORTEST = 5  # samples in a piece
+_MOVING = 2.0  # robust standard deviations of the speed in corners above which the shaft is still on its way
+_LARGEST_DEFLECTION = 6.0e-6  # [m], of a pivot under the push load where no curve says it
+_TURN_NEEDED = 2.0 * np.pi * 0.97
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
     load, position, time = load[good], position[good], time[good]
     _check_turn(run, load, position)
     # whole turns of a shaft that turns: its runout averages out
-    turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else BLOCK
-    return _average(time, load, position, angles, float(turn * max(round(BLOCK / turn), 1)))
+    turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else _BLOCK
+    return _average(time, load, position, angles, float(turn * max(round(_BLOCK / turn), 1)))
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
@@ -70,7 +70,7 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     whole = len(load) // step * step
     load_mean, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) for part in (load, position))
     angle = np.unwrap(np.arctan2(load_mean[:, 1], load_mean[:, 0]))
-    if np.ptp(angle) < TURN_NEEDED:
+    if np.ptp(angle) < _TURN_NEEDED:
         what = f"turns its load through {np.degrees(np.ptp(angle)):.0f} deg only"
         raise _refused(run, what, "Sweep the load once around, 360 deg or more")
     place = place - 0.5 * (place.max(axis=0) + place.min(axis=0))
@@ -108,13 +108,13 @@ def _average(
     """Average per pad over pieces of `length` [s] in which the same pads are touched."""
     # the shaft touches a pad within some micrometres of where it was farthest out
     outward = position @ directions(angles).T
-    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - (CONTACT_DEPTH + LARGEST_DEFLECTION))
+    touched = np.asarray(outward > np.quantile(outward, 0.995, axis=0) - (_CONTACT_DEPTH + _LARGEST_DEFLECTION))
     carried = _carried(load, angles, touched)
     state = touched @ (1 << np.arange(len(angles)))
     piece = np.floor((time - time[0]) / length).astype(int)
     cuts = np.flatnonzero((np.diff(state) != 0) | (np.diff(piece) != 0)) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
-    long = (stops - starts) >= SHORTEST
+    long = (stops - starts) >= _SHORTEST
     starts, stops = starts[long], stops[long]
     count = (stops - starts).astype(float)
     period = float(time[-1] - time[0]) / (len(time) - 1)
@@ -150,7 +150,7 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
     ordinary = float(np.median(speed[corner]))
     spread = 1.4826 * float(np.median(np.abs(speed[corner] - ordinary)))
-    moving = corner & (speed >= ordinary + MOVING * spread)
+    moving = corner & (speed >= ordinary + _MOVING * spread)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
     return np.asarray(~corner | ~(moving | beside))

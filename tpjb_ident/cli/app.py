@@ -25,7 +25,7 @@ from tpjb_ident.cli.commands.watch import watch
 from tpjb_ident.cli.common.options import GroupedHelp
 
 #: What is written outside --out.
-CACHES = (
+_CACHES = (
     "Results go into --out. Outside it only caches are kept: pad solutions in the user's cache folder (at most 200 "
     "MB), the model's machine code beside the program (35 MB). The variable TPJB_CACHE names another folder for both; "
     "TPJB_CACHE=off keeps no pad solutions."
@@ -37,7 +37,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    epilog=CACHES,
+    epilog=_CACHES,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -57,10 +57,10 @@ def _common(
     pass
 
 
-COMMANDS = (
+_COMMANDS = (
     init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
     watch, verify,
 )  # fmt: skip
-for command in COMMANDS:
+for command in _COMMANDS:
     lines = "\n".join(f"  {example}" for example in command.examples)  # type: ignore[attr-defined]
     app.command(command.__name__, cls=GroupedHelp, epilog=f"\b\nExamples:\n{lines}")(command)

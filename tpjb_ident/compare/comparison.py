@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
-DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
+_DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
 
 
 class ComparisonError(TpjbError):
@@ -73,7 +73,7 @@ class CompareSettings:
     'isothermal'
     """
 
-    variants: tuple[str, ...] = DEFAULT_VARIANTS
+    variants: tuple[str, ...] = _DEFAULT_VARIANTS
     thermal: str = "adiabatic"
     effects: tuple[Effect, ...] = ()
     identify: IdentifySettings | None = None
@@ -409,7 +409,7 @@ def pivot_extrapolated(predicted: PointPrediction) -> bool:
     return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
 
 
-METHOD = "table"
+_METHOD = "table"
 
 
 def compare_table(
@@ -430,7 +430,7 @@ def compare_table(
         model = ModelSettings(name, settings.thermal, settings.effects)
         predictions = predict_points(bearing, [p.point for p in points], model, progress)
         variants.append(Variant(name, predictions))
-    identification = Identification(path.stem, METHOD, points, np.zeros((0, 8 * len(points))))
+    identification = Identification(path.stem, _METHOD, points, np.zeros((0, 8 * len(points))))
     source = TableSource(path.stem)
     return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
 
@@ -442,9 +442,9 @@ def _point(row: TableRow) -> PointResult:
         value[j], error[j] = row.coefficients.get(f"k{entry}", (np.nan, np.nan))
         value[4 + j], error[4 + j] = row.omega * np.array(row.coefficients.get(f"c{entry}", (np.nan, np.nan)))
     h = (value[:4] + 1j * value[4:]).reshape(2, 2)
-    stiffness = DynamicStiffness(h, row.omega, np.diag(error**2), np.full(8, np.inf), METHOD, np.zeros((0, 2)))
+    stiffness = DynamicStiffness(h, row.omega, np.diag(error**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nothing = np.full(2, np.nan)
     point = OperatingPoint(row.load, row.direction, row.speed, row.omega)
     return PointResult(
-        point, stiffness, {METHOD: stiffness}, row.load, nothing, nothing, {}, 0, 0, 0.0, np.nan, np.nan, (), (), ()
+        point, stiffness, {_METHOD: stiffness}, row.load, nothing, nothing, {}, 0, 0, 0.0, np.nan, np.nan, (), (), ()
     )

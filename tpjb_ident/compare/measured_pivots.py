@@ -25,27 +25,27 @@ def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -
 
 
 #: Effects that say how far pivots give way under load: a dry test measures just that.
-PIVOT_EFFECTS = frozenset({"pivot_flexibility", "soft_pivot"})
+_PIVOT_EFFECTS = frozenset({"pivot_flexibility", "soft_pivot"})
 #: Key of an effects file whose pivot effects are sizes beside measured pivots, as a diagnosis that began there writes.
-COUNTED_FROM = "counted_from"
-MEASURED = "measured pivots"
+_COUNTED_FROM = "counted_from"
+_MEASURED = "measured pivots"
 
 
 def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
     """Names of the effects that measured pivots hold already."""
-    return tuple(dict.fromkeys(e.name for e in effects if e.name in PIVOT_EFFECTS))
+    return tuple(dict.fromkeys(e.name for e in effects if e.name in _PIVOT_EFFECTS))
 
 
 def beside_measured(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Effects without those that measured pivots hold already."""
-    return tuple(e for e in effects if e.name not in PIVOT_EFFECTS)
+    return tuple(e for e in effects if e.name not in _PIVOT_EFFECTS)
 
 
 def counts_from_measured(path: Path | None) -> bool:
     """Whether an effects file says that its sizes are meant beside measured pivots."""
     if path is None:
         return False
-    return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(COUNTED_FROM) == MEASURED)
+    return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(_COUNTED_FROM) == _MEASURED)
 
 
 def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:

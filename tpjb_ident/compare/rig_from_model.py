@@ -33,7 +33,7 @@ INSTRUMENT_ERRORS = {
     "housing_mass": ("mass_error", "mass_error"),
 }
 #: Where the rig's temperature sensors sit, as a fraction of the arc.
-SENSOR_POSITION = 0.75
+_SENSOR_POSITION = 0.75
 
 
 class ModelConvergenceError(TpjbError):
@@ -103,7 +103,7 @@ class _SolvedSetup:
         return self._at(point).bearing_position + self.setup.structure @ load
 
     def temperature(self, point: OperatingPoint) -> FloatArray:
-        return self._at(point).pad_temperature(SENSOR_POSITION)
+        return self._at(point).pad_temperature(_SENSOR_POSITION)
 
     def pivot_deflection(self, pad: int, load: Any) -> FloatArray:
         law, angle = self.setup.pivots[pad - 1], self.setup.bearing.pads[pad - 1].pivot_angle

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 #: Measured over drawn clearance beyond which the probes' scale is wrong, or the bearing file is another bearing's.
-SCALE = (0.5, 2.0)
+_SCALE = (0.5, 2.0)
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def _of_sweep(run: Run, bearing: Bearing) -> list[Problem]:
         if condition == "probe-gains-differ":
             cure = "Check the sensitivities of both probes"
             problems.append(Problem("warning", run.file, f"channels {names}", condition.detail, cure, run.id))
-    if not SCALE[0] * drawn < measured < SCALE[1] * drawn:
+    if not _SCALE[0] * drawn < measured < _SCALE[1] * drawn:
         what = f"the sweep shows a clearance of {1e6 * measured:.3g} um, the bearing file says {1e6 * drawn:.3g} um"
         cure = "Check the sensitivities of the probes, and whether it is this bearing's file"
         problems.append(Problem("error", run.file, f"channels {names}", what, cure, run.id))

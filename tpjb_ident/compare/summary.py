@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
 
 #: Clearances no farther from the drawing are as drawn [m].
-AS_DRAWN = 0.3e-6
-PIVOTS_IN_WORDS = {
+_AS_DRAWN = 0.3e-6
+_PIVOTS_IN_WORDS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots (printed formula, tangent)",
     "kirk-secant": "Kirk pivots (printed formula as printed, secant)",
@@ -68,7 +68,7 @@ def closest(all_deviations: tuple[Deviation, ...]) -> str | None:
 
 
 #: Median deviation of a direct coefficient from which a model is said to be off.
-OFF = 0.05
+_OFF = 0.05
 
 
 def worth_a_diagnosis(all_deviations: tuple[Deviation, ...]) -> bool:
@@ -77,7 +77,7 @@ def worth_a_diagnosis(all_deviations: tuple[Deviation, ...]) -> bool:
     A direct coefficient by its tolerance, half of its points or more.
     """
     best_deviations = [d for d in all_deviations if d.pivots == closest(all_deviations) and math.isfinite(d.median)]
-    return any(abs(d.median) > OFF and d.inside <= 0.5 * d.n for d in best_deviations)
+    return any(abs(d.median) > _OFF and d.inside <= 0.5 * d.n for d in best_deviations)
 
 
 def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, ...]) -> str:
@@ -91,10 +91,10 @@ def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, .
         who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
         return (
             f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with "
-            f"{PIVOTS_IN_WORDS[best]}."
+            f"{_PIVOTS_IN_WORDS[best]}."
         )
     agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
-    return f"{name}: prediction and measurement {agrees} with {PIVOTS_IN_WORDS[best]}."
+    return f"{name}: prediction and measurement {agrees} with {_PIVOTS_IN_WORDS[best]}."
 
 
 def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
@@ -124,12 +124,12 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         best_deviations = [d for d in all_deviations if d.pivots == best]
         worst = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
         sentences.append(
-            f"The prediction comes closest with {PIVOTS_IN_WORDS[best]}: {_medians(best_deviations)} (median over "
+            f"The prediction comes closest with {_PIVOTS_IN_WORDS[best]}: {_medians(best_deviations)} (median over "
             f"{max(d.n for d in best_deviations)} points); the largest single deviation is {percent(worst.worst)} in "
             f"{worst.coefficient}."
         )
     sentences += [
-        f"With {PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
+        f"With {_PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
         for v in comparison.variants
         if v.name != best
     ]
@@ -166,7 +166,7 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
-    if abs(off[pad]) < AS_DRAWN:
+    if abs(off[pad]) < _AS_DRAWN:
         return [f"The measured clearance is that of the drawing, within {1e6 * abs(off[pad]):.1g} µm at every pad."]
     median, worst = signed(1e6 * float(np.nanmedian(off))), signed(1e6 * float(off[pad]))
     return [

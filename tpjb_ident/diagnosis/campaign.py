@@ -164,7 +164,7 @@ def measure_campaign(
     static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
     curves, polygon, locus = static.curves, static.clearance, static.locus
     identification = replace(identification, conditions=identification.conditions + static.left_out)
-    housing = with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
+    housing = _with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
     certain = _stated_tolerances(campaign, bearing, known or Tolerances())
     if polygon is None and locus is not None:
         certain = replace(certain, centre=unknown_centre(locus))
@@ -256,12 +256,12 @@ def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]
 
 
 #: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
-RUNS = 8
+_RUNS = 8
 #: Beyond, the housing does not move as far as accelerometers can tell [N/m].
-STIFF = 1e13
+_STIFF = 1e13
 
 
-def with_housing(setup: Setup, campaign: Campaign) -> Setup:
+def _with_housing(setup: Setup, campaign: Campaign) -> Setup:
     """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
     instruments = setup.instruments
     if math.isfinite(campaign.housing_mass):
@@ -277,7 +277,7 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
 
     Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
     """
-    runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:RUNS]
+    runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:_RUNS]
     if not any(c.quantity == "acceleration" for c in campaign.channels.values()):
         return None
     mass = campaign.housing_mass if math.isfinite(campaign.housing_mass) else 0.0
@@ -303,7 +303,7 @@ def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
     if np.any(np.all(np.isnan(table), axis=0)):
         return None
     x, y = (float(v) for v in np.nanmedian(table, axis=0))
-    return tuple(1.0 / max(c, 1.0 / STIFF) for c in (x, y))  # type: ignore[return-value]
+    return tuple(1.0 / max(c, 1.0 / _STIFF) for c in (x, y))  # type: ignore[return-value]
 
 
 def _over_band(run: Run, band: tuple[float, float], housing_mass: float, mains: float | None) -> RunPhasors:

@@ -39,9 +39,9 @@ ACCURACY = 1e-5
 #: Film mesh while models are compared: 0.02 % from the default in the coefficients, at half the time.
 MESH = Mesh(48, 4)
 #: Other explanations that a confirming test is chosen against.
-IMPOSTORS = 2
+_IMPOSTORS = 2
 #: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
-DIRECTIONS = 10
+_DIRECTIONS = 10
 #: Names of the two models in the column ``pivots``, as pictures label them.
 BEFORE, AFTER = "model before", "with the effects found"
 
@@ -151,18 +151,18 @@ def _rivals(result: Search) -> list[Fit]:
     for r in rows:
         if r.names != result.model.names:
             by_names.setdefault(r.names, r)
-    return list(by_names.values())[:IMPOSTORS]
+    return list(by_names.values())[:_IMPOSTORS]
 
 
 def _thinned(observations: Observations) -> Observations:
-    """Keep every second, third .. load direction of a locus that has more than `DIRECTIONS`."""
+    """Keep every second, third .. load direction of a locus that has more than `_DIRECTIONS`."""
     used_places = set()
     tests: dict[tuple[float, float], list[float]] = {}
     for locus_test in observations.layout.locus:
         tests.setdefault((locus_test.load, locus_test.speed), []).append(locus_test.direction)
     for (load, speed), directions in tests.items():
         around = sorted(set(directions), key=lambda a: a % (2 * np.pi))
-        step = -(-len(around) // DIRECTIONS)
+        step = -(-len(around) // _DIRECTIONS)
         used_places |= {(load, speed, a) for a in around[::step]}
     selected = np.array([
         e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in used_places

@@ -34,12 +34,12 @@ from tpjb_ident.diagnosis.search.components import usual_factor
 
 HZ = 2 * math.pi
 #: Step of the supply temperature that a cooler can make [K].
-HOTTER = 10.0
+_HOTTER = 10.0
 #: The model knows one sense of rotation: a shaft that turns clockwise is, seen in a mirror along the y axis, one that
 #: turns counter-clockwise. There x becomes -x, angles pi minus themselves, and a pad's leading edge its trailing one.
 _MIRROR = np.diag([-1.0, 1.0])
 #: How far from the middle of its pad a pivot may sit for the shaft to turn either way [share of the arc].
-CENTRAL = 0.05
+_CENTRAL = 0.05
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class Design:
         """The model of this test, for what `planned` lists."""
         if self.change is None:
             return Forward(setup, self.layout, seen.elements)
-        return ChangedForward(setup, self.layout, seen.elements, last=self.change)
+        return _ChangedForward(setup, self.layout, seen.elements, last=self.change)
 
 
 @dataclass
-class ChangedForward(Forward):
+class _ChangedForward(Forward):
     """A model of a rig that the test itself has changed; `last` is done after effects and nuisances."""
 
     last: Change = lambda setup: setup
@@ -166,8 +166,8 @@ def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
             Layout(at.tests([at.low, at.top], at.lines)), blind=frozenset({"housing_flexibility"}),
         ),
         Design(
-            f"the load sweep repeated with the oil {HOTTER:.0f} K hotter at the inlet, with pad temperatures", sweep,
-            change=functools.partial(_hotter, by=HOTTER),
+            f"the load sweep repeated with the oil {_HOTTER:.0f} K hotter at the inlet, with pad temperatures", sweep,
+            change=functools.partial(_hotter, by=_HOTTER),
         ),
         Design(
             "the load sweep repeated with so much oil that more changes nothing, with pad temperatures", sweep,
@@ -223,7 +223,7 @@ def _dry(layout: Layout, pads: int) -> list[Design]:
 
 def reversible(setup: Setup) -> bool:
     """Whether every pad would carry with the shaft turning the other way."""
-    return all(abs(pad.pivot_offset - 0.5) <= CENTRAL for pad in setup.bearing.pads)
+    return all(abs(pad.pivot_offset - 0.5) <= _CENTRAL for pad in setup.bearing.pads)
 
 
 def mirrored(setup: Setup) -> Setup:
@@ -253,9 +253,9 @@ def _map(one: SensorMap) -> SensorMap:
 
 #: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong
 #: explanation's chi-square exceeds the right one's by 9 in 95 of 100 cases.
-TELLING, ENOUGH = 3.0, 5.0
+_TELLING, _ENOUGH = 3.0, 5.0
 #: Difference of chi-square from which one explanation counts as the right one.
-MARGIN = 9.0
+_MARGIN = 9.0
 
 
 @dataclass(frozen=True)
@@ -315,16 +315,16 @@ def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> fl
 
 
 def chance(separation: float) -> float:
-    """Probability that chi-square of the wrong explanation exceeds the right one's by `MARGIN`.
+    """Probability that chi-square of the wrong explanation exceeds the right one's by `_MARGIN`.
 
     The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
     """
-    return float(ndtr((separation**2 - MARGIN) / (2.0 * separation))) if separation > 0.0 else 0.0
+    return float(ndtr((separation**2 - _MARGIN) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
     """Return the best test, or the best two together where the best alone would not settle the matter."""
-    if len(tests) < 2 or tests[0].expected >= ENOUGH:
+    if len(tests) < 2 or tests[0].expected >= _ENOUGH:
         return tuple(tests[:1])
     return max(itertools.combinations(tests, 2), key=together)
 
@@ -338,7 +338,7 @@ def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
     """In words: what `suggested` gives, and what it is expected to tell."""
     names = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
-    if expected < TELLING:
+    if expected < _TELLING:
         return (
             f"nothing on the list separates {one} from {names} (best: {words}, {expected:.1f} standard deviations); "
             "a change of hardware would, such as another oil or another bearing on the same rig"

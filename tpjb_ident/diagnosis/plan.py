@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-SEEN = 6.0
-CONFUSABLE = 3.0
+_SEEN = 6.0
+_CONFUSABLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class CampaignPlan:
             (self.candidates[i].label, self.candidates[j].label)
             for i in range(n)
             for j in range(i + 1, n)
-            if min(self.separation[i, j], self.separation[j, i]) < CONFUSABLE
+            if min(self.separation[i, j], self.separation[j, i]) < _CONFUSABLE
         )
 
     @property
@@ -93,7 +93,7 @@ class CampaignPlan:
 
         rows = []
         for i, c in enumerate(self.candidates):
-            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < CONFUSABLE]
+            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < _CONFUSABLE]
             at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
             rows.append(
                 {
@@ -111,12 +111,12 @@ class CampaignPlan:
 def plan(setup: Setup, layout: Layout, pool: Sequence[Candidate] | None = None) -> CampaignPlan:
     """Work out what a layout of tests could tell."""
     chosen = tuple(pool if pool is not None else one_amplitude(setup.bearing))
-    shown = signatures(setup, layout, chosen)
+    shown = _signatures(setup, layout, chosen)
     return separated(chosen, np.asarray(np.linalg.solve(shown.factor(), shown.columns)))
 
 
 @dataclass(frozen=True)
-class Signatures:
+class _Signatures:
     """What every candidate does to the observation vector of a layout, beside what hides it."""
 
     observations: Observations
@@ -128,14 +128,14 @@ class Signatures:
         return usual_factor(self.observations, self.nuisances if free else self.nuisances[:, :0])
 
 
-def signatures(setup: Setup, layout: Layout, chosen: Sequence[Candidate]) -> Signatures:
+def _signatures(setup: Setup, layout: Layout, chosen: Sequence[Candidate]) -> _Signatures:
     """Work out the signature of every candidate on a layout."""
     observations = planned_observations(setup, layout)
     forward = Forward(setup, layout, observations.elements)
     base = forward()
     free = at_baseline(forward, (), setup, Tolerances(), base)
     columns = [_signature(forward, base, c) for c in chosen]
-    return Signatures(observations, free, np.column_stack(columns))
+    return _Signatures(observations, free, np.column_stack(columns))
 
 
 def _signature(forward: Forward, base: FloatArray, candidate: Candidate) -> FloatArray:
@@ -159,19 +159,19 @@ def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size
     cosine = np.clip(unit.T @ unit, -1.0, 1.0)
-    separation = SEEN * np.sqrt(1.0 - cosine**2)
+    separation = _SEEN * np.sqrt(1.0 - cosine**2)
     np.fill_diagonal(separation, np.nan)
     return CampaignPlan(tuple(chosen), size, separation)
 
 
-DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
-FAMILIES = {
+_DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})
+_FAMILIES = {
     "B": frozenset({"h"}),
     "C": frozenset({"h", "locus", "load", "clearance"}),
     "D": frozenset({"h", "locus", "load", "clearance", "dry", "temperature"}),
 }
 #: Second speed of data set E over the planned one.
-FASTER = 1.5
+_FASTER = 1.5
 
 
 @dataclass(frozen=True)
@@ -197,17 +197,17 @@ class DataSet:
 
 def data_sets(setup: Setup, layout: Layout) -> tuple[DataSet, ...]:
     """Work out what every data set sees at typical sizes and mixes up at d' = 6, nuisances known and free."""
-    faster = tuple(replace(t, speed=FASTER * t.speed) for t in layout.dynamic)
+    faster = tuple(replace(t, speed=_FASTER * t.speed) for t in layout.dynamic)
     chosen = one_amplitude(setup.bearing)
-    shown = signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
+    shown = _signatures(setup, replace(layout, dynamic=(*layout.dynamic, *faster)), chosen)
     planned = {t.speed for t in layout.dynamic}
     return tuple(
         DataSet(name, int(mask.sum()), *(_told(shown, mask, chosen, free) for free in (False, True)))
-        for name, mask in masks(shown.observations.elements, planned).items()
+        for name, mask in _masks(shown.observations.elements, planned).items()
     )
 
 
-def _told(shown: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
+def _told(shown: _Signatures, mine: BoolArray, chosen: Sequence[Candidate], free: bool) -> CampaignPlan:
     """Sizes and separations by a part of the elements."""
     factor = shown.factor(free)
     part = (factor @ factor.T)[np.ix_(mine, mine)]
@@ -216,7 +216,7 @@ def _told(shown: Signatures, mine: BoolArray, chosen: Sequence[Candidate], free:
     return separated(chosen, np.asarray(np.linalg.solve(whole, shown.columns[mine] / scale[:, None])))
 
 
-def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
+def _masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArray]:
     """Elements of every data set."""
     families = np.array([e.family for e in elements])
     first = np.array([not np.isfinite(e.place("speed")) or e.place("speed") in planned for e in elements])
@@ -225,7 +225,7 @@ def masks(elements: Sequence[Element], planned: set[float]) -> dict[str, BoolArr
     frequencies, counts = np.unique(line[np.isfinite(line)], return_counts=True)
     usual = frequencies[counts == counts.max()]
     usual_line = line == usual[len(usual) // 2]
-    direct = np.array([e.observable in DIRECT for e in elements])
+    direct = np.array([e.observable in _DIRECT for e in elements])
     masks = {"A": direct & usual_line & first}
-    masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in FAMILIES.items()}
+    masks |= {name: np.isin(families, sorted(families_used)) & first for name, families_used in _FAMILIES.items()}
     return {**masks, "E": np.ones(len(elements), dtype=bool)}

@@ -23,7 +23,7 @@ from tpjb_ident.diagnosis.observations.observe import (
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
 #: position [m], temperature [K], share of a dry compliance, angle of a polygon side [rad].
-STIFFNESS, POSITION, TEMPERATURE, DRY, ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 3e-4
+_STIFFNESS, _POSITION, _TEMPERATURE, _DRY, _ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 3e-4
 
 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
@@ -33,13 +33,13 @@ def planned_observations(setup: Setup, layout: Layout) -> Observations:
     value = Forward(setup, layout, elements)()
     scale = direct_scale(elements, value)
     table: dict[str, tuple[np.ndarray | float, np.ndarray | float]] = {
-        "h": (STIFFNESS * scale, tolerance.stiffness * scale),
-        "temperature": (TEMPERATURE, tolerance.temperature),
-        "locus": (POSITION, tolerance.position),
+        "h": (_STIFFNESS * scale, tolerance.stiffness * scale),
+        "temperature": (_TEMPERATURE, tolerance.temperature),
+        "locus": (_POSITION, tolerance.position),
         "load": (tolerance.load_miss, tolerance.load),
-        "dry": (DRY, tolerance.dry),
-        "clearance": (POSITION, tolerance.position),
-        "side": (ANGLE, tolerance.angle),
+        "dry": (_DRY, tolerance.dry),
+        "clearance": (_POSITION, tolerance.position),
+        "side": (_ANGLE, tolerance.angle),
     }
     columns = np.zeros((2, len(value)))
     for i, e in enumerate(elements):

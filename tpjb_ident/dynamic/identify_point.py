@@ -27,9 +27,9 @@ from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 #: Windows that a run needs, for its mean to be nearly free of each window's own noise.
-MIN_WINDOWS = 5
+_MIN_WINDOWS = 5
 #: Smallest sine of the angle between two excitation directions that counts as two.
-MIN_SINE = 0.1
+_MIN_SINE = 0.1
 
 
 def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
@@ -125,7 +125,7 @@ def point_result(
 
 def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
     """Every method that was asked for and applies, the default one in any case."""
-    drive = nominal_drive(data)
+    drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     table = replace(table, directions_differ=differ)
     estimates: dict[str, DynamicStiffness] = {}
@@ -153,7 +153,7 @@ def disagreement(by_method: dict[str, DynamicStiffness], default: str) -> tuple[
     return (Condition("methods-disagree", f"{', '.join(conditions)} away from {default}"),)
 
 
-def nominal_drive(data: PointData) -> ComplexArray | None:
+def _nominal_drive(data: PointData) -> ComplexArray | None:
     """Instruments (n, 2) [N] of one point's windows; None where the campaign cannot give them.
 
     The format has no channel for the actuators' command. But every run states the direction of its excitation, and the
@@ -165,7 +165,7 @@ def nominal_drive(data: PointData) -> ComplexArray | None:
     if (
         len(stated_angles) < len(angles)
         or len(stated_angles) < 2
-        or np.abs(np.sin(stated_angles - stated_angles[0])).max() < MIN_SINE
+        or np.abs(np.sin(stated_angles - stated_angles[0])).max() < _MIN_SINE
     ):
         return None
     result = np.full(data.F.shape, np.nan + 0j)
@@ -173,7 +173,7 @@ def nominal_drive(data: PointData) -> ComplexArray | None:
         selected = data.run_index == i
         along = data.F[selected] @ np.array([np.cos(angle), np.sin(angle)])
         along = along[np.isfinite(along)]
-        if len(along) < MIN_WINDOWS:
+        if len(along) < _MIN_WINDOWS:
             return None
         drive = np.median(along.real) + 1j * np.median(along.imag)
         result[selected] = drive * np.array([np.cos(angle), np.sin(angle)])

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Columns of ``plain.csv`` besides the point's and the coefficients'.
-FIGURES = ("norm", "window_s", "n_records", "n_windows", "status")
+_FIGURES = ("norm", "window_s", "n_records", "n_windows", "status")
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
         for name, value, error in zip(COEFFICIENT_COLUMNS, values, p.standard_error * factor):
             row[name], row[f"{name}_se"] = value, error
         figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, "; ".join(p.status) or "ok")
-        rows.append(row | dict(zip(FIGURES, figures)))
+        rows.append(row | dict(zip(_FIGURES, figures)))
     columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
-    return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *columns, *FIGURES])
+    return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *columns, *_FIGURES])
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:

@@ -8,7 +8,7 @@ from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
 from tpjb_ident.presentation import changed
 
 #: Methods of ``estimators.csv``; ``"rlm:tukey"`` names a norm.
-TABLED = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv")
+_TABLED = ("ols", "rlm:huber", "rlm:tukey", "mm", "mm-eiv", "iv")
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class IdentifySettings:
     """
 
     method: str = "mm-eiv"
-    methods: tuple[str, ...] = TABLED
+    methods: tuple[str, ...] = _TABLED
     phasors: PhasorSettings = field(default_factory=PhasorSettings)
     clearance: float | None = None
     correct: bool = True

@@ -110,7 +110,7 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
     usable = frame[finite]
     reasons, doubtful = [], []
     for _, row in usable.iterrows():
-        reasons.append(distrust(row))
+        reasons.append(_distrust(row))
         if reasons[-1]:
             doubtful.append(f"{_place(row)}: {reasons[-1]}")
     usable = usable.assign(_trusted=[not reason for reason in reasons], _reasons=reasons)
@@ -153,7 +153,7 @@ def _with_reasons(quality: object, reasons: str) -> str:
     return "; ".join(dict.fromkeys(names)) or "ok"
 
 
-def distrust(row: Mapping[str, Any]) -> str:
+def _distrust(row: Mapping[str, Any]) -> str:
     """Say why a row of coefficients is not to be trusted.
 
     A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a

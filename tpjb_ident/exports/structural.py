@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rigdata.run import Run
 
 #: Unit of each quantity after calibration.
-UNITS = {
+_UNITS = {
     "displacement": "m",
     "force": "N",
     "acceleration": "m/s^2",
@@ -47,13 +47,13 @@ def sep005(run: Run) -> list[dict[str, Any]]:
 
     signals = []
     for name, channel in run.channels.items():
-        if channel.quantity not in UNITS:
+        if channel.quantity not in _UNITS:
             continue
         record = run.record(name)
         signal: dict[str, Any] = {
             "name": name,
             "data": record.values,
-            "unit_str": UNITS[channel.quantity],
+            "unit_str": _UNITS[channel.quantity],
             "quantity": channel.quantity,
             "group": run.id,
         }

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 NAME = "bearing_coefficients"
 #: Beside files of a form that holds no intervals.
 INTERVALS = f"{NAME}_intervals.csv"
-FIELDS = (
+_FIELDS = (
     "load_N", "direction_deg", "speed_Hz", "frequency_rad_per_s", "K", "C", "K_lo", "K_hi", "C_lo", "C_hi",
     "quality", "trusted",
 )  # fmt: skip
 
 
-def coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
+def _coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
     """One row per static point and frequency."""
     import pandas as pd
 
@@ -54,7 +54,7 @@ def write_intervals(folder: Path, points: tuple[StaticPoint, ...]) -> None:
 
 
 def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
-    frame = safe_for_spreadsheets(coefficient_table(points))
+    frame = safe_for_spreadsheets(_coefficient_table(points))
     write_atomic(path, lambda part: frame.to_csv(part, index=False, encoding="utf-8", lineterminator="\n"))
 
 
@@ -63,7 +63,7 @@ def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) ->
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = pa.Table.from_pandas(coefficient_table(points), preserve_index=False)
+    table = pa.Table.from_pandas(_coefficient_table(points), preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), b"source": printable(source).encode()})
     write_atomic(folder / f"{NAME}.parquet", lambda part: pq.write_table(table, part))
 
@@ -82,7 +82,7 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
     book = Workbook()
     sheet = book.active
     sheet.title = "coefficients"
-    frame = coefficient_table(points)
+    frame = _coefficient_table(points)
     for column, name in enumerate(frame.columns, start=1):
         _text(sheet.cell(1, column), str(name))
         sheet.column_dimensions[sheet.cell(1, column).column_letter].width = max(12, len(str(name)) + 2)
@@ -128,7 +128,7 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
     """
     from scipy.io import savemat
 
-    array = np.zeros(len(points), dtype=[(name, object) for name in FIELDS])
+    array = np.zeros(len(points), dtype=[(name, object) for name in _FIELDS])
     for i, p in enumerate(points):
         array[i] = (
             p.load, p.direction, p.speed, p.frequency,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
 
 #: Tables of an output folder that hold coefficients.
-RESULT_TABLES = ("coefficients.csv", "prediction.csv")
+_RESULT_TABLES = ("coefficients.csv", "prediction.csv")
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def result_table(path: Path) -> Path | None:
     """Find the table of coefficients in an output folder of tpjb."""
     if path.is_file() and path.suffix == ".csv":
         return path
-    return next((path / name for name in RESULT_TABLES if (path / name).is_file()), None)
+    return next((path / name for name in _RESULT_TABLES if (path / name).is_file()), None)
 
 
 def read_result_table(path: Path) -> pd.DataFrame:
@@ -113,7 +113,7 @@ def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataF
     if isinstance(source, (str, Path)):
         path = result_table(Path(source))
         if path is None:
-            raise ExportError(f"{source}: holds neither {' nor '.join(RESULT_TABLES)}. Give results of tpjb identify.")
+            raise ExportError(f"{source}: holds neither {' nor '.join(_RESULT_TABLES)}. Give results of tpjb identify.")
         return read_result_table(path), path.parent.resolve().name
     from tpjb_ident.dynamic.results.identification import Identification
 

@@ -20,7 +20,7 @@ from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.steps import Hold
 from tpjb_ident.slow_records.bad_samples import piece_means
 
-TURN = 0.02  # of the load range: a smaller way back is noise
+_TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
 
 
@@ -154,10 +154,10 @@ def _split(start: float, stop: float, length: float, number: int) -> list[tuple[
 
 
 def _directions(load: FloatArray) -> IntArray:
-    """Sense of the load's way (m,): it turns only when the load has come back by `TURN` of its range."""
+    """Sense of the load's way (m,): it turns only when the load has come back by `_TURN` of its range."""
     if not len(load):  # a logger too slow for a single piece
         return np.zeros(0, dtype=int)
-    turn = TURN * float(np.ptp(load))
+    turn = _TURN * float(np.ptp(load))
     travel = load - load[0]
     direction = 1 if travel[int(np.argmax(np.abs(travel) > turn))] >= 0.0 else -1
     sense = np.full(len(load), direction)

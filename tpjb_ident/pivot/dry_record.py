@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
-FEWEST_SAMPLES = 50
-MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
-FEWEST_BLOCKS = 8
-UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
-AROUND = 0.35  # [Hz] in which the mains is looked for
-SMOOTH = 0.1  # [s]: whole periods of either, so that taking off the running mean leaves the pick-up whole
-NOISE_FROM, NOISE_TO = 1.0, 4.0  # [Hz] off the mains, where noise is measured
-SHORTEST = 3.0  # [s] of record
+_FEWEST_SAMPLES = 50
+_MOST_LOST = 0.5  # share of samples lost to gaps and glitches above which a record is refused
+_FEWEST_BLOCKS = 8
+_UNDITHERED = 0.3  # share of samples that differ from the one before, below which noise does not reach a step
+_AROUND = 0.35  # [Hz] in which the mains is looked for
+_SMOOTH = 0.1  # [s]: whole periods of either, so that taking off the running mean leaves the pick-up whole
+_NOISE_FROM, _NOISE_TO = 1.0, 4.0  # [Hz] off the mains, where noise is measured
+_SHORTEST = 3.0  # [s] of record
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,14 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     """Read one dry run; `pad_angles` (n_pads,) [rad]."""
     if run.pad is None or not 1 <= run.pad <= len(pad_angles):
         what = f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}"
-        raise refusal(run, "pad", what, "Correct the manifest")
+        raise _refusal(run, "pad", what, "Correct the manifest")
     angle = float(pad_angles[run.pad - 1])
     time, load, displacement, good = slow_samples(run, settings.longest_glitch)
     good &= np.isfinite(time)
     lost = 1.0 - float(np.mean(good)) if len(good) else 1.0
-    if len(good) < FEWEST_SAMPLES or lost > MOST_LOST:
+    if len(good) < _FEWEST_SAMPLES or lost > _MOST_LOST:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches"
-        raise refusal(run, "record", what, "Repeat the test")
+        raise _refusal(run, "record", what, "Repeat the test")
     pickup = _pickup(run, {"force": load, "displacement": displacement}, good)
     order = np.flatnonzero(good)
     if np.any(np.diff(time[order]) <= 0.0):
@@ -98,18 +98,18 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     samples = Samples(time[order], load[order], displacement[order], angle)
     if float(np.ptp(samples.along)) <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
         what = "does not move: a dead or disconnected channel"
-        raise refusal(run, "force or displacement", what, "Check the channels of this run")
+        raise _refusal(run, "force or displacement", what, "Check the channels of this run")
     holds = find_holds(samples.time, samples.along)
     blocks = cut_blocks(samples, holds, settings.block)
-    if len(blocks) < FEWEST_BLOCKS:
+    if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
-        raise refusal(run, "record", what, "Record for longer, or set a shorter block")
+        raise _refusal(run, "record", what, "Record for longer, or set a shorter block")
     good = np.ones(len(blocks), dtype=bool)
     step = _quantisation(samples.displacement)
     return DryRecord(run, run.pad, angle, holds, blocks, good, lost, step, pickup, load_direction(blocks))
 
 
-def refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
+def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
     """Error that names the run, the place, the trouble and the cure."""
     return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))
 
@@ -121,7 +121,7 @@ def _quantisation(displacement: FloatArray) -> float:
         moves = np.abs(np.diff(column))
         # two channels turned into X and Y leave rounding residues: those are no steps
         real = moves > 1e-6 * np.ptp(column)
-        if real.any() and real.mean() < UNDITHERED:
+        if real.any() and real.mean() < _UNDITHERED:
             worst = max(worst, float(np.min(moves[real])) / math.sqrt(6.0))
     return worst
 
@@ -143,11 +143,11 @@ def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> Pic
 def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:
     """Mains line in the channels (n,) of one run at `rate` [Hz]; only samples that are `good` (n,) take part."""
     n = len(good)
-    if n < SHORTEST * rate or rate < 2.2 * max(MAINS_FREQUENCIES) or good.sum() < 0.5 * n:
+    if n < _SHORTEST * rate or rate < 2.2 * max(MAINS_FREQUENCIES) or good.sum() < 0.5 * n:
         return None
     index = np.arange(n)
     window = np.hanning(n) * good
-    width = max(int(SMOOTH * rate + 0.5), 3)
+    width = max(int(_SMOOTH * rate + 0.5), 3)
     rows = []
     for column in values.values():
         whole = column if good.all() else np.interp(index, index[good], column[good])
@@ -159,10 +159,10 @@ def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: floa
     strength = 0.0
     for mains in MAINS_FREQUENCIES:
         distance = np.abs(frequency - mains)
-        beside = (distance > NOISE_FROM) & (distance < NOISE_TO)
+        beside = (distance > _NOISE_FROM) & (distance < _NOISE_TO)
         noise = np.sqrt(np.mean(np.abs(spectra[:, beside]) ** 2, axis=1))
         power = np.sum(np.abs(spectra / np.maximum(noise, 1e-300)[:, None]) ** 2, axis=0)
-        peak = int(np.argmax(np.where(distance < AROUND, power, 0.0)))
+        peak = int(np.argmax(np.where(distance < _AROUND, power, 0.0)))
         if power[peak] > strength:
             strength = float(power[peak])
             strongest = PickupSignature(tuple(values), spectra[:, peak], noise)

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
 
-MISFIT_PROBABILITY = 1e-4
-CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
-MANY_LOST = 0.05
+_MISFIT_PROBABILITY = 1e-4
+_CLEAR_CHOICE = 0.5  # posterior share below which the law counts as undecided
+_MANY_LOST = 0.05
 
 
 def fit_pivots(
@@ -167,7 +167,7 @@ def assemble_curve(
 
 def _misfits(fit: LawFit) -> bool:
     """Whether the points scatter about the law more than their noise allows."""
-    return fit.freedom > 0 and bool(special.chdtrc(fit.freedom, fit.chi_square) < MISFIT_PROBABILITY)
+    return fit.freedom > 0 and bool(special.chdtrc(fit.freedom, fit.chi_square) < _MISFIT_PROBABILITY)
 
 
 def _widened(fit: LawFit) -> LawFit:
@@ -250,7 +250,7 @@ def _status(
     shares: dict[str, float] = {}
     for fit, weight in zip(curve.fits, curve.weights, strict=True):
         shares[fit.name] = shares.get(fit.name, 0.0) + float(weight)
-    if shares[law.name] < CLEAR_CHOICE:
+    if shares[law.name] < _CLEAR_CHOICE:
         listed = ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
         status.append(Condition("law-undecided", listed))
     if law.name == "spline":
@@ -259,7 +259,7 @@ def _status(
         status.append(Condition("misfit", "the scatter exceeds the noise"))
     if not any(record.holds for record in records):
         status.append(Condition("no-holds", "drift cannot be told from deflection"))
-    if any(record.lost > MANY_LOST for record in records):
+    if any(record.lost > _MANY_LOST for record in records):
         status.append(Condition("samples-lost"))
     return status
 

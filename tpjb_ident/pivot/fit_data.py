@@ -22,9 +22,9 @@ from tpjb_ident.slow_records.noise import NoiseModel
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only
 UNKNOWN_ZERO = 2.0e-5  # [m], spread of the reading at zero load from run to run of one pad
-MOST_BAD = 0.3  # share of the groups that may be dropped
+_MOST_BAD = 0.3  # share of the groups that may be dropped
 GROUPS_ON_RAMP = 15
-STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
+_STICKS_WITHIN = 0.08  # of the load at a reversal: twice the friction of a poor pivot
 
 
 def fit_data(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSettings) -> FitData:
@@ -63,7 +63,7 @@ def bad_blocks(record: DryRecord, noise: NoiseModel, settings: PivotSettings) ->
     """Blocks (m,) that belong to bad steps, or to a reversal."""
     groups = _groups(record)
     bad = sticking(record.blocks.load, record.blocks.branch)
-    for _ in range(int(MOST_BAD * len(np.unique(groups)))):
+    for _ in range(int(_MOST_BAD * len(np.unique(groups)))):
         data = fit_data([replace(record, good=~bad)], noise, settings)
         worst, size = _worst(fit_law(LAWS["spline"], True, data), data, groups[~bad])
         if size < settings.bad_hold_limit:
@@ -82,7 +82,7 @@ def sticking(load: FloatArray, branch: IntArray) -> BoolArray:
             reversal = float(load[k - 1])
         if reversal is None:
             continue
-        if abs(load[k] - reversal) < STICKS_WITHIN * abs(reversal):
+        if abs(load[k] - reversal) < _STICKS_WITHIN * abs(reversal):
             stuck[k] = True
         else:
             reversal = None

@@ -24,14 +24,14 @@ from tpjb_ident.pivot.laws import Law
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
 CONTACT_LOAD_SPREAD = 0.6  # of ln F0 about a tenth of the largest load
-ITERATIONS = 60  # a law far from its prior, such as an exponent of 0.4, takes 40
-LONGEST_STEP = 1.0  # in any shape parameter or logarithm
-CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
-PSEUDO_PADS = 0.5
-CONTACT_VOTE = 0.3  # what a pad with incomplete contact says of the law counts: it saw the upper loads only
-CONTACT_LOSS_PRIOR = 0.3  # share of pads with incomplete contact at low load: two of five in the paper
-SPLINE_PRIOR = 0.02  # of a physical law's prior: a spline takes contact loss for a soft pivot, so physics goes first
-SMALLEST_WEIGHT = 1e-3  # laws below it are dropped
+_ITERATIONS = 60  # a law far from its prior, such as an exponent of 0.4, takes 40
+_LONGEST_STEP = 1.0  # in any shape parameter or logarithm
+_CONVERGED = 3e-3  # change of the misfit (chi-square) that no longer matters
+_PSEUDO_PADS = 0.5
+_CONTACT_VOTE = 0.3  # what a pad with incomplete contact says of the law counts: it saw the upper loads only
+_CONTACT_LOSS_PRIOR = 0.3  # share of pads with incomplete contact at low load: two of five in the paper
+_SPLINE_PRIOR = 0.02  # of a physical law's prior: a spline takes contact loss for a soft pivot, so physics goes first
+_SMALLEST_WEIGHT = 1e-3  # laws below it are dropped
 ALIKE = 0.25  # spread of the shape among pads of one make, as a share of what is plausible for any pivot
 SMALLEST_SHARE = 0.05  # that the other pads give a law, together, for its shape to be asked for
 HOPELESS = 25.0  # below the pad's best log-evidence: no prior makes up for that
@@ -229,7 +229,7 @@ def _minimise(initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray) -
     damping = 1e-3
     theta = initial.theta
     cost, chi_square, residual, jacobian = evaluate(theta)
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         hessian = jacobian.T @ jacobian + precision
         gradient = jacobian.T @ residual - precision @ ((theta - prior.mean) / unit)
         # a parameter that stands at its bound and wants to go on takes no part in the step
@@ -239,14 +239,14 @@ def _minimise(initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray) -
         damped[at_bound, at_bound] = 1.0
         step = np.linalg.solve(damped, np.where(at_bound, 0.0, gradient)) * unit
         # shapes and logarithms: a contact gap near zero leaves its decay load free to run away
-        step *= min(1.0, LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:] / unit[SCALE:]))), 1e-300))
+        step *= min(1.0, _LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:] / unit[SCALE:]))), 1e-300))
         trial = np.clip(theta + step, prior.low, prior.high)
         trial_state = evaluate(trial)
         if trial_state[0] <= cost:
             gain = cost - trial_state[0]
             theta, (cost, chi_square, residual, jacobian) = trial, trial_state
             damping = max(damping * 0.2, 1e-9)
-            if gain < CONVERGED:
+            if gain < _CONVERGED:
                 break
         else:
             damping *= 8.0
@@ -258,8 +258,8 @@ def _minimise(initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray) -
 def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...]:
     """Posterior shares (n,) of the n fits of every pad."""
     names = sorted({fit.name for candidates in fits for fit in candidates})
-    prior = {name: SPLINE_PRIOR if name == "spline" else 1.0 for name in names}
-    prior = {name: PSEUDO_PADS * value / sum(prior.values()) for name, value in prior.items()}
+    prior = {name: _SPLINE_PRIOR if name == "spline" else 1.0 for name in names}
+    prior = {name: _PSEUDO_PADS * value / sum(prior.values()) for name, value in prior.items()}
     weights = [_pad_weights(candidates, prior) for candidates in fits]
     for _ in range(30):
         votes = [_votes(candidates, shares, names) for candidates, shares in zip(fits, weights, strict=True)]
@@ -279,14 +279,14 @@ def _votes(candidates: Sequence[LawFit], shares: FloatArray, names: Sequence[str
     """What one pad says of each law to the others."""
     votes = dict.fromkeys(names, 0.0)
     for fit, share in zip(candidates, shares, strict=True):
-        votes[fit.name] += float(share * (CONTACT_VOTE if fit.contact else 1.0))
+        votes[fit.name] += float(share * (_CONTACT_VOTE if fit.contact else 1.0))
     return votes
 
 
 def _pad_weights(candidates: Sequence[LawFit], law_prior: Mapping[str, float]) -> FloatArray:
     logs = np.zeros(len(candidates))
     for k, fit in enumerate(candidates):
-        contact_prior = CONTACT_LOSS_PRIOR if fit.contact else 1 - CONTACT_LOSS_PRIOR
+        contact_prior = _CONTACT_LOSS_PRIOR if fit.contact else 1 - _CONTACT_LOSS_PRIOR
         logs[k] = np.log(law_prior[fit.name] * contact_prior) + fit.log_evidence
     weights = np.exp(logs - np.max(logs))
     return np.asarray(weights / weights.sum())
@@ -294,7 +294,7 @@ def _pad_weights(candidates: Sequence[LawFit], law_prior: Mapping[str, float]) -
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
     """The fits that count, most likely first, with shares (n,) that sum to one."""
-    order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= SMALLEST_WEIGHT]
+    order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= _SMALLEST_WEIGHT]
     shares = weights[order]
     return tuple(fits[k] for k in order), np.asarray(shares / shares.sum())
 

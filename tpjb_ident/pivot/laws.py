@@ -280,11 +280,11 @@ class _Spline(_Shape):
 
     def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
         logs = np.insert(q, FIXED, 0.0)
-        weighted = GRID_LOAD * np.exp(GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
-        columns = np.column_stack([weighted, weighted[:, None] * np.delete(GRID_WEIGHTS, FIXED, axis=1)])
+        weighted = _GRID_LOAD * np.exp(_GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
+        columns = np.column_stack([weighted, weighted[:, None] * np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
         # below the grid the compliance is a power of the load, integrable whatever the slope says
         slope = max((logs[1] - logs[0]) / (NODES[1] - NODES[0]), -0.9)
-        trapezoids = 0.5 * GRID_STEP * (columns[1:] + columns[:-1])
+        trapezoids = 0.5 * _GRID_STEP * (columns[1:] + columns[:-1])
         total = np.vstack([np.zeros(columns.shape[1]), np.cumsum(trapezoids, axis=0)])
         below = columns[0] / (1.0 + slope)
         # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
@@ -292,8 +292,8 @@ class _Spline(_Shape):
         below[1], below[2] = below[1] + turn, below[2] - turn
         total += below
         # between grid points the integral is a power of the load: interpolate its logarithm
-        x = np.clip((np.log(np.maximum(u, 1e-12)) - GRID[0]) / GRID_STEP, None, len(GRID) - 1.0)
-        cell = np.clip(x.astype(int), 0, len(GRID) - 2)
+        x = np.clip((np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP, None, len(_GRID) - 1.0)
+        cell = np.clip(x.astype(int), 0, len(_GRID) - 2)
         part = x - cell
         value = total[:, 0]
         log = np.log(value)
@@ -316,10 +316,10 @@ def _interpolation(x: FloatArray) -> FloatArray:
 
 
 # ln u on which the compliance is integrated
-GRID, GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
-GRID_LOAD = np.exp(GRID)
-GRID_WEIGHTS = _interpolation(GRID)
-ALL: tuple[Law, ...] = (
+_GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
+_GRID_LOAD = np.exp(_GRID)
+_GRID_WEIGHTS = _interpolation(_GRID)
+_ALL: tuple[Law, ...] = (
     _HertzLine(),
     _HertzPoint(),
     _Power(),
@@ -328,4 +328,4 @@ ALL: tuple[Law, ...] = (
     _Bilinear(),
     _Spline(),
 )
-LAWS = {law.name: law for law in ALL}
+LAWS = {law.name: law for law in _ALL}

@@ -13,16 +13,16 @@ from rigdata.problem import Problem
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
 
-ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
-ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
-ALONG = 0.5  # of the clearance: pads may differ, but not by this much
-CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
+_ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
+_ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
+_ALONG = 0.5  # of the clearance: pads may differ, but not by this much
+_CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
 #: Pads that must be there: two numbers are fitted.
-FEWEST = 4
+_FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
-SLACK = 0.1
-MATCHES = 30.0  # chi-square below which two runs show one signature (6 degrees of freedom; by chance above: 4e-5)
-CLEARER = 25.0  # by which a mistake undone must lower it
+_SLACK = 0.1
+_MATCHES = 30.0  # chi-square below which two runs show one signature (6 degrees of freedom; by chance above: 4e-5)
+_CLEARER = 25.0  # by which a mistake undone must lower it
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def check_directions(records: Sequence[DryRecord], settings: PivotSettings, pad_
 
 
 def _problem(record: DryRecord, place: str, what: str) -> Problem:
-    return Problem("error", record.run.file, place, what, CURE, run=record.run.id)
+    return Problem("error", record.run.file, place, what, _CURE, run=record.run.id)
 
 
 def _suspect(record: DryRecord, settings: PivotSettings, pad_angles: FloatArray) -> str:
@@ -117,7 +117,7 @@ def structure_behind(
     size along its own direction would move the shaft further along some pads than it moved.
     """
     phi, along = np.asarray(angles, float), np.asarray(slopes, float)
-    if len(set(np.round(phi, 6))) < FEWEST or np.any(along <= 0.0):
+    if len(set(np.round(phi, 6))) < _FEWEST or np.any(along <= 0.0):
         return None
     if any(abs(direction.angle) >= 0.5 * math.pi for direction in directions):
         return None
@@ -128,7 +128,7 @@ def structure_behind(
     structure = Structure(2.0 * math.hypot(p, q), 0.5 * math.atan2(q, -p))
     across_residual = across - np.array([structure.across(float(angle)) for angle in phi])
     pivot_alone = along - np.array([structure.along(float(angle)) for angle in phi])
-    if np.any(pivot_alone < -SLACK * along) or np.any(np.abs(across_residual) > math.tan(limit) * along):
+    if np.any(pivot_alone < -_SLACK * along) or np.any(np.abs(across_residual) > math.tan(limit) * along):
         return None
     return structure
 
@@ -151,11 +151,11 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     starts = along_pad[:, None] * outward + across_pad[:, None] * tangent
     centre, distance = _centre(starts, outward)
     asides = np.sum((starts - centre) * tangent, axis=1)
-    limit = max(ASIDE * distance, ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
+    limit = max(_ASIDE * distance, _ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
     problems = []
     for record, start, normal, aside in zip(records, starts, outward, asides, strict=True):
         along = float((start - centre) @ normal)
-        if abs(aside) > limit or abs(along - distance) > ALONG * distance:
+        if abs(aside) > limit or abs(along - distance) > _ALONG * distance:
             what = (
                 f"run {record.run.id}: the shaft stands {1e6 * along:.0f} um toward pad {record.pad} and "
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
@@ -224,13 +224,13 @@ def _mistake(
 ) -> tuple[str, int] | None:
     """The mistake that, undone, makes a signature that of most runs it now differs from."""
     sizes = [(pickup, _mismatch(signature, pickup)) for pickup in comparable]
-    different = [(pickup, size) for pickup, size in sizes if size > MATCHES]
+    different = [(pickup, size) for pickup, size in sizes if size > _MATCHES]
     needed = max(2, math.ceil(len(comparable) / 2))
     if len(different) < needed:
         return None
     likeliest: tuple[str, int] | None = None
     for what, undone in _undone(signature, pairs):
-        agree = sum(_mismatch(undone, pickup) < min(MATCHES, size - CLEARER) for pickup, size in different)
+        agree = sum(_mismatch(undone, pickup) < min(_MATCHES, size - _CLEARER) for pickup, size in different)
         if agree >= needed and (likeliest is None or agree > likeliest[1]):
             likeliest = (what, agree)
     return likeliest

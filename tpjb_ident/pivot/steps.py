@@ -12,10 +12,10 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 
-STILL = 0.2  # share of the mean rate of change below which the load counts as held
-SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
-FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
-MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
+_STILL = 0.2  # share of the mean rate of change below which the load counts as held
+_SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
+_FEWEST = 4  # bins of a hold: 0.16 s, longer in long records
+_MAINS_PERIOD = 0.02  # [s]: averages over whole periods carry no pickup
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,20 @@ def find_holds(time: FloatArray, load: FloatArray) -> tuple[Hold, ...]:
     rate = np.gradient(bins.load, bins.time)
     # noise adds to the way, but at most a tenth of what the second limit is above it
     mean_rate = float(np.sum(np.abs(np.diff(bins.load)))) / float(bins.time[-1] - bins.time[0])
-    still_rate = max(STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
+    still_rate = max(_STILL * mean_rate, 3.0 * bins.noise / (np.sqrt(2.0) * bins.width))
     runs = _runs(np.abs(rate) < still_rate)
     holds = []
     for run in _merge(runs, bins):
         hold = _settle(run, bins)
         if hold is not None:
             holds.append(hold)
-    return tuple(_with_branches(holds, float(bins.load[0]), SETTLED * bins.noise))
+    return tuple(_with_branches(holds, float(bins.load[0]), _SETTLED * bins.noise))
 
 
 def _bin(time: FloatArray, load: FloatArray) -> _Bins:
     """Load medians over bins of two mains periods (longer for long records)."""
     span = float(time[-1] - time[0])
-    width = MAINS_PERIOD * max(2.0, np.ceil(span / MAINS_PERIOD / 2000.0))
+    width = _MAINS_PERIOD * max(2.0, np.ceil(span / _MAINS_PERIOD / 2000.0))
     label = np.floor((time - time[0]) / width + 1e-9).astype(int)
     edges = np.flatnonzero(np.diff(label)) + 1
     starts, stops = np.r_[0, edges], np.r_[edges, len(time)]
@@ -101,16 +101,16 @@ def _merge(runs: list[tuple[int, int]], bins: _Bins) -> list[tuple[int, int]]:
 def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
     """Cut the overshoot off the front of a run and the first moving bin off either end."""
     a, b = run
-    while b - a >= FEWEST:
+    while b - a >= _FEWEST:
         level = float(np.median(bins.load[a:b]))
         noise = max(bins.noise, 1.4826 * float(np.median(np.abs(bins.load[a:b] - level))), 1e-9 * abs(level))
-        if abs(bins.load[a] - level) > SETTLED * noise:
+        if abs(bins.load[a] - level) > _SETTLED * noise:
             a += 1
-        elif abs(bins.load[b - 1] - level) > SETTLED * noise:
+        elif abs(bins.load[b - 1] - level) > _SETTLED * noise:
             b -= 1
         else:
             break
-    if b - a < FEWEST:
+    if b - a < _FEWEST:
         return None
     start = float(bins.time[a]) - 0.5 * bins.width
     stop = float(bins.time[b - 1]) + 0.5 * bins.width

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Formula = Callable[[int, float], tuple[float, float]]
-ROWS = 20  # up to the largest measured load
+_ROWS = 20  # up to the largest measured load
 
 
 def load_grid(curves: Sequence[PivotCurve], extrapolate_to: float = 1.6) -> FloatArray:
     """Round loads [N] up to `extrapolate_to` times the largest measured one (n,)."""
     largest = max(curve.valid_to for curve in curves)
-    raw = largest / ROWS
+    raw = largest / _ROWS
     decade = 10.0 ** np.floor(np.log10(raw))
     step = decade * next(m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * decade >= 0.99 * raw)
     return np.asarray(step * np.arange(1, int(extrapolate_to * largest / step + 1e-9) + 1))
@@ -139,15 +139,15 @@ def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-SCHEMA = "tpjb-pivots/1"
-TOML_ROWS = 160
-SMALLEST = 5e-4  # first load of the table, as a share of the largest measured one
-EXTRAPOLATE_TO = 2.5
+_SCHEMA = "tpjb-pivots/1"
+_TOML_ROWS = 160
+_SMALLEST = 5e-4  # first load of the table, as a share of the largest measured one
+_EXTRAPOLATE_TO = 2.5
 
 
 def table_loads(curve: PivotCurve) -> FloatArray:
     """Loads of the table [N]: zero, then geometric steps (n,)."""
-    return np.r_[0.0, np.geomspace(SMALLEST * curve.valid_to, EXTRAPOLATE_TO * curve.valid_to, TOML_ROWS)]
+    return np.r_[0.0, np.geomspace(_SMALLEST * curve.valid_to, _EXTRAPOLATE_TO * curve.valid_to, _TOML_ROWS)]
 
 
 def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
@@ -156,7 +156,7 @@ def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
         raise ArgumentError("curves must hold at least one PivotCurve")
     lines = [
         "# Measured pivot laws: pivot and housing together, as the probes on the housing see them.",
-        f'schema = "{SCHEMA}"',
+        f'schema = "{_SCHEMA}"',
         f"source = {_quoted(source)}",
         "includes_housing = true",
     ]

@@ -133,11 +133,11 @@ def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
             tables=[
                 measured_table(comparison.identification),
                 *([] if table else [budget_table(comparison.identification)]),
-                predicted_table(frame),
+                _predicted_table(frame),
             ],
         )
     )
-    flags = flag_table(comparison)
+    flags = _flag_table(comparison)
     text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
     sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
     sections.append(set_up_section(comparison))
@@ -158,7 +158,7 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
             "Pivots, from the dry tests",
             notes=[note],
             panels=pivot_panels(comparison.curves, formula),
-            tables=[pivot_points_table(comparison.curves, formula)],
+            tables=[_pivot_points_table(comparison.curves, formula)],
         )
     ]
 
@@ -172,13 +172,13 @@ def _position_sections(comparison: Comparison) -> list[Section]:
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
     if not panels:
         return []
-    tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
+    tables = [] if comparison.clearance is None else [_clearance_table(comparison.clearance, drawn[1])]
     return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
 
 
-DIRECT = ("kxx", "kyy", "cxx", "cyy")
+_DIRECT = ("kxx", "kyy", "cxx", "cyy")
 #: Loads at which pivot stiffness is tabled [N].
-PIVOT_LOADS = (2000.0, 4000.0)
+_PIVOT_LOADS = (2000.0, 4000.0)
 
 
 def measured_table(result: Identification) -> Table:
@@ -197,13 +197,13 @@ def measured_table(result: Identification) -> Table:
     return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
 
 
-def predicted_table(frame: pd.DataFrame) -> Table:
+def _predicted_table(frame: pd.DataFrame) -> Table:
     """Direct coefficients predicted with every pivot model, and how far off each is."""
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     for _, row in ordered.iterrows():
         cells = []
-        for name in DIRECT:
+        for name in _DIRECT:
             column = coefficient_column(name)
             cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
@@ -211,13 +211,13 @@ def predicted_table(frame: pd.DataFrame) -> Table:
         label = f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
         rows.append([label, VARIANT_LABEL[row["pivots"]], *cells, remark or ""])
     columns = ["point", "pivots"]
-    for name in DIRECT:
+    for name in _DIRECT:
         columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]
     columns.append("remark")
     return Table("Predicted", columns, rows, frozenset({0, 1, len(columns) - 1}))
 
 
-def flag_table(comparison: Comparison) -> Table:
+def _flag_table(comparison: Comparison) -> Table:
     """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
     identified = comparison.identification
     parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
@@ -243,15 +243,15 @@ def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     return out
 
 
-def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
+def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
     """Tangent stiffness of every pad at two loads beside the printed formula's."""
     columns = ["pad", "law"]
-    for load in PIVOT_LOADS:
+    for load in _PIVOT_LOADS:
         columns += [f"at {load / 1e3:g} kN, MN/m", "of Kirk's tangent"]
     rows = []
     for curve in curves:
         cells = []
-        for load in PIVOT_LOADS:
+        for load in _PIVOT_LOADS:
             value = float(curve.stiffness(load))
             low, high = (float(v) for v in curve.stiffness_band(load))
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
@@ -261,7 +261,7 @@ def pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) ->
     return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))
 
 
-def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
+def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad beside the drawing's, in µm."""
     rows = []
     for k, drawing in enumerate(drawn):

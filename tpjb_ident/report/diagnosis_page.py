@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
 
 #: The gaps of a verdict in words; each is another question.
-GAPS = {
+_GAPS = {
     "before": "all points, model as stated",
     "after": "all points, with what was added, all else as stated",
     "heldout_before": "points that no fit has seen, model as stated",
@@ -37,7 +37,7 @@ GAPS = {
     "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
     "noise_floor": "what noise alone would leave",
 }
-GROUP = "Where model and measurement part"
+_GROUP = "Where model and measurement part"
 OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
@@ -78,10 +78,10 @@ def _effects_table(verdict: Verdict) -> Table:
 
 
 def _gap_table(verdict: Verdict) -> Table:
-    gaps = {name: verdict.gap[name] for name in GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
+    gaps = {name: verdict.gap[name] for name in _GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
     if not verdict.effects:  # nothing was added: before and after are the same
         gaps = {name: value for name, value in gaps.items() if not name.endswith("after")}
-    rows = [[GAPS[name], f"{value:.2f}"] for name, value in gaps.items()]
+    rows = [[_GAPS[name], f"{value:.2f}"] for name, value in gaps.items()]
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
 
 
@@ -129,7 +129,7 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
     sections = _effect_sections(verdict) + _coefficient_sections(table) + _other_explanations(verdict)
     sections.append(
         Section(
-            GROUP,
+            _GROUP,
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
             tables=[
@@ -158,13 +158,13 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     frame = residual_frame(diagnosis)
     for over, name, title in OVER:
         try:
-            panels.append(panel(name, title, residual_series(frame, over), GROUP))
+            panels.append(panel(name, title, residual_series(frame, over), _GROUP))
         except ValueError:  # nothing varies over it
             continue
     if len(frame):
-        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), GROUP))
+        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), GROUP)]
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), _GROUP)]
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 #: Observables of a diagnosis in words.
-OBSERVABLES = {
+_OBSERVABLES = {
     "locus_x": "the shaft's horizontal position",
     "locus_y": "the shaft's vertical position",
     "load_ratio": "the size of the measured load",
@@ -23,7 +23,7 @@ OBSERVABLES = {
     "dry_compliance": "the dry pivot tests",
     "pad_temperature": "the pad temperatures",
 }
-DIRECT = ("kxx", "kyy", "cxx", "cyy")
+_DIRECT = ("kxx", "kyy", "cxx", "cyy")
 
 
 def verdict_sentences(
@@ -32,8 +32,8 @@ def verdict_sentences(
     """Say what came out, the answer first."""
     sentences = [_answer(name, verdict, deviations)]
     if deviations and verdict.verdict != "consistent":
-        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
-        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
+        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in _DIRECT if c in deviations)
+        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in _DIRECT if c in deviations)
         with_effects = f"; with it {after}" if verdict.effects else ""
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
@@ -102,7 +102,7 @@ def _remainder_sentences(verdict: Verdict) -> list[str]:
 
 def observable(name: str) -> str:
     """An observable in words."""
-    return OBSERVABLES.get(name, label_in_words(name))
+    return _OBSERVABLES.get(name, label_in_words(name))
 
 
 def place(range_text: str) -> str:
@@ -121,7 +121,7 @@ def place(range_text: str) -> str:
 def in_words(text: str) -> str:
     """A sentence of a diagnosis without the names of its variables."""
     found = place(text).removeprefix("at ")
-    for name, words in OBSERVABLES.items():
+    for name, words in _OBSERVABLES.items():
         found = found.replace(name, words)
     return label_in_words(re.sub(r"(-?\d(?:\.\d+)?e[+-]?\d+) (N/m|N s/m|m|rad)\b", _read, found))
 

@@ -28,7 +28,7 @@ from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
-PNG_DPI = 160
+_PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
 _SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 _USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
@@ -69,7 +69,7 @@ def shape(svg: str) -> str:
 
 
 #: Panels from which on a second process draws too, and how many processes do at most.
-TOGETHER, MOST_HANDS = 6, 4
+_TOGETHER, _MOST_HANDS = 6, 4
 #: What is being drawn, for processes that are forked from this one.
 _drawn: dict[int, tuple[Panel, ...]] = {}
 _numbers = itertools.count()
@@ -83,10 +83,10 @@ def panel(name: str, title: str, figure: Figure | Callable[[], Figure], group: s
 def svg_text(figure: Figure, name: str) -> str:
     """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
     buffer = io.StringIO()
-    points = hover_points(figure)
+    points = _hover_points(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return with_titles(buffer.getvalue(), points)
+    return _with_titles(buffer.getvalue(), points)
 
 
 def inline_svg(text: str, name: str, title: str) -> str:
@@ -115,8 +115,8 @@ def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     _drawn[number] = tuple(panels)
     try:
         # forked: what is drawn is there already, and a few panels are not worth a second process
-        alone = len(panels) < TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
-        with local_workers(1 if alone else min(cores(), MOST_HANDS), start="fork") as opened:
+        alone = len(panels) < _TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
+        with local_workers(1 if alone else min(cores(), _MOST_HANDS), start="fork") as opened:
             jobs = [(number, index, folder) for index in range(len(panels))]
             texts = list(map_ordered(opened, _save_panel, jobs))
     finally:
@@ -141,14 +141,14 @@ def _on_white(svg: str) -> str:
 
 def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
     pixels = io.BytesIO()
-    figure.savefig(pixels, format="rgba", dpi=PNG_DPI, facecolor="white")
-    width, height = (int(inches * PNG_DPI) for inches in figure.get_size_inches())
+    figure.savefig(pixels, format="rgba", dpi=_PNG_DPI, facecolor="white")
+    width, height = (int(inches * _PNG_DPI) for inches in figure.get_size_inches())
     opaque = Image.frombytes("RGBA", (width, height), pixels.getvalue()).convert("RGB")  # a third of the file
-    opaque.save(path, format="PNG", dpi=(PNG_DPI, PNG_DPI), compress_level=4)
+    opaque.save(path, format="PNG", dpi=(_PNG_DPI, _PNG_DPI), compress_level=4)
 
 
 @dataclass(frozen=True)
-class HoverPoints:
+class _HoverPoints:
     """Markers of one line: where they are drawn and what they say."""
 
     gid: str
@@ -156,7 +156,7 @@ class HoverPoints:
     texts: tuple[str, ...]
 
 
-def hover_points(figure: Figure) -> tuple[HoverPoints, ...]:
+def _hover_points(figure: Figure) -> tuple[_HoverPoints, ...]:
     """Give every line with markers a name that the SVG keeps, and work out what its points say."""
     lines = []
     for i, axes in enumerate(figure.axes):
@@ -185,7 +185,7 @@ def _errorbars(axes: Axes) -> tuple[dict[Line2D, str], dict[Line2D, np.ndarray]]
     return labels, halves
 
 
-def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarray | None) -> HoverPoints:
+def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarray | None) -> _HoverPoints:
     x = np.asarray(line.get_xdata(), dtype=float)
     y = np.asarray(line.get_ydata(), dtype=float)
     shown = axes.transData.transform(np.column_stack([x, y])) * _POINTS_PER_INCH / figure.dpi
@@ -197,7 +197,7 @@ def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: 
     for k in range(len(x)):
         spread = f" ± {half[k]:.2g}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
         texts.append(f"{name}{_with_unit(yl, y[k], spread)} at {_with_unit(xl, x[k])}")
-    return HoverPoints(str(line.get_gid()), places, tuple(texts))
+    return _HoverPoints(str(line.get_gid()), places, tuple(texts))
 
 
 def _with_unit(label: str, value: float, spread: str = "") -> str:
@@ -207,8 +207,8 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
     return f"{name} {value:.4g}{spread} {unit}".strip()
 
 
-def with_titles(svg: str, lines: tuple[HoverPoints, ...]) -> str:
-    """Put a title into every marker of the drawing that `hover_points` knows."""
+def _with_titles(svg: str, lines: tuple[_HoverPoints, ...]) -> str:
+    """Put a title into every marker of the drawing that `_hover_points` knows."""
     for points in lines:
         start = svg.find(f'<g id="{points.gid}"')
         if start < 0:
@@ -227,7 +227,7 @@ def _end_of_group(svg: str, start: int) -> int:
     return len(svg)
 
 
-def _titled(points: HoverPoints, match: re.Match[str]) -> str:
+def _titled(points: _HoverPoints, match: re.Match[str]) -> str:
     place = np.array([float(match[1]), float(match[2])])
     with np.errstate(invalid="ignore"):  # a spot off the axes has no place, and NaN is never near
         away = np.abs(points.places - place).max(axis=1)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
 
 #: SI unit of a calibrated quantity, what people read, and its size in SI.
-SENSITIVITY = {
+_SENSITIVITY = {
     "displacement": ("µm", 1e-6),
     "force": ("N", 1.0),
     "acceleration": ("m/s²", 1.0),
@@ -39,9 +39,9 @@ SENSITIVITY = {
     "pressure": ("MPa", 1e6),
     "speed": ("rad/s", 1.0),
 }
-KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
+_KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip
-EVIDENCE = "Raw evidence of one run"
+_EVIDENCE = "Raw evidence of one run"
 
 
 def set_up_section(comparison: Comparison) -> Section:
@@ -63,9 +63,9 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     """Channels with their calibration."""
     rows = []
     for channel in channels:
-        if channel.quantity not in SENSITIVITY:
+        if channel.quantity not in _SENSITIVITY:
             continue
-        unit, scale = SENSITIVITY[channel.quantity]
+        unit, scale = _SENSITIVITY[channel.quantity]
         axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
         place = axis if channel.pad is None else f"pad #{channel.pad}"
         uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
@@ -108,7 +108,7 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         p = run.point
         several = run.kind in {"locus", "dry_pivot"}
         key = (
-            KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load / 1e3:g}" if p.static_load else "–",
+            _KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load / 1e3:g}" if p.static_load else "–",
             "several" if several else f"{p.static_load_direction_deg:g}", f"{p.shaft_speed_hz:g}",
             f"{p.excitation_hz:g}" if p.excitation else "–", f"{run.sample_rate:g}",
         )  # fmt: skip
@@ -125,8 +125,8 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section | No
     panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
     if result.points:
         title = "Force that the displacements do not explain"
-        panels.append(panel("coherence-points", title, functools.partial(coherence, result), EVIDENCE))
-    return Section(EVIDENCE, panels=panels) if panels else None
+        panels.append(panel("coherence-points", title, functools.partial(coherence, result), _EVIDENCE))
+    return Section(_EVIDENCE, panels=panels) if panels else None
 
 
 def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
@@ -139,10 +139,10 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
             label = f"run {run.id}, {point_label(point)}"
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
-                      orbit(run), EVIDENCE),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), EVIDENCE),
+                      orbit(run), _EVIDENCE),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
-                      coherence_spectrum(run), EVIDENCE),
+                      coherence_spectrum(run), _EVIDENCE),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -157,12 +157,12 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         title = (
             f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
         )
-        panels.append(panel("h-over-frequency", title, functools.partial(frf, result), EVIDENCE))
+        panels.append(panel("h-over-frequency", title, functools.partial(frf, result), _EVIDENCE))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {key['static_load_N'] / 1e3:g} kN, "
                  f"{key['shaft_speed_Hz']:g} Hz shaft speed, {key['excitation']}")  # fmt: skip
-        panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), EVIDENCE))
+        panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), _EVIDENCE))
     return panels
 
 

@@ -100,19 +100,19 @@ def save_isolability(folder: Path, plans: Mapping[str, CampaignPlan]) -> None:
 
 
 #: A picture of more channels could not be read.
-MOST = 24
+_MOST = 24
 _ROW, _WIDTH = 1.15, 9.0
 _POINTS = 4000
 
 
 def write_quick_look(folder: Path, title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> None:
     """Write ``figures/quick-look.svg`` and ``.png``."""
-    save_panels([panel("quick-look", title, quick_look(title, series, looks), "")], folder / "figures")
+    save_panels([panel("quick-look", title, _quick_look(title, series, looks), "")], folder / "figures")
 
 
-def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
+def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    shown = list(series)[:MOST]
+    shown = list(series)[:_MOST]
     height = _ROW * len(shown) + 0.9
     figure = Figure(figsize=(_WIDTH, height))
     figure.suptitle(printable(title), fontsize=FONT_SIZE + 1, color=INK, y=1.0 - 0.15 / height)

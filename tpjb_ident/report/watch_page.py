@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from tpjb_ident.watch.watcher import Snapshot
 
 #: Words of the page for the states of a run.
-WORDS = {"to run": "to run", "being written": "being written", "good": "good", "look": "good, with a remark",
+_WORDS = {"to run": "to run", "being written": "being written", "good": "good", "look": "good, with a remark",
          "repeat": "repeat", "replaced": "replaced by a repeat"}  # fmt: skip
-KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
+_KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
          "baseline": "baseline runs"}  # fmt: skip
 
 
@@ -68,7 +68,7 @@ def coverage_table(snapshot: Snapshot) -> Table:
 def _group(status: RunStatus) -> str:
     run, p = status.run, status.run.point
     if run.kind != "dynamic":
-        return KINDS[run.kind]
+        return _KINDS[run.kind]
     set_point = f"{p.static_load / 1e3:g} kN, {p.static_load_direction_deg:g} deg, shaft {p.shaft_speed_hz:g} Hz"
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
@@ -147,5 +147,5 @@ def _records_table(snapshot: Snapshot) -> Table:
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
         remarks += [f"not in the manifest; {why[s.run.id]}"] if s.run.id in why else []
-        rows.append([s.landed[11:19], s.run.id, described(s.run), WORDS[s.state], "; ".join(remarks)])
+        rows.append([s.landed[11:19], s.run.id, described(s.run), _WORDS[s.state], "; ".join(remarks)])
     return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows, frozenset(range(5)))

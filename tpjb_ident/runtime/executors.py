@@ -37,11 +37,11 @@ from tpjb_ident.runtime.threads import limit_threads, one_thread_each
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
 #: Jobs handed out per worker before the first comes back: enough that nobody waits, few enough to cancel.
-AHEAD = 4
+_AHEAD = 4
 #: Losses in a row, without any job done between them, after which the workers are given up.
-MAX_LOSSES = 3
+_MAX_LOSSES = 3
 #: Seconds without any job done after which somebody looks whether there are workers at all.
-STALLED = 60.0
+_STALLED = 60.0
 
 
 class LostJobsError(TpjbError):
@@ -196,11 +196,11 @@ class PoolWorkers:
     def _ended(self, flying: dict[Future[Outcome], tuple[int, Job]]) -> set[Future[Outcome]]:
         """Wait until a job ends."""
         while True:
-            done = wait(flying, timeout=STALLED, return_when=FIRST_COMPLETED).done
+            done = wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done
             if done:
                 return done
             if self._alive is not None and not self._alive():
-                raise LostJobsError(f"all workers are gone, and none came back within {STALLED:g} s. Start some again")
+                raise LostJobsError(f"all workers are gone, and none came back within {_STALLED:g} s. Start some again")
 
     def _launch(
         self,
@@ -210,12 +210,12 @@ class PoolWorkers:
         flying: dict[Future[Outcome], tuple[int, Job]],
     ) -> tuple[list[tuple[int, Job]], Exception | None]:
         """Hand out jobs until every worker has enough; tell what was lost on the way, and why."""
-        while waiting and len(flying) < AHEAD * self.count:
+        while waiting and len(flying) < _AHEAD * self.count:
             entry = waiting.popleft()
             try:
                 if self._executor is None:
                     self._executor = self._opened()
-                flying[self._executor.submit(attempt, task, packed, entry[1])] = entry
+                flying[self._executor.submit(_attempt, task, packed, entry[1])] = entry
             except Exception as error:  # broken since the last look, or closed
                 return [entry], error
         return [], None
@@ -228,7 +228,7 @@ class PoolWorkers:
         flying: dict[Future[Outcome], tuple[int, Job]],
     ) -> None:
         """Prepare another attempt: a broken pool takes all its jobs with it."""
-        if losses >= MAX_LOSSES:
+        if losses >= _MAX_LOSSES:
             raise LostJobsError(
                 f"workers were lost {losses} times in a row, last with {type(cause).__name__}: {cause}. "
                 "Is memory short? Use fewer workers, or look at the workers' own messages"
@@ -239,7 +239,7 @@ class PoolWorkers:
             self.close(wait=False)
 
 
-def attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
+def _attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
     """Run a job on a worker; whatever it raises or warns of travels back as a value."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")  # the process that asked decides what a warning means
@@ -272,7 +272,7 @@ def _portable(error: Exception) -> Exception:
     return error
 
 
-def begin_worker() -> None:
+def _begin_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it; the cores are shared already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     limit_threads()
@@ -307,7 +307,7 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
     context = multiprocessing.get_context(start or ("forkserver" if "forkserver" in known else "spawn"))
     if context.get_start_method() == "forkserver":
         context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
-    pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker), count)
+    pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     with one_thread_each(), _shared_memory(context.get_start_method() == "fork"):
         try:
             yield pool
@@ -353,9 +353,9 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
 
 
 def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
-    begin_worker()
+    _begin_worker()
     with suppress(ConnectionError):  # nobody waits for it any more
-        sender.send(attempt(task, None, job))
+        sender.send(_attempt(task, None, job))
 
 
 def _received_value(receiver: Connection) -> Any | None:

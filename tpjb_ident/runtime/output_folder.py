@@ -45,7 +45,7 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
             f"--out {out}: {why}; nothing was written. Make room on the disk or give a folder on another one."
         ) from error
     finally:
-        release(lock)
+        _release(lock)
         if staging.exists():
             shutil.rmtree(staging)
 
@@ -59,13 +59,13 @@ def _bring(staging: Path, target: Path, command: str) -> None:
             flush(target.parent, deep=False)
             return
     with locked(target):
-        move_in(staging, target, command)
+        _move_in(staging, target, command)
 
 
 def _clear_abandoned(target: Path) -> None:
     """Delete what killed runs into the same folder have left beside it."""
     for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*"):
-        if is_abandoned(abandoned):
+        if _is_abandoned(abandoned):
             shutil.rmtree(abandoned, ignore_errors=True)  # whoever else clears it at the same time may be quicker
 
 
@@ -105,10 +105,10 @@ def record_text(commands: Mapping[str, Any]) -> str:
     return json.dumps({"schema": "tpjb-run/1", "commands": dict(commands)}, indent=1, ensure_ascii=False) + "\n"
 
 
-def move_in(staging: Path, target: Path, command: str) -> None:
+def _move_in(staging: Path, target: Path, command: str) -> None:
     """Move results into an existing folder, whose lock the caller holds; drop what the command left there before."""
-    finish_moving(target)
-    new = files_in(staging)
+    _finish_moving(target)
+    new = _files_in(staging)
     before = former_runs(target)
     ours = {name for entry in before.values() for name in outputs_of(entry)} | {RECORD}
     foreign = [name for name in new if (target / name).exists() and name not in ours]
@@ -124,16 +124,16 @@ def move_in(staging: Path, target: Path, command: str) -> None:
         write_text(staging / ".stale", json.dumps(stale))
     flush(staging)
     staging.replace(target / READY)
-    finish_moving(target)
+    _finish_moving(target)
 
 
-def finish_moving(target: Path) -> bool:
+def _finish_moving(target: Path) -> bool:
     """Bring in what waits in `READY`; whether there was anything."""
     ready = target / READY
     if not ready.is_dir():
         return False
     (target / RECORD).unlink(missing_ok=True)
-    names = [name for name in files_in(ready) if name != ".stale"]
+    names = [name for name in _files_in(ready) if name != ".stale"]
     for name in sorted(names, key=lambda n: n == RECORD):
         if name == RECORD:
             _drop_stale(target, ready, names)
@@ -162,7 +162,7 @@ def outputs_of(entry: Mapping[str, Any]) -> list[str]:
     return [name for name in outputs if isinstance(name, str)] if isinstance(outputs, list) else []
 
 
-def files_in(folder: Path) -> list[str]:
+def _files_in(folder: Path) -> list[str]:
     """Relative names of all files, sorted."""
     return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
 
@@ -193,21 +193,21 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        release(handle)
+        _release(handle)
 
 
 def hold(folder: Path) -> int | None:
-    """Take the lock of a folder that nobody else knows yet; give it to `release`."""
+    """Take the lock of a folder that nobody else knows yet; give it to `_release`."""
     return _open(folder, wait=False)
 
 
-def release(handle: int | None) -> None:
+def _release(handle: int | None) -> None:
     """Drop a lock."""
     if handle is not None:
         os.close(handle)
 
 
-def is_abandoned(folder: Path) -> bool:
+def _is_abandoned(folder: Path) -> bool:
     """Whether the process that held the lock of `folder` is gone; False where that cannot be told."""
     if fcntl is None:
         return False
@@ -215,7 +215,7 @@ def is_abandoned(folder: Path) -> bool:
         handle = _open(folder, wait=False)
     except OSError:  # held, or gone by now
         return False
-    release(handle)
+    _release(handle)
     return True
 
 

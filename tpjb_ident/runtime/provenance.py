@@ -8,7 +8,7 @@ import json
 import platform
 from pathlib import Path
 
-PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "numba", "matplotlib")
+_PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "numba", "matplotlib")
 
 
 def versions() -> dict[str, str]:
@@ -16,7 +16,7 @@ def versions() -> dict[str, str]:
     import importlib.metadata  # with the mail parser behind it, an eighth of what help waits for
 
     installed = {"python": platform.python_version(), "platform": platform.system()}
-    for package in PACKAGES:
+    for package in _PACKAGES:
         try:
             installed[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:

@@ -31,7 +31,7 @@ def open_workers(
 
 
 #: Seconds to wait for the scheduler, and for its first worker.
-PATIENCE = 20.0
+_PATIENCE = 20.0
 #: Versions that numbers depend on.
 _SAME = ("tpjb-ident", "numpy", "scipy", "h5py", "statsmodels", "numba")
 
@@ -41,7 +41,7 @@ class ClusterError(TpjbError):
 
 
 @contextmanager
-def dask_workers(address: str, patience: float = PATIENCE) -> Iterator[Workers]:
+def dask_workers(address: str, patience: float = _PATIENCE) -> Iterator[Workers]:
     """Open the workers of a running Dask scheduler."""
     try:
         from distributed import Client

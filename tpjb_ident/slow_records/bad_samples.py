@@ -20,13 +20,15 @@ from rigdata.problem import Problem, RigDataError
 if TYPE_CHECKING:
     from rigdata.campaign import Run
 
-ROUNDING = 1e-9  # of the reading, for a component that does not move at all
-SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
-NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
-THRESHOLD = 7.0  # noise standard deviations beyond both medians
-SHORTEST = 50  # samples
-TIMES_EXPECTED = 10.0
-NOISE_FREE = 0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
+_ROUNDING = 1e-9  # of the reading, for a component that does not move at all
+_SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
+_NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
+_THRESHOLD = 7.0  # noise standard deviations beyond both medians
+_SHORTEST = 50  # samples
+_TIMES_EXPECTED = 10.0
+_NOISE_FREE = (
+    0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
+)
 
 
 def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
@@ -76,8 +78,8 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
     before = median[np.clip(centre - half - 1, half, n + half - 1)]
     after = median[np.clip(centre + half + 1, half, n + half - 1)]
     noise = _noise(x, median[centre])
-    low = np.minimum(before, after) - THRESHOLD * noise
-    high = np.maximum(before, after) + THRESHOLD * noise
+    low = np.minimum(before, after) - _THRESHOLD * noise
+    high = np.maximum(before, after) + _THRESHOLD * noise
     return np.asarray((x < low) | (x > high))
 
 
@@ -88,7 +90,7 @@ def _noise(x: FloatArray, median: FloatArray) -> float:
     # two converters turned into X and Y leave rounding residues: those are no steps
     steps = steps[steps > 1e-6 * np.ptp(x)]
     resolution = float(np.min(steps)) if len(steps) else 0.0
-    return max(spread, resolution / 2.0, SMALLEST * float(np.ptp(x)), ROUNDING * float(np.max(np.abs(x))), NOTHING)
+    return max(spread, resolution / 2.0, _SMALLEST * float(np.ptp(x)), _ROUNDING * float(np.max(np.abs(x))), _NOTHING)
 
 
 def refuse_flat_channels(run: Run) -> None:
@@ -104,13 +106,13 @@ def refuse_flat_channels(run: Run) -> None:
             if channel.quantity == quantity:
                 statistics[name] = ChannelStatistics()
                 statistics[name].add(np.asarray(run.record(name).values))
-        if any(_repeated(s) > NOISE_FREE for s in statistics.values() if not s.constant):
+        if any(_repeated(s) > _NOISE_FREE for s in statistics.values() if not s.constant):
             # noise below the converter's step: standing still says nothing here
             continue
         problems += [
             _problem(run, name, s)
             for name, s in statistics.items()
-            if s.longest_flat >= max(SHORTEST, TIMES_EXPECTED * s.expected_flat())
+            if s.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * s.expected_flat())
         ]
     if problems:
         raise RigDataError(problems)

@@ -22,13 +22,13 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.errors import BadInputError
 
 DRIFT_OVER_FLICKER = 0.7  # [1/sqrt(s)], drift rate to be expected over the square root of the 1/f power density
-BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
-PINNED = 0.01  # of ln(drift rate): as good as given
+_BEND = 0.5  # of a drift: half of what its rate at either end differs by from that in the middle, standard deviation
+_PINNED = 0.01  # of ln(drift rate): as good as given
 # time constants [s] of the exponentially correlated processes whose sum has a 1/f spectrum from some 5 mHz
 # to 5 Hz
-FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
+_FLICKER_TIMES = 0.05 * 4.0 ** np.arange(7)
 # power density [1/Hz] at 1 Hz of the sum of unit processes
-_FLICKER_GAIN = float(np.sum(4.0 * FLICKER_TIMES / (1.0 + (2.0 * np.pi * FLICKER_TIMES) ** 2)))
+_FLICKER_GAIN = float(np.sum(4.0 * _FLICKER_TIMES / (1.0 + (2.0 * np.pi * _FLICKER_TIMES) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class NoiseModel:
         """Covariance of block averages, (m, m); `time`, `duration` (m,) [s]."""
         centred = time - np.mean(time)
         span = max(float(np.ptp(time)), 1e-300)
-        bent = BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
+        bent = _BEND * (centred**2 - np.mean(centred**2)) / span * 2.0
         return np.asarray(
             np.diag(self.white / duration)
             + self.flicker * flicker_kernel(time, duration)
@@ -65,7 +65,7 @@ def flicker_kernel(time: FloatArray, duration: FloatArray | None = None) -> Floa
     """
     lag = np.abs(time[:, None] - time[None, :])
     kernel = np.zeros_like(lag)
-    for tau in FLICKER_TIMES:
+    for tau in _FLICKER_TIMES:
         term = np.exp(-lag / tau)
         if duration is not None:
             x = duration / tau
@@ -141,7 +141,7 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
     unit = np.sqrt(white)
     rotated = [_Rotated(alike, unit) for alike in _by_shape(usable)]
     prior = np.log(drift_rate / unit)
-    spread = 1.0 if learn_drift else PINNED
+    spread = 1.0 if learn_drift else _PINNED
 
     def objective(logs: FloatArray) -> float:
         w, f, d = np.exp(np.clip(logs, -30.0, 30.0))

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from rigdata.record import Record
 
 #: More points than this are thinned to lows and highs: a screen shows no more.
-MOST_POINTS = 6000
+_MOST_POINTS = 6000
 #: Of the running speed, taken off the orbit together: unbalance and runout.
-HARMONICS = 2
+_HARMONICS = 2
 #: Stretches of a waterfall that do not overlap, and samples of one at most.
-STRETCHES, MOST_LINES = 12, 2048
-INK, BLUE, RED = "#1c2024", "#0072b2", "#d55e01"
-_COLOURS = (INK, BLUE, "#d98c00", "#009e73", RED, "#b9609a", "#7a828b")
+_STRETCHES, _MOST_LINES = 12, 2048
+_INK, _BLUE, _RED = "#1c2024", "#0072b2", "#d55e01"
+_COLOURS = (_INK, _BLUE, "#d98c00", "#009e73", _RED, "#b9609a", "#7a828b")
 _UNITS = {
     "displacement": ("µm", 1e6),
     "force": ("N", 1.0),
@@ -51,16 +51,16 @@ def records_tab(campaign: Campaign) -> Any:
     data = {name: ColumnDataSource({"x": [], "y": []}) for name in ("orbit", "without")}
     data |= {name: ColumnDataSource({"x": [], "y": [], "colour": [], "name": []}) for name in ("time", "spectrum")}
     data["waterfall"] = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-    time = new_plot("channels over time", "time, s", "", name="time-plot")
-    spectrum = new_plot("amplitude spectrum", "frequency, Hz", "amplitude", y_axis_type="log", name="spectrum-plot")
+    time = _new_plot("channels over time", "time, s", "", name="time-plot")
+    spectrum = _new_plot("amplitude spectrum", "frequency, Hz", "amplitude", y_axis_type="log", name="spectrum-plot")
     for plot, name in ((time, "time"), (spectrum, "spectrum")):
         plot.multi_line("x", "y", source=data[name], color="colour", legend_field="name")
         plot.add_layout(plot.legend[0], "below")  # covers nothing
         plot.legend.orientation = "horizontal"
     fall = _waterfall_plot(data["waterfall"])
-    orbit = new_plot("shaft in the housing", "x, µm", "y, µm", match_aspect=True, height=420, name="orbit-plot")
-    orbit.line("x", "y", source=data["orbit"], color=BLUE, line_width=0.7, legend_label="as measured")
-    orbit.line("x", "y", source=data["without"], color=RED, line_width=0.7, legend_label="without running speed")
+    orbit = _new_plot("shaft in the housing", "x, µm", "y, µm", match_aspect=True, height=420, name="orbit-plot")
+    orbit.line("x", "y", source=data["orbit"], color=_BLUE, line_width=0.7, legend_label="as measured")
+    orbit.line("x", "y", source=data["without"], color=_RED, line_width=0.7, legend_label="without running speed")
     orbit.add_layout(orbit.legend[0], "below")  # covers nothing
     orbit.legend.click_policy = "hide"
 
@@ -71,7 +71,7 @@ def records_tab(campaign: Campaign) -> Any:
         text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
         try:
             records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
-            message = show_channels(records, (time, spectrum), data)
+            message = _show_channels(records, (time, spectrum), data)
             fall.title.text = f"waterfall of {records[0].name}"
             data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
@@ -89,18 +89,18 @@ def records_tab(campaign: Campaign) -> Any:
         column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
     )
     return column(
-        side_by_side(pick, channel, further), facts, side_by_side(left_column, right), sizing_mode="stretch_width"
+        _side_by_side(pick, channel, further), facts, _side_by_side(left_column, right), sizing_mode="stretch_width"
     )
 
 
-def show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
+def _show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
     """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
     unit, scale = _UNITS.get(first.quantity, ("", 1.0))
     drawn = [r for r in records if r.quantity == first.quantity][: len(_COLOURS) - 1]
     label = first.name if len(drawn) == 1 else first.quantity
     plots[0].yaxis.axis_label, plots[1].yaxis.axis_label = f"{label}, {unit}", f"amplitude, {unit}"
-    paths = [thinned(r.time, scale * r.values) for r in drawn]
+    paths = [_thinned(r.time, scale * r.values) for r in drawn]
     spectra = [amplitude_spectrum(scale * r.values, r.rate) for r in drawn]
     look = {"colour": _COLOURS[: len(drawn)], "name": [r.name for r in drawn]}
     data["time"].data = {"x": [x for x, _ in paths], "y": [y for _, y in paths], **look}
@@ -122,7 +122,7 @@ def _waterfall_plot(source: Any) -> Any:
     """An empty waterfall: amplitude over frequency and time."""
     from bokeh.models import ColorBar, LinearColorMapper
 
-    plot = new_plot("waterfall", "frequency, Hz", "time, s", name="waterfall-plot")
+    plot = _new_plot("waterfall", "frequency, Hz", "time, s", name="waterfall-plot")
     mapper = LinearColorMapper(palette="Viridis256", low=-60.0, high=0.0)
     plot.image("image", x="x", y="y", dw="dw", dh="dh", source=source, color_mapper=mapper)
     plot.add_layout(ColorBar(color_mapper=mapper, title="dB", width=12), "right")
@@ -133,10 +133,10 @@ def _waterfall_plot(source: Any) -> Any:
 def waterfall(record: Record) -> dict[str, Any]:
     """Spectra of short stretches one above the other, in dB below the strongest line."""
     values = np.nan_to_num(record.values - np.nanmean(record.values))
-    length = min(MOST_LINES, len(values) // STRETCHES * 2)
+    length = min(_MOST_LINES, len(values) // _STRETCHES * 2)
     if length < 64:
         return {"image": [], "x": [], "y": [], "dw": [], "dh": []}
-    starts = np.linspace(0, len(values) - length, 2 * STRETCHES).astype(int)
+    starts = np.linspace(0, len(values) - length, 2 * _STRETCHES).astype(int)
     spectra = np.stack([amplitude_spectrum(values[i : i + length], record.rate)[1] for i in starts])
     level = 20.0 * np.log10(np.maximum(spectra / max(float(spectra[:, 2:].max()), 1e-300), 1e-6))
     seconds = float(record.time[-1] - record.time[0])
@@ -152,16 +152,16 @@ def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     path = 1e6 * (record.values - np.nanmean(record.values, axis=0))
     good = np.isfinite(path).all(axis=1)
     omega, without_synchronous = run.point.shaft_speed, np.full((0, 2), np.nan)
-    if omega > 0 and good.sum() > 2 * HARMONICS + 1:
-        turns = [wave(k * omega * record.time) for k in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
+    if omega > 0 and good.sum() > 2 * _HARMONICS + 1:
+        turns = [wave(k * omega * record.time) for k in range(1, _HARMONICS + 1) for wave in (np.cos, np.sin)]
         waves = np.column_stack(turns)
         without_synchronous = path - waves @ np.linalg.lstsq(waves[good], path[good], rcond=None)[0]
-    return tuple({"x": p[:MOST_POINTS, 0], "y": p[:MOST_POINTS, 1]} for p in (path, without_synchronous))  # type: ignore[return-value]
+    return tuple({"x": p[:_MOST_POINTS, 0], "y": p[:_MOST_POINTS, 1]} for p in (path, without_synchronous))  # type: ignore[return-value]
 
 
-def thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lows and highs of so many blocks that a screen can show them; short records as they are."""
-    step = -(-len(values) // (MOST_POINTS // 2))
+    step = -(-len(values) // (_MOST_POINTS // 2))
     if step <= 2:
         return time, values
     count = len(values) // step
@@ -174,14 +174,14 @@ def _escaped(text: str) -> str:
     return html.escape(printable(text))
 
 
-def side_by_side(*parts: Any) -> Any:
+def _side_by_side(*parts: Any) -> Any:
     """Set parts beside each other; on a narrow screen below each other."""
     from bokeh.layouts import row
 
     return row(*parts, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
 
 
-def new_plot(title: str, x: str, y: str, **options: Any) -> Any:
+def _new_plot(title: str, x: str, y: str, **options: Any) -> Any:
     """Make an empty plot."""
     from bokeh.plotting import figure
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tpjb_ident.view.server import Session
 
 #: Frequencies of the curves [Hz].
-LINES = np.arange(5.0, 85.0, 5.0)
+_LINES = np.arange(5.0, 85.0, 5.0)
 #: Points are shown at the slider's load where theirs differs by no more than this share.
 _NEAR = 0.02
 
@@ -108,7 +108,7 @@ def _curves_html(session: Session, kilonewtons: float) -> str:
     measured = session.identification.to_frame()
     measured = measured[(measured["static_load_N"] / (1e3 * kilonewtons) - 1.0).abs() < _NEAR]
     measured = measured.assign(static_load_N=1e3 * kilonewtons)
-    frequencies = sorted({*LINES, *measured["excitation_Hz"]})
+    frequencies = sorted({*_LINES, *measured["excitation_Hz"]})
     points = [
         OperatingPoint(1e3 * kilonewtons, first.static_load_direction, first.shaft_speed, 2 * np.pi * frequency)
         for frequency in frequencies

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
 
 #: The only address that is ever listened on.
-LOOPBACK = "127.0.0.1"
+_LOOPBACK = "127.0.0.1"
 #: Without it a phone shows the page as wide as a desk's and small.
-VIEWPORT = '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}'
-MOST_ROWS = 5000
+_VIEWPORT = '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}'
+_MOST_ROWS = 5000
 
 
 class ViewError(TpjbError):
@@ -57,13 +57,13 @@ def serve(session: Session, port: int, ready: Callable[[str], None], seconds: fl
     application = Application(FunctionHandler(lambda document: build(document, session)))
     try:
         # without `allow_websocket_origin` Bokeh takes connections from pages of this very address only
-        server = Server({"/": application}, address=LOOPBACK, port=port, num_procs=1)
+        server = Server({"/": application}, address=_LOOPBACK, port=port, num_procs=1)
     except OSError as error:
         raise ViewError(f"port {port} cannot be used ({error.strerror}). Give another with --port, or 0.") from error
     server.start()
     if seconds is not None:
         server.io_loop.call_later(seconds, server.io_loop.stop)
-    ready(f"http://{LOOPBACK}:{server.port}/")
+    ready(f"http://{_LOOPBACK}:{server.port}/")
     try:
         server.io_loop.start()
     finally:
@@ -75,7 +75,7 @@ def build(document: Any, session: Session) -> None:
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs
 
-    document.template = VIEWPORT
+    document.template = _VIEWPORT
     document.title = f"tpjb: {printable(session.name)}"
     panels = []
     if session.campaign is not None and session.campaign.runs:
@@ -105,7 +105,7 @@ def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
     grid = DataTable(source=source, columns=[], height=560, sizing_mode="stretch_width", reorderable=False, name="grid")
 
     def update() -> None:
-        frame = tables[pick.value].head(MOST_ROWS)
+        frame = tables[pick.value].head(_MOST_ROWS)
         source.data = {str(c): [_cell(v) for v in frame[c]] for c in frame.columns}
         grid.columns = [TableColumn(field=str(c), title=printable(c)) for c in frame.columns]
 

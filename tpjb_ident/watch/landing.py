@@ -76,7 +76,7 @@ class NewFiles:
 #: What loggers and people append to the name of a record that is made again.
 _AGAIN = re.compile(r"[-_. (]*(?:r|rep|repeat|again|copy|wdh|bis|v|no|nr)?[-_. ]*\d{0,4}[a-d]?\)?", re.IGNORECASE)
 #: How near the record must be to a planned set point: load vector and frequency as shares, direction [rad].
-NEAR_LOAD, NEAR_LINE, NEAR_DIRECTION = 0.1, 0.01, math.radians(10.0)
+_NEAR_LOAD, _NEAR_LINE, _NEAR_DIRECTION = 0.1, 0.01, math.radians(10.0)
 #: The planned line must hold this share of the oscillationing of the force.
 _DRIVEN = 0.5
 
@@ -135,7 +135,7 @@ def _fits(run: Run, force: FloatArray, rate: float) -> bool:
     # the housing is pulled the way the film carries the shaft: cells read the load on the shaft, reversed or not
     planned = point.static_load * directions(np.array([point.static_load_direction]))[0]
     mean = force.mean(axis=0)
-    if min(np.linalg.norm(mean - planned), np.linalg.norm(mean + planned)) > NEAR_LOAD * point.static_load:
+    if min(np.linalg.norm(mean - planned), np.linalg.norm(mean + planned)) > _NEAR_LOAD * point.static_load:
         return False
     oscillation = force - mean
     size = float(np.sqrt((oscillation**2).sum(axis=1).mean()))
@@ -148,7 +148,7 @@ def _fits(run: Run, force: FloatArray, rate: float) -> bool:
         return True
     along = np.linalg.svd(np.stack([phasor.real, phasor.imag]))[2][0]
     away = math.atan2(along[1], along[0]) - run.excitation_direction
-    return abs((away + math.pi / 2) % math.pi - math.pi / 2) < NEAR_DIRECTION
+    return abs((away + math.pi / 2) % math.pi - math.pi / 2) < _NEAR_DIRECTION
 
 
 def _line(values: FloatArray, frequency: float, rate: float) -> ComplexArray:
@@ -156,7 +156,7 @@ def _line(values: FloatArray, frequency: float, rate: float) -> ComplexArray:
     time = np.arange(len(values)) / rate
     window = np.hanning(len(values))[:, None]
     phasors = []
-    for trial in frequency * (1.0 + NEAR_LINE * np.linspace(-1.0, 1.0, 9)):
+    for trial in frequency * (1.0 + _NEAR_LINE * np.linspace(-1.0, 1.0, 9)):
         carrier = np.exp(-2j * math.pi * trial * time)[:, None]
         phasors.append(2.0 * (values * window * carrier).sum(axis=0) / window.sum())
     return max(phasors, key=lambda p: float(np.linalg.norm(p)))

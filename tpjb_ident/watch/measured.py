@@ -20,9 +20,9 @@ from tpjb_ident.pivot import PivotSettings, fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
 
 #: A whole identification that took longer [s] is made of the points with news alone.
-PATIENCE = 30.0
+_PATIENCE = 30.0
 #: What a record or a campaign that is not complete yet may raise.
-REFUSALS = (RigError, TpjbError, np.linalg.LinAlgError)
+_REFUSALS = (RigError, TpjbError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True)
@@ -61,14 +61,14 @@ class Measuring:
             if campaign.of_kind("dry_pivot"):
                 try:
                     curves = fit_pivots(campaign, self.pad_angles, PivotSettings(on_refusal="skip"))
-                except REFUSALS as error:
+                except _REFUSALS as error:
                     refusals.append(f"pivots: {error}")
         if self.pad_angles and self._news(campaign, "clearance", marks):
             polygon = None
             if campaign.of_kind("clearance"):
                 try:
                     polygon = measure_clearance(campaign, self.pad_angles)
-                except REFUSALS as error:
+                except _REFUSALS as error:
                     refusals.append(f"clearance: {error}")
         self._last = Measured(identification, curves, polygon, tuple(refusals))
         return self._last
@@ -87,14 +87,14 @@ class Measuring:
         if not points or not news:
             return last if points else None
         selected = campaign
-        if self._took > PATIENCE and last is not None:
+        if self._took > _PATIENCE and last is not None:
             changed = {run.point for run in campaign.of_kind("dynamic") if run.id in news}
             runs = [run for run in campaign.runs if run.point in changed or run.kind != "dynamic"]
             selected = replace(campaign, runs=tuple(runs))
         began = time.monotonic()
         try:
             identification = identify(selected, self.settings, store=self.store)
-        except REFUSALS as error:
+        except _REFUSALS as error:
             refusals.append(f"identification: {error}")
             return last
         if selected is campaign or last is None:

@@ -18,10 +18,10 @@ from tpjb_ident.dynamic.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
-LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
-GRAVITY = ("error", "warning", "note")
+_LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
+_GRAVITY = ("error", "warning", "note")
 #: A finding in so many runs at least, and in this share of those of their kinds, is not the runs' fault.
-COMMON_RUNS, COMMON_SHARE = 3, 1 / 3
+_COMMON_RUNS, _COMMON_SHARE = 3, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def judge_states(
     of_run: dict[str, list[Finding]] = {}
     for observation in observations:
         findings = [finding for finding in observation.report.found if id(finding) not in shared]
-        of_run[observation.run.id] = sorted(findings, key=lambda f: GRAVITY.index(f.problem.severity))
+        of_run[observation.run.id] = sorted(findings, key=lambda f: _GRAVITY.index(f.problem.severity))
     states = []
     for run in runs:
         findings = of_run.get(run.id, [])
@@ -78,7 +78,7 @@ def judge_states(
 
 def _forces_repeat(finding: Finding) -> bool:
     severity = finding.problem.severity
-    return severity == "error" or (severity == "warning" and finding.key.startswith(LOST_SAMPLES))
+    return severity == "error" or (severity == "warning" and finding.key.startswith(_LOST_SAMPLES))
 
 
 def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
@@ -94,7 +94,7 @@ def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
     for key, group in groups.items():
         affected = {finding.problem.run for finding in group}
         comparable = sum(observation.run.kind in kinds[key] for observation in observations)
-        if len(affected) >= COMMON_RUNS and len(affected) >= COMMON_SHARE * comparable:
+        if len(affected) >= _COMMON_RUNS and len(affected) >= _COMMON_SHARE * comparable:
             common.append(group)
     return common
 
@@ -115,9 +115,9 @@ def _test(run: Run) -> tuple[object, ...]:
 
 
 #: From so many records in a row with one fault on, the sensor is to be repaired before another one is made.
-IN_A_ROW = 2
+_IN_A_ROW = 2
 #: Kinds of runs with a turning shaft.
-TURNING = ("dynamic", "locus")
+_TURNING = ("dynamic", "locus")
 _LISTED = 4
 
 
@@ -152,7 +152,7 @@ def _current_run(states: Sequence[RunStatus]) -> Run | None:
     """The running test that landed last: what the rig stands at."""
     last: RunStatus | None = None
     for status in states:
-        turning = status.run.kind in TURNING
+        turning = status.run.kind in _TURNING
         if status.landed and turning and (last is None or status.landed >= last.landed):
             last = status
     return last.run if last else None
@@ -204,14 +204,14 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
         return [], set()
     steps, stopped = [], set()
     for finding in landed[-1].findings:
-        if not finding.key.startswith(LOST_SAMPLES) or finding.problem.severity == "note":
+        if not finding.key.startswith(_LOST_SAMPLES) or finding.problem.severity == "note":
             continue
         row: list[str] = []
         for status in reversed(landed):
             if finding.key not in {f.key for f in status.findings}:
                 break
             row.append(status.run.id)
-        if len(row) >= IN_A_ROW:
+        if len(row) >= _IN_A_ROW:
             stopped.update(row)
             runs = tuple(reversed(row))
             p = finding.problem
@@ -229,12 +229,12 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         run, why = status.run, f"{located(problem)}. {problem.cure}."
         same_set_up = at is None or _set_up(run) == _set_up(at)
         when = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
-        if run.kind not in TURNING:
+        if run.kind not in _TURNING:
             when = f"({described(run)})"
         elif same_set_up:
             when = "before you change the load"
         step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
-        if same_set_up or run.kind not in TURNING:
+        if same_set_up or run.kind not in _TURNING:
             now.append(step)
         else:
             later.append(step)
@@ -292,7 +292,7 @@ def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         return [] if unfinished else [Step("next", "Every run of the plan has landed.")]
     same = []
     if at is not None:
-        same = [run for run in waiting if run.kind in TURNING and _set_up(run) == _set_up(at)]
+        same = [run for run in waiting if run.kind in _TURNING and _set_up(run) == _set_up(at)]
     run = (same or waiting)[0]
     more = f"{len(same) - 1} more at this load" if len(same) > 1 else f"{len(waiting) - 1} more in the plan"
     change = "" if same or at is None else " (new set-up)"

@@ -21,7 +21,7 @@ from tpjb_ident.watch.measured import Measured, Measuring
 from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks
 
 #: Share of the usual length below which a record was cut off.
-WHOLE = 0.8
+_WHOLE = 0.8
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ def seconds(run: Run) -> float:
 
 
 def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:
-    """Note records below `WHOLE` of the median length of their kind, before everything else that follows from it."""
+    """Note records below `_WHOLE` of the median length of their kind, before everything else that follows from it."""
     of_kind: dict[str, list[float]] = {}
     for observation, length in zip(observations, lengths, strict=True):
         if length > 0:
@@ -215,7 +215,7 @@ def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[flo
     for observation, length in zip(observations, lengths, strict=True):
         same_kind = of_kind.get(observation.run.kind, [0.0])
         usual = median(same_kind)
-        if 0 < length < WHOLE * usual and len(same_kind) > 2:
+        if 0 < length < _WHOLE * usual and len(same_kind) > 2:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
             observation.report.say("short record", "error", "record", what, cure)

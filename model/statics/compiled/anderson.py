@@ -34,7 +34,7 @@ def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
         trace += gram[i, i]
     if not trace > 0.0:
         return last
-    mix = least_squares(gram, right)
+    mix = _least_squares(gram, right)
     for i in range(k):
         for q in range(images.shape[1]):
             last[q] -= mix[i] * (images[k, q] - images[i, q])
@@ -42,7 +42,7 @@ def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
 
 
 @inner
-def least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
+def _least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """Least-squares solution of a symmetric system that may be singular, by Jacobi's rotations.
 
     `matrix` (k, k), `right` (k,).

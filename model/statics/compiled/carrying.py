@@ -16,7 +16,7 @@ from model.statics.compiled.stack import PadStack, PadState
 from rigdata.arrays import FloatArray
 
 #: Every so many rows of an attitude's table the pivot is asked; between them its give is as good as straight.
-EVERY = 4
+_EVERY = 4
 
 
 class Case(NamedTuple):
@@ -114,10 +114,10 @@ def find_branch(case: Case, pads: PadStack, works: FilmWork, state: PadState, m:
 @inner
 def _sorted(load: FloatArray) -> FloatArray:
     """Every so many loads, rising; they are nearly so as they come."""
-    count = (len(load) + EVERY - 1) // EVERY
+    count = (len(load) + _EVERY - 1) // _EVERY
     out = np.empty(count)
     for k in range(count):
-        value, place = load[k * EVERY], k
+        value, place = load[k * _EVERY], k
         while place > 0 and out[place - 1] > value:
             out[place] = out[place - 1]
             place -= 1
@@ -143,7 +143,7 @@ def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
 
 
 @inner
-def let_idle(state: PadState, m: int) -> None:
+def _let_idle(state: PadState, m: int) -> None:
     """Let a pad carry nothing."""
     state.idle[m] = True
     state.deflection[m] = 0.0
@@ -153,7 +153,7 @@ def let_idle(state: PadState, m: int) -> None:
 @inner
 def set_loaded(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
     """Put a pad on its loaded attitude, or let it idle."""
-    let_idle(state, m)
+    _let_idle(state, m)
     state.idle[m] = margin(pads, state, m) <= 0.0
     works.ruptured[m] = False
     if not state.idle[m]:
@@ -172,7 +172,7 @@ def hold_of(case: Case, state: PadState, m: int, load: float) -> tuple[float, fl
 
 
 @inner
-def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
+def _is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
     """Whether film and pivot push a pad back from a small change of tilt and deflection."""
     k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
@@ -193,7 +193,7 @@ def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState
         if state.idle[m] and inside > 0.0 and state.changes[m] < MAX_LOAD_CHANGES:
             set_loaded(pads, works, state, m)
         elif not state.idle[m] and case.hold[0] == 0.0 and not _keeps_its_load(case, pads, state, m, inside):
-            let_idle(state, m)
+            _let_idle(state, m)
         else:
             continue
         state.changes[m] += 1
@@ -205,7 +205,7 @@ def update_carrying(case: Case, pads: PadStack, works: FilmWork, state: PadState
 def _keeps_its_load(case: Case, pads: PadStack, state: PadState, m: int, inside: float) -> bool:
     if inside > 0.0 or inside < -edge(pads, state, m) or not state.solved[m]:
         return inside > 0.0
-    return is_stable(case, pads, state, m)
+    return _is_stable(case, pads, state, m)
 
 
 @inner
@@ -213,13 +213,13 @@ def leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState)
     """Move pads off attitudes that nothing holds, the falling part of the load near an edge; True if there were any."""
     found = False
     for m in range(len(state.tilt)):
-        if not state.solved[m] or case.hold[0] > 0.0 or is_stable(case, pads, state, m):
+        if not state.solved[m] or case.hold[0] > 0.0 or _is_stable(case, pads, state, m):
             continue
         found = True
         state.changes[m] += 1
         if margin(pads, state, m) > edge(pads, state, m) and state.changes[m] < MAX_LOAD_CHANGES:
             set_loaded(pads, works, state, m)
         else:
-            let_idle(state, m)
+            _let_idle(state, m)
             state.changes[m] = MAX_LOAD_CHANGES
     return found

@@ -11,7 +11,7 @@ from model.film.loaded_attitude import Branch
 from rigdata.arrays import FloatArray, IntArray
 
 #: Share of the load that may be missing.
-GOOD_ENOUGH = 0.002
+_GOOD_ENOUGH = 0.002
 
 
 def first_position(load: FloatArray, normals: FloatArray, distances: FloatArray, branches: list[Branch]) -> FloatArray:
@@ -48,7 +48,7 @@ def balance(
     error = math.hypot(fx, fy)
     step = 1e-4 * room
     for _ in range(60):
-        if error < GOOD_ENOUGH * size:
+        if error < _GOOD_ENOUGH * size:
             break
         ax, ay = _missing(x + step, y, load, curves)
         bx, by = _missing(x - step, y, load, curves)

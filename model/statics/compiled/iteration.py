@@ -42,11 +42,11 @@ from model.statics.compiled.step import move, newton, solve_films, solve_pressur
 from rigdata.arrays import FloatArray
 
 #: How an iteration ends.
-SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED = range(6)
+SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, _NOT_CONVERGED = range(6)
 
 
 @inner
-def start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
+def _start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
     """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
 
     Films that make heat are balanced twice: as hot as their oil gets where it is only dragged along is known then.
@@ -87,7 +87,7 @@ def iterate(
 ) -> tuple[int, int, float, float, float]:
     """Iterate from where the arrays stand, or from a cold start."""
     if cold:
-        start_cold(shapes.grids, case, pads, works, state)
+        _start_cold(shapes.grids, case, pads, works, state)
     best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
     left, best_left, limited, relaxation = math.inf, math.inf, 0.0, RELAXATION if cold else 1.0
     mixes = not case.isothermal or len(shapes.bodies.which) > 0
@@ -98,7 +98,7 @@ def iterate(
             count = 0
         kept = left > SLOW * best_left and mixes
         if kept:
-            write_vector(pads, works, state, before)
+            _write_vector(pads, works, state, before)
         heat, limited = solve_films(shapes, pads, works, state, case, relaxation)
         if not heat < BOUNDLESS:
             return FILM_LOST if _lost(state) else BOUNDLESS_HEAT, iteration, math.inf, heat, limited
@@ -118,13 +118,13 @@ def iterate(
         whole = move(shapes, pads, works, state, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
         if kept and whole and near and left > SLOW * best_left:
             count = _remember(images, residuals, count)
-            write_vector(pads, works, state, images[count - 1])
+            _write_vector(pads, works, state, images[count - 1])
             for q in range(size):
                 residuals[count - 1, q] = images[count - 1, q] - before[q]
-            read_vector(pads, works, state, mixed(images, residuals, count))
+            _read_vector(pads, works, state, mixed(images, residuals, count))
         else:
             count = 0
-    return NOT_CONVERGED, MAX_ITERATIONS, residual, heat, limited
+    return _NOT_CONVERGED, MAX_ITERATIONS, residual, heat, limited
 
 
 @inner
@@ -172,7 +172,7 @@ def _size(works: FilmWork, state: PadState) -> int:
 
 
 @inner
-def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
+def _write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
     """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins."""
     out[0], out[1] = state.position[0] / MICROMETRE, state.position[1] / MICROMETRE
     at = 2
@@ -192,8 +192,8 @@ def write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArr
 
 
 @inner
-def read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
-    """Undo `write_vector`."""
+def _read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
+    """Undo `_write_vector`."""
     state.position[0], state.position[1] = vector[0] * MICROMETRE, vector[1] * MICROMETRE
     at = 2
     for m in range(len(state.tilt)):

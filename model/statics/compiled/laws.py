@@ -14,7 +14,7 @@ from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, Scale
 from rigdata.arrays import FloatArray
 
 #: First number of a law's row: which formula; the others are its constants, the last the factor on the stiffness.
-RIGID, CONSTANT, ROCKER, SPHERICAL, MEASURED = range(5)
+_RIGID, _CONSTANT, _ROCKER, _SPHERICAL, _MEASURED = range(5)
 
 
 def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray] | None:
@@ -48,30 +48,30 @@ def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] 
         factor *= law.stiffness_factor
         law = law.law
     if type(law) is RigidPivot:
-        return (RIGID, 0.0, 0.0, factor), nothing
+        return (_RIGID, 0.0, 0.0, factor), nothing
     if type(law) is ConstantPivot:
-        return (CONSTANT, law.value, 0.0, factor), nothing
+        return (_CONSTANT, law.value, 0.0, factor), nothing
     if type(law) is RockerPivot:
-        return (ROCKER, law.line_modulus, law.load_scale, factor), nothing
+        return (_ROCKER, law.line_modulus, law.load_scale, factor), nothing
     if type(law) is SphericalPivot:
-        return (SPHERICAL, law.compliance, 0.0, factor), nothing
+        return (_SPHERICAL, law.compliance, 0.0, factor), nothing
     if type(law) is MeasuredPivot:
         curve = np.zeros((5, len(law.load)))
         curve[0], curve[1:, :-1] = law.load, law.coefficients
-        return (MEASURED, len(law.load), 0.0, factor), curve
+        return (_MEASURED, len(law.load), 0.0, factor), curve
     return None
 
 
 @inner
 def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Give of a pivot, delta(W) [m]: `law` (4,), `curve` (5, m)."""
-    if not load > 0.0 or law[0] == RIGID:
+    if not load > 0.0 or law[0] == _RIGID:
         return 0.0
-    if law[0] == CONSTANT:
+    if law[0] == _CONSTANT:
         give = load / law[1]
-    elif law[0] == ROCKER:
+    elif law[0] == _ROCKER:
         give = load * (2.0 / 3.0 + _logarithm(law[2], load)) / law[1]
-    elif law[0] == SPHERICAL:
+    elif law[0] == _SPHERICAL:
         give = law[1] * load ** (2.0 / 3.0)
     else:
         end = curve[0, int(law[1]) - 1]
@@ -85,13 +85,13 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
 @inner
 def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Tangent d delta / dW [m/N]; zero for a rigid pivot."""
-    if law[0] == RIGID:
+    if law[0] == _RIGID:
         return 0.0
-    if law[0] == CONSTANT:
+    if law[0] == _CONSTANT:
         value = 1.0 / law[1]
-    elif law[0] == ROCKER:
+    elif law[0] == _ROCKER:
         value = (_logarithm(law[2], load) - 1.0 / 3.0) / law[1]
-    elif law[0] == SPHERICAL:
+    elif law[0] == _SPHERICAL:
         value = law[1] / (1.5 * max(load, 1e-9) ** (1.0 / 3.0))
     else:
         value = _measured_compliance(law, curve, load)

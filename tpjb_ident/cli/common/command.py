@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
 
-BUG, BAD_INPUT, NOT_TRUSTED, INTERRUPTED = 1, 2, 3, 130
+_BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED = 1, 2, 3, 130
 #: A result table of more rows is named in the document of ``--json``, not repeated in it.
-MOST_ROWS = 5000
+_MOST_ROWS = 5000
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 #: Options that change how a command runs, not what it computes.
-UNRECORDED = ("workers", "scheduler")
+_UNRECORDED = ("workers", "scheduler")
 
 
 class Command(Terminal):
@@ -140,19 +140,19 @@ class Command(Terminal):
                 function(self, **options)
         except NotTrustedError as error:
             self.error("not to be trusted", str(error))
-            return NOT_TRUSTED
+            return _NOT_TRUSTED
         except KeyboardInterrupt:
             self.error("interrupted", "nothing was written.")
-            return INTERRUPTED
+            return _INTERRUPTED
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
         except Exception as error:
             message = _bad_input_message(error)
             if message is None:
                 self.error("bug", _bug_report(error))
-                return BUG
+                return _BUG
             self.error("error", message)
-            return BAD_INPUT
+            return _BAD_INPUT
         return 0
 
     def _show_warning(
@@ -202,7 +202,7 @@ def command(
 
         @functools.wraps(function)
         def run(out: Path | None = None, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
-            recorded = {key: options[key] for key in own if key not in UNRECORDED}
+            recorded = {key: options[key] for key in own if key not in _UNRECORDED}
             c = Command(name, recorded, out, as_json, quiet)
             exit_code = c.run(function, options)
             if as_json:
@@ -238,7 +238,7 @@ def _rows(path: Path) -> Any:
 
     table = pq.ParquetFile(path)
     count = table.metadata.num_rows
-    return table.read().to_pylist() if count <= MOST_ROWS else {"rows": count, "file": path.name}
+    return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
 
 
 def _bad_input_message(error: Exception) -> str | None:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.settings import IdentifySettings
 
 #: Share of the mean direct coefficient from which a cross-coupled one is shown.
-CROSS_COUPLED = 0.1
+_CROSS_COUPLED = 0.1
 #: Lines of h that are shown per operating point; all are in the table on disk.
-MOST_LINES = 5
-LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_MOST_LINES = 5
+_LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 def with_half(value: float, half: float) -> str:
@@ -34,16 +34,16 @@ def with_half(value: float, half: float) -> str:
     return f"{value:.{min(digits, 3)}f} ±{half:.{min(digits, 3)}f}"
 
 
-LOAD = Column("load {load}")
-POINT: tuple[Column | str, ...] = (LOAD, "dir. {angle}", "speed {frequency}", "exc. {frequency}")
+_LOAD = Column("load {load}")
+_POINT: tuple[Column | str, ...] = (_LOAD, "dir. {angle}", "speed {frequency}", "exc. {frequency}")
 #: Entries of (kxx, kxy, kyx, kyy, cxx, .. cyy).
-DIRECT, CROSS = (0, 3, 4, 7), (1, 2, 5, 6)
-COEFFICIENTS = [
+_DIRECT, _CROSS = (0, 3, 4, 7), (1, 2, 5, 6)
+_COEFFICIENTS = [
     *(Column(f"k{entry} {{stiffness}}", with_half) for entry in ("xx", "xy", "yx", "yy")),
     *(Column(f"c{entry} {{damping}}", with_half) for entry in ("xx", "xy", "yx", "yy")),
 ]
-MASSES = [Column(f"m{entry} {{mass}}", with_half) for entry in ("xx", "yy")]
-MODEL, VERDICT = words("model", "verdict")
+_MASSES = [Column(f"m{entry} {{mass}}", with_half) for entry in ("xx", "yy")]
+_MODEL, _VERDICT = words("model", "verdict")
 
 
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
@@ -120,7 +120,7 @@ def refuse_untrusted(result: Identification) -> None:
 def show_identification(c: Command, result: Identification) -> None:
     """Print what was identified: a summary, coefficients and models over frequency, bands, remarks."""
     names = dict.fromkeys(str(q) for p in result.points for q in p.quality)
-    letters = dict(zip(names, LETTERS, strict=False))
+    letters = dict(zip(names, _LETTERS, strict=False))
     if result.points or not result.bands:
         _show_summary(c, result)
         _show_coefficients(c, result, letters)
@@ -160,15 +160,15 @@ def _show_coefficients(c: Command, result: Identification, letters: dict[str, st
         point = p.point
         place = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
         flags = "".join(letters[str(q)] for q in p.quality)
-        direct.append([*place, *(cells[i] for i in DIRECT), p.outlier_fraction, flags])
+        direct.append([*place, *(cells[i] for i in _DIRECT), p.outlier_fraction, flags])
         if cross_coupling_matters(values, halves):
-            cross.append([*place, *(cells[i] for i in CROSS)])
+            cross.append([*place, *(cells[i] for i in _CROSS)])
     title = f"{result.campaign}: {result.method}, 95 % intervals"
-    columns = [*POINT, *(COEFFICIENTS[i] for i in DIRECT), Column("out {share}", ".0f"), *words("flags")]
+    columns = [*_POINT, *(_COEFFICIENTS[i] for i in _DIRECT), Column("out {share}", ".0f"), *words("flags")]
     c.show(title, columns, direct, file="coefficients.csv")
     if cross:
         title = "cross-coupled, where they are more than a tenth of the direct ones"
-        c.show(title, [*POINT, *(COEFFICIENTS[i] for i in CROSS)], cross, file="coefficients.csv")
+        c.show(title, [*_POINT, *(_COEFFICIENTS[i] for i in _CROSS)], cross, file="coefficients.csv")
 
 
 def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
@@ -176,7 +176,7 @@ def cross_coupling_matters(values: FloatArray, halves: FloatArray) -> bool:
     import numpy as np
 
     for value, half in zip(np.split(values, 2), np.split(halves, 2), strict=True):
-        limit = CROSS_COUPLED * 0.5 * (abs(value[0]) + abs(value[3]))
+        limit = _CROSS_COUPLED * 0.5 * (abs(value[0]) + abs(value[3]))
         if np.isfinite(value).all() and (np.abs(value[1:3]) - half[1:3] > limit).any():
             return True
     return False
@@ -194,7 +194,7 @@ def _show_frequency_fits(c: Command, result: Identification) -> None:
             rows.append([load, name, fit.chi_square, fit.dof, fit.probability, fit.misfit, verdict])
     if rows:
         figures = [Column("chi-square", ".1f"), Column("dof", ".0f"), Column("probability", ".2g")]
-        columns = [LOAD, MODEL, *figures, Column("misfit {share}", ".1f"), VERDICT]
+        columns = [_LOAD, _MODEL, *figures, Column("misfit {share}", ".1f"), _VERDICT]
         c.show("over frequency", columns, rows, file="frequency_fits.csv")
     if rejecting:
         more = f" and {len(rejecting) - 6} more loads" if len(rejecting) > 6 else ""
@@ -218,24 +218,24 @@ def _show_bands(c: Command, result: Identification) -> None:
         load = band.point.static_load
         for name, model in band.models.items():
             pairs = [*zip(model.parameters, model.half_width(), strict=False), *4 * [None]]
-            cells = [pairs[i] for i in (*DIRECT, 8, 11)]
+            cells = [pairs[i] for i in (*_DIRECT, 8, 11)]
             models.append([load, name, *cells, _verdict(name == band.supported, model.refused)])
         if band.models and band.supported == "raw H":
             rejecting.append(f"{load / 1e3:g}")
         half = band.half_width()
-        step = max(1, (len(band.lines) - 1) // (MOST_LINES - 1))
-        for k in range(0, len(band.lines), step)[:MOST_LINES]:
+        step = max(1, (len(band.lines) - 1) // (_MOST_LINES - 1))
+        for k in range(0, len(band.lines), step)[:_MOST_LINES]:
             line = band.lines[k]
-            cells = [(line.stiffness.vector[i], half[k, i]) for i in DIRECT]
+            cells = [(line.stiffness.vector[i], half[k, i]) for i in _DIRECT]
             lines.append([load, band.kind, line.frequency, *cells, min(line.coherence), line.method])
     if models:
-        columns = [LOAD, MODEL, *(COEFFICIENTS[i] for i in DIRECT), *MASSES, VERDICT]
+        columns = [_LOAD, _MODEL, *(_COEFFICIENTS[i] for i in _DIRECT), *_MASSES, _VERDICT]
         c.show("models over the band, 95 % intervals", columns, models, file="frf_models.csv")
     if lines:
         entries = ("Re hxx", "Re hyy", "Im hxx", "Im hyy")
         parts = [Column(entry, with_half, quantity="stiffness") for entry in entries]
         excitation, method = words("excitation", "method")
-        columns = [LOAD, excitation, Column("{frequency}", ".4g"), *parts, Column("coh.", ".3f"), method]
+        columns = [_LOAD, excitation, Column("{frequency}", ".4g"), *parts, Column("coh.", ".3f"), method]
         c.show(f"dynamic stiffness over the band, {UNITS['stiffness'][0]}", columns, lines, file="frf.csv")
     if rejecting:
         c.print(

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from rigdata.operating_point import OperatingPoint
     from tpjb_ident.compare.predictions import ModelSettings
 
-PIVOTS = ("rigid", "kirk", "kirk-secant")
-THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
+_PIVOTS = ("rigid", "kirk", "kirk-secant")
+_THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
 def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[OperatingPoint]:
@@ -47,21 +47,21 @@ def _refuse_negative(values: Sequence[float], option: str, remedy: str) -> None:
 
 def pivot_choice(c: Command, text: str) -> str | float | Path:
     """What --pivots means: a name, a stiffness [N/m], or the path of a file."""
-    if text in PIVOTS:
+    if text in _PIVOTS:
         return text
     path = Path(text)
     if path.is_file():
         return c.file(path)
     if text[:1].isdigit():
         return parse_value(text, "stiffness", "--pivots")
-    near = nearest_name(text, PIVOTS)
+    near = nearest_name(text, _PIVOTS)
     hint = f"Did you mean {near!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
     raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {hint}")
 
 
 def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects: Path | None) -> ModelSettings:
     """Build `ModelSettings` from options."""
-    refuse_unknown(thermal, THERMAL, "--thermal")
+    refuse_unknown(thermal, _THERMAL, "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings
 
     if effects is None:

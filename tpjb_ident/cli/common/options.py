@@ -107,9 +107,9 @@ def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool 
 
 
 #: Parameters from which on headings help more than they cost.
-MANY = 11
+_MANY = 11
 #: Headings of the help with the parameters under them, in their order; others stand under "Options".
-HEADINGS = {
+_HEADINGS = {
     "Arguments": "",
     "Operating points": "load load_direction speed excitation",
     "Model": "bearing pivots thermal effects physics housing_temperature model_tolerance tolerance library",
@@ -128,12 +128,12 @@ class GroupedHelp(TyperCommand):
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write arguments, then options by heading; what every command has stands last."""
         parameters = self.get_params(ctx)
-        groups: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
+        groups: dict[str, list[tuple[str, str]]] = {heading: [] for heading in _HEADINGS}
         for parameter in parameters:
-            heading = next((h for h, names in HEADINGS.items() if parameter.name in names.split()), "Options")
+            heading = next((h for h, names in _HEADINGS.items() if parameter.name in names.split()), "Options")
             if parameter.param_type_name == "argument":
                 heading = "Arguments"
-            elif len(parameters) < MANY:
+            elif len(parameters) < _MANY:
                 heading = "Options"
             if record := parameter.get_help_record(ctx):
                 groups[heading].append(record)

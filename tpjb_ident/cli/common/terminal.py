@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
 #: Columns of a log file or a pipe.
-LOG_WIDTH = 100
+_LOG_WIDTH = 100
 #: Rows of a table that are printed where a file has them all.
 MOST_ROWS = 40
 #: Share of a step from which its speed is known well enough to tell the remaining time.
-FORETELLS = 0.02
+_FORETELLS = 0.02
 #: Columns between two columns of a table.
-SPACE = 2
+_SPACE = 2
 #: A column of words is not made narrower than this; what needs less room than it has is printed below the row instead.
-NARROWEST = 14
+_NARROWEST = 14
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
@@ -148,7 +148,7 @@ class ProgressLines:
         self._last = now
         remaining = ""
         counted = done - self._first
-        if counted > 0 and done >= FORETELLS * total:
+        if counted > 0 and done >= _FORETELLS * total:
             remaining = f", about {_duration((now - self._began) * (total - done) / counted)} left"
         self._report(f"{self._activity}: {done} of {total}{remaining} ({text})")
 
@@ -177,7 +177,7 @@ def _print_message(kind: str, text: str) -> None:
 
 def _width() -> int:
     """Columns that a table may take: the terminal's, or what COLUMNS says, or a log file's."""
-    return max(40, shutil.get_terminal_size((LOG_WIDTH, 24)).columns)
+    return max(40, shutil.get_terminal_size((_LOG_WIDTH, 24)).columns)
 
 
 def _fitted(text: str, stderr: bool = False) -> str:
@@ -230,10 +230,10 @@ def _narrow(sizes: list[int], words: Collection[int], width: int) -> list[int]:
     while True:
         over = _total([size for i, size in enumerate(sizes) if i not in below]) - width
         candidates = [i for i in words if i not in below]
-        wide = [i for i in candidates if sizes[i] > NARROWEST]
+        wide = [i for i in candidates if sizes[i] > _NARROWEST]
         if over > 0 and wide:
             widest = max(wide, key=lambda i: sizes[i])
-            sizes[widest] = max(NARROWEST, sizes[widest] - over)
+            sizes[widest] = max(_NARROWEST, sizes[widest] - over)
         elif over > 0 and max(candidates, default=0) > 0:
             below.append(max(candidates))
         else:
@@ -241,7 +241,7 @@ def _narrow(sizes: list[int], words: Collection[int], width: int) -> list[int]:
 
 
 def _total(sizes: Sequence[int]) -> int:
-    return sum(sizes) + SPACE * (len(sizes) - 1)
+    return sum(sizes) + _SPACE * (len(sizes) - 1)
 
 
 def _row_lines(row: Sequence[str], layout: Sequence[tuple[int, int, bool]], bottom: bool = False) -> list[str]:
@@ -257,4 +257,4 @@ def _row_lines(row: Sequence[str], layout: Sequence[tuple[int, int, bool]], bott
     for size, block in blocks:
         missing = [" " * size] * (height - len(block))
         block[:] = [*missing, *block] if bottom else [*block, *missing]
-    return [(" " * SPACE).join(cells).rstrip() for cells in zip(*(block for _, block in blocks), strict=True)]
+    return [(" " * _SPACE).join(cells).rstrip() for cells in zip(*(block for _, block in blocks), strict=True)]

@@ -15,9 +15,9 @@ from rigdata.arrays import FloatArray
 
 #: Standard deviation of the prior of an amplitude, in the library's typical sizes: three of them are no surprise in a
 #: bearing that has the fault at all.
-PRIOR_WIDTH = 3.0
+_PRIOR_WIDTH = 3.0
 #: The same of a direction that is refined beside its grid [rad]: about half a step of the grid.
-DIRECTION_WIDTH = math.pi / 8
+_DIRECTION_WIDTH = math.pi / 8
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Candidate:
     @property
     def width(self) -> FloatArray:
         """Standard deviations of the prior, (k,)."""
-        width = PRIOR_WIDTH * self.steps
+        width = _PRIOR_WIDTH * self.steps
         if not self.basis:
-            width[[p.name in self.about for p in self.free]] = DIRECTION_WIDTH
+            width[[p.name in self.about for p in self.free]] = _DIRECTION_WIDTH
         return width
 
     @property

@@ -25,7 +25,7 @@ from tpjb_ident.diagnosis.observations.observe import Element
 
 #: Step of derivatives, in standard deviations: small, so that a nuisance and the effect that does the same have the
 #: same derivative, and their curvature does not tell them apart.
-STEP = 0.3
+_STEP = 0.3
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def column_of(
     if unknowns[index].column is not None:
         return np.asarray(unknowns[index].column)
     # towards zero: there the model surely has an equilibrium
-    step = -STEP if at[index] > 0.0 else STEP
+    step = -_STEP if at[index] > 0.0 else _STEP
     moved = at.copy()
     moved[index] += step
     return (predict(forward, effects, unknowns, moved) - base) / step

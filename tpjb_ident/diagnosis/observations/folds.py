@@ -15,9 +15,9 @@ from rigdata.arrays import BoolArray, IntArray
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 #: Frequencies at one load from which each is a block of its own.
-SWEEP = 4
+_SWEEP = 4
 #: Sectors of neighbouring load directions that a locus is split into.
-SECTORS = 5
+_SECTORS = 5
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
             continue
         swept = lines.get(key, set())
         name = f"load {key[0]:.0f} N at {np.degrees(key[1]):.0f} deg"
-        if len(swept) >= SWEEP:
+        if len(swept) >= _SWEEP:
             line = e.place("excitation")
             outer = line in (min(swept), max(swept))
             name += ", temperatures" if e.family == "temperature" else f", {line / (2 * np.pi):g} Hz"
@@ -90,7 +90,7 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
 def _sectors(elements: tuple[Element, ...]) -> dict[int, int]:
     """Sector of neighbouring directions that every element of a locus lies in."""
     around = sorted({e.place("direction") % (2 * np.pi) for e in elements if e.family in {"locus", "load"}})
-    place = {angle: SECTORS * k // len(around) + 1 for k, angle in enumerate(around)}
+    place = {angle: _SECTORS * k // len(around) + 1 for k, angle in enumerate(around)}
     return {
         i: place[e.place("direction") % (2 * np.pi)] for i, e in enumerate(elements) if e.family in {"locus", "load"}
     }

@@ -83,12 +83,12 @@ class Layout:
 
 ENTRY_NAMES = ("xx", "xy", "yx", "yy")
 #: Loads at which dry curves are compared, as shares of the range in which contact is complete.
-DRY_SHARES = (0.15, 0.5, 0.95)
+_DRY_SHARES = (0.15, 0.5, 0.95)
 #: Error of a dry curve at each load by itself, as a share of its standard error: no law is quite the pivot's own. From
 #: 110 simulated curves: with less, pads that all were given the same wrong law raise false alarms.
-DRY_SHAPE = 0.7
+_DRY_SHAPE = 0.7
 #: Standard error of a mean pad temperature [K]: sensors drift and self-heat far more than their noise.
-TEMPERATURE_SE = 0.05
+_TEMPERATURE_SE = 0.05
 #: What runs in other directions would differ by where only two were excited, as a share of the direct coefficients.
 UNSEEN_DIFFERENCE = 0.005
 
@@ -181,7 +181,7 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
         temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
         names = [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in temperature]
         if temperature:
-            noise = np.eye(len(names)) * TEMPERATURE_SE**2
+            noise = np.eye(len(names)) * _TEMPERATURE_SE**2
             value = np.array(list(temperature.values()))
             builder.add(names, value, noise, tolerance.temperature)
         out.append(
@@ -238,11 +238,11 @@ def _usable(curve: PivotCurve) -> bool:
 
 
 def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
-    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in DRY_SHARES])
+    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in _DRY_SHARES])
     value = -np.log(np.asarray(curve.stiffness(load), float))
     elements = [Element("dry", "dry_compliance", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
     covariance = curve.relative_stiffness_covariance(load)
-    covariance = covariance + np.diag(DRY_SHAPE**2 * np.diag(covariance))
+    covariance = covariance + np.diag(_DRY_SHAPE**2 * np.diag(covariance))
     builder.add(elements, value, covariance, tolerance.dry)
     used_loads = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in used_loads))
@@ -263,7 +263,7 @@ def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tole
 
 
 #: Harmonics of the load's direction that a locus of many directions is described by.
-HARMONICS = 3
+_HARMONICS = 3
 
 
 def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArray]:
@@ -294,7 +294,7 @@ def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
     angle = np.array([p.point.static_load_direction for p in alike])
     place = np.array([p.position for p in alike])
     count = len(np.unique(np.round(np.exp(1j * angle), 6)))
-    orders = np.arange(1, min(HARMONICS, (count - 1) // 2) + 1)
+    orders = np.arange(1, min(_HARMONICS, (count - 1) // 2) + 1)
     if not len(orders) or _largest_gap(angle) > math.pi / orders[-1]:
         # too few directions: as if the whole locus turned about its middle, or about the zero where that is all
         middle = place.mean(axis=0) if count > 2 else np.zeros(2)

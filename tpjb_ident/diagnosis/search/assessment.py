@@ -26,12 +26,12 @@ from tpjb_ident.diagnosis.observations.folds import Fold
 from tpjb_ident.diagnosis.search.components import Component
 
 #: Most steps of the scales: with 12 a baseline ended 7 nats short of its best, and what was fitted from there led.
-STEPS = 40
+_STEPS = 40
 #: A step that has helped may be so many times as long the next time: residuals far below a scale bring it down by a
 #: factor of e a step.
-LONGEST = 8.0
+_LONGEST = 8.0
 #: Change of the log scales at which they count as found.
-FOUND = 0.05
+_FOUND = 0.05
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed:
     inverse = _inverse(factor)
     damping, stride = 1e-3, 1.0
     lowest, highest = np.array([(component.lowest, component.highest) for component in basis.components]).T
-    for _ in range(0 if fixed else STEPS):
+    for _ in range(0 if fixed else _STEPS):
         gradient, fisher = _slopes(basis, linear, inverse, logs)
         moved = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)) + 1e-9 * np.eye(len(logs)), gradient)
         for share in dict.fromkeys((stride, 1.0)):
@@ -159,13 +159,13 @@ def assess(basis: Basis, linear: Linear, start: FloatArray | None = None, fixed:
             trial, factor = _evidence(basis, linear, spread, new)
             if trial >= value:
                 break
-        stride = min(2.0 * share, LONGEST) if trial >= value else 1.0
+        stride = min(2.0 * share, _LONGEST) if trial >= value else 1.0
         if trial < value:
             damping = max(10.0 * damping, 0.1)
             if damping > 1e4:
                 break
             continue
-        done = np.max(np.abs(new - logs)) < FOUND or trial - value < 0.01
+        done = np.max(np.abs(new - logs)) < _FOUND or trial - value < 0.01
         logs, value, inverse, damping = new, trial, _inverse(factor), 0.1 * damping
         if done:
             break

@@ -19,11 +19,11 @@ from tpjb_ident.diagnosis.observations.gap import coordinate
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 #: Scales are fitted as logarithms, within what can still be told from nothing and what drowns everything.
-NOTHING, LOWEST, HIGHEST = math.log(1e-5), math.log(0.1**2), math.log(1e5)
+NOTHING, _LOWEST, HIGHEST = math.log(1e-5), math.log(0.1**2), math.log(1e5)
 #: Parts of the variance: the same at all points, smooth over the range that was measured, each point by itself (a
 #: tenth of the standard deviation: programs that solve the same equations differ like that).
-CONSTANT, SMOOTH, ROUGH = 0.5, 0.49, 0.01
-KINDS = {
+_CONSTANT, _SMOOTH, _ROUGH = 0.5, 0.49, 0.01
+_KINDS = {
     "h": "h", "locus": "position", "load": "load", "clearance": "polygon", "dry": "dry", "temperature": "temperature",
 }  # fmt: skip
 
@@ -35,7 +35,7 @@ class Component:
     name: str
     rows: IntArray = field(repr=False)  #: (m,)
     matrix: FloatArray = field(repr=False)  #: (m, m)
-    lowest: float = LOWEST
+    lowest: float = _LOWEST
     highest: float = 0.0
     made_of: tuple[int, ...] = ()
 
@@ -47,7 +47,7 @@ def components(observations: Observations) -> tuple[Component, ...]:
     out = [Component("scatter", everything, observations.covariance / np.outer(scale, scale), NOTHING)]
     share = observations.sigma / scale
     combined = np.zeros_like(observations.covariance)  # all kinds together
-    kinds = np.array([KINDS[e.family] for e in observations.elements])
+    kinds = np.array([_KINDS[e.family] for e in observations.elements])
     for kind in dict.fromkeys(kinds):
         rows = np.flatnonzero(kinds == kind)
         members = [observations.elements[i] for i in rows]
@@ -69,13 +69,13 @@ def _correlation(elements: Sequence[Element]) -> FloatArray:
     distance += 1.0 - np.cos(angle[:, None] - angle[None, :])
     around = elements[0].family in {"locus", "load"}
     # the constant part of a locus is its centre, which is free
-    constant, smooth = (0.0, CONSTANT + SMOOTH) if around else (CONSTANT, SMOOTH)
-    return equal * (constant + smooth * np.exp(-distance)) + ROUGH * np.eye(len(elements))
+    constant, smooth = (0.0, _CONSTANT + _SMOOTH) if around else (_CONSTANT, _SMOOTH)
+    return equal * (constant + smooth * np.exp(-distance)) + _ROUGH * np.eye(len(elements))
 
 
 #: Share of the stated tolerance that campaigns turn out to need, for what is planned before any is there: with models
 #: that solve the same equations 0.1 to 0.2, see `docs/diagnosis.md`.
-USUAL = 0.2
+_USUAL = 0.2
 
 
 def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
@@ -87,6 +87,6 @@ def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)
     for component in components(observations)[1:-1]:
-        total[np.ix_(component.rows, component.rows)] += USUAL**2 * component.matrix
+        total[np.ix_(component.rows, component.rows)] += _USUAL**2 * component.matrix
     total += 1e-6 * np.diag(share**2)
     return np.asarray(scale[:, None] * np.linalg.cholesky(total))

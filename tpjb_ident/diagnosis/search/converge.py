@@ -15,12 +15,12 @@ from tpjb_ident.diagnosis.search.minimise import CONVERGED, SearchState, attempt
 from tpjb_ident.diagnosis.search.problem import Problem
 
 #: How often a fit takes derivatives of its own.
-ROUNDS = 3
+_ROUNDS = 3
 #: Steps on the same derivatives, which every step corrects: one run of the model each, where derivatives take thirty.
-STEPS_BETWEEN = 4
+_STEPS_BETWEEN = 4
 
 
-def converge(run: Map, problem: Problem, fit: Fit, rounds: int = ROUNDS) -> Fit:
+def converge(run: Map, problem: Problem, fit: Fit, rounds: int = _ROUNDS) -> Fit:
     """Give a fit derivatives of its own, those of the nuisances too, and move all of them together."""
     if fit.converged:
         return fit
@@ -32,7 +32,7 @@ def converge(run: Map, problem: Problem, fit: Fit, rounds: int = ROUNDS) -> Fit:
             fit = fitted(problem, state.start, state.prediction, scales)
             scales = fit.assessment.scales
         moved = False
-        for _ in range(STEPS_BETWEEN):
+        for _ in range(_STEPS_BETWEEN):
             next_state, stepped = _stepped(run, problem, state, fit)
             if not stepped:
                 break

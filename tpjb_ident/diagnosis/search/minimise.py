@@ -13,14 +13,14 @@ from tpjb_ident.diagnosis.search.assessment import Assessment, Basis, assess
 from tpjb_ident.diagnosis.search.fit import Fit, InitialFit, build, fitted, linear
 from tpjb_ident.diagnosis.search.problem import Problem
 
-MAX_STEPS = 4
+_MAX_STEPS = 4
 #: Share of their tolerances that nuisances have at first.
-TIGHT = 0.2
+_TIGHT = 0.2
 #: A fit is settled when a step would move every amplitude by less than this share of its standard error.
 CONVERGED = 0.1
 #: A step that loses less than this [nats] is not tried shorter: it loses by its derivative, which is better known after
 #: it, and not by its length.
-HARDLY = 0.3
+_HARDLY = 0.3
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ def fit(forward: ForwardModel, problem: Problem, start: InitialFit) -> Fit | Non
     if y is None:
         return None
     coarse, basis = problem.basis.coarse, problem.basis
-    state = _minimised(forward, problem, SearchState(start, y), Objective(coarse, basis.stated, TIGHT))
-    state = _minimised(forward, problem, state, Objective(basis, basis.stated, TIGHT))
-    state = _minimised(forward, problem, state, Objective(basis, basis.stated))
+    state = _minimised(forward, problem, SearchState(start, y), _Objective(coarse, basis.stated, _TIGHT))
+    state = _minimised(forward, problem, state, _Objective(basis, basis.stated, _TIGHT))
+    state = _minimised(forward, problem, state, _Objective(basis, basis.stated))
     fitted_first = fitted(problem, state.start, state.prediction)
-    next_state = _minimised(forward, problem, state, Objective(basis, fitted_first.assessment.scales))
+    next_state = _minimised(forward, problem, state, _Objective(basis, fitted_first.assessment.scales))
     if next_state is state:
         return fitted_first
     refitted = fitted(problem, next_state.start, next_state.prediction, fitted_first.assessment.scales)
@@ -63,7 +63,7 @@ def fit(forward: ForwardModel, problem: Problem, start: InitialFit) -> Fit | Non
 
 
 @dataclass(frozen=True)
-class Objective:
+class _Objective:
     """What a step is judged by."""
 
     basis: Basis
@@ -75,9 +75,9 @@ class Objective:
         return assess(self.basis, linear(problem, start, y, self.slack), self.scales, fixed=True)
 
 
-def _minimised(forward: ForwardModel, problem: Problem, state: SearchState, objective: Objective) -> SearchState:
+def _minimised(forward: ForwardModel, problem: Problem, state: SearchState, objective: _Objective) -> SearchState:
     """Steps at fixed scales of the model's error until no amplitude moves."""
-    for _ in range(MAX_STEPS if state.start.jacobian.shape[1] else 0):
+    for _ in range(_MAX_STEPS if state.start.jacobian.shape[1] else 0):
         assessment = objective.assess(problem, state.start, state.prediction)
         now = np.concatenate(state.start.amplitudes)
         step = np.concatenate(state.start.split(_targets(state.start, assessment))) - now
@@ -96,7 +96,7 @@ def _improved(
     problem: Problem,
     state: SearchState,
     step: FloatArray,
-    evidence: tuple[Objective, Assessment],
+    evidence: tuple[_Objective, Assessment],
 ) -> SearchState | None:
     """The place after a step, or after a part of it, that is better; None if none is."""
     objective, assessment = evidence
@@ -111,7 +111,7 @@ def _improved(
         trial_assessment = objective.assess(problem, trial, y)
         if trial_assessment.evidence > assessment.evidence:
             return SearchState(trial, y)
-        if assessment.evidence - trial_assessment.evidence < HARDLY:
+        if assessment.evidence - trial_assessment.evidence < _HARDLY:
             break
     return None
 

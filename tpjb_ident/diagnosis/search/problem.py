@@ -16,7 +16,7 @@ from tpjb_ident.diagnosis.search.assessment import Basis
 from tpjb_ident.diagnosis.search.components import components
 
 #: Share of the static load below which a pad hardly carries: its attitude, and so its temperature, is not unique.
-HARDLY = 0.10
+_HARDLY = 0.10
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,6 @@ class Problem:
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
     """Trust no temperature of a pad that hardly carries in the baseline; `shares` (n,)."""
-    idle = np.nan_to_num(shares, nan=1.0) < HARDLY
+    idle = np.nan_to_num(shares, nan=1.0) < _HARDLY
     noise = np.where(idle, tolerance.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

@@ -31,11 +31,11 @@ from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 #: How often a model takes derivatives of its own while the search goes on.
 ROUNDS_ON_THE_WAY = 2
 #: Candidates that are fitted since they explain most by themselves, whatever else may be off.
-ALONE = 3
+_ALONE = 3
 #: Pairs of candidates that are fitted from the baseline: forward selection can begin with a compromise.
-PAIRS = 2
+_PAIRS = 2
 #: Fits afresh that are settled in a second search.
-FAR = 2
+_FAR = 2
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Proposals:
         ranking = scores(self.problem, drawn, free, paths=self.paths)
         ranked = self._promising(ranking)
         # a fit of a large effect may end on either side of a hill: it begins at both sizes that were proposed
-        first = alone(self.problem, drawn, free, self.paths)[:ALONE]
+        first = alone(self.problem, drawn, free, self.paths)[:_ALONE]
         names = {s.candidates for s in first} - {s.candidates for s in ranked}
         ranked = [*ranked, *first, *(s for s in ranking if s.candidates in names)]
         return best_of(self.fits([with_model(drawn, s, free, self.paths) for s in ranked]))
@@ -95,7 +95,7 @@ class Proposals:
             if len(a) == 1 and abs(a[0] - c.neutral) > 1e-3 * c.step:
                 alone = f.prediction - f.columns @ f.nuisance - self.problem.base
                 table[c] = alone[:, None] / (a[0] - c.neutral)
-        ranked = scores(self.problem, self.drawn, table, pairs=True)[:PAIRS]
+        ranked = scores(self.problem, self.drawn, table, pairs=True)[:_PAIRS]
         return self.fits([with_model(self.drawn, s, table) for s in ranked])
 
     def fits(self, starts: Sequence[InitialFit]) -> list[Fit]:
@@ -135,7 +135,7 @@ class Proposals:
         """Fits afresh that close most of the gap, settled, where they come to be likelier than what leads."""
         least = max((f.evidence for f in near), default=-np.inf)
         remaining = [self.problem.scaled(self.problem.observations.value - f.prediction) for f in afresh]
-        order = np.argsort([float(z @ z) for z in remaining])[:FAR]
+        order = np.argsort([float(z @ z) for z in remaining])[:_FAR]
         fits = self.run.together([functools.partial(self.refined, afresh[i]) for i in order])
         return [converge(self.run, self.problem, f) for f in fits if f.evidence > least]
 

@@ -19,9 +19,9 @@ from tpjb_ident.diagnosis.search.minimise import attempt, slope
 from tpjb_ident.diagnosis.search.problem import Problem
 
 #: Shares of a model's own error scales at which candidates are scored: with the right effect added they fall.
-SHARES = (1.0, 0.1, 0.01, 0.001)
+_SHARES = (1.0, 0.1, 0.01, 0.001)
 #: Effects that solve the pads' own heat or bending: seconds a run, and nearly linear at any size that a rig has.
-SLOW = frozenset({"pad_bending", "pad_conduction"})
+_SLOW = frozenset({"pad_bending", "pad_conduction"})
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def survey(run: Map, model: Fit, pool: Sequence[Candidate]) -> Survey:
     effect explains little, and others would be fitted in its place.
     """
     # the longest ones begin: nobody waits for them at the end
-    order = sorted(pool, key=lambda c: c.name not in SLOW)
+    order = sorted(pool, key=lambda c: c.name not in _SLOW)
     surveyed = dict(zip(order, run(_surveyed, [(model.start, model.prediction, c) for c in order]), strict=True))
     secants, slopes = ({c: surveyed[c][i] for c in pool} for i in range(2))
     return Survey(secants, slopes, {c: path for c in pool if (path := surveyed[c][2]) is not None})
@@ -63,7 +63,7 @@ def _surveyed(
     forward: ForwardModel, problem: Problem, model: InitialFit, y: FloatArray, candidate: Candidate
 ) -> tuple[FloatArray, FloatArray, AmplitudePath | None]:
     """Secants, slopes, and the course where it can be told."""
-    if len(candidate.steps) == 1 and candidate.name not in SLOW:
+    if len(candidate.steps) == 1 and candidate.name not in _SLOW:
         path = _path(forward, problem, model, y, candidate)
         if path is not None:
             nearest = int(np.argmin(np.where(path.at == 0.0, np.inf, np.abs(path.at - NODES[0] * candidate.step))))
@@ -114,7 +114,7 @@ def scores(
     problem: Problem, model: Fit, table: Columns, pairs: bool = False, paths: AmplitudePaths | None = None
 ) -> list[Score]:  # fmt: skip
     """Score candidates, or all pairs of them, beside a model; best first; `table` (n, k) each."""
-    levels = [_Level(problem, model, table, share, paths or {}) for share in SHARES]
+    levels = [_Level(problem, model, table, share, paths or {}) for share in _SHARES]
     pool = list(table)
     chosen: list[tuple[Candidate, ...]] = [(c,) for c in pool]
     if pairs:

@@ -17,7 +17,7 @@ from tpjb_ident.diagnosis.search.selection import CLEARLY, Progress, Selection
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 #: How often another explanation may take the place of one effect of the model.
-SWAPS = 2
+_SWAPS = 2
 #: Variance of the error beyond what is stated, in stated ones, above which a model is wrong: of the mixtures right ones
 #: need 0.011 at the most, those that miss a large effect 0.1 to 70.
 WRONG = 0.05
@@ -64,7 +64,7 @@ def _selected(
     model, singles = selection.forward(say, afar)
     say("rivals", 0.8)
     rivals: tuple[tuple[Fit, ...], ...] = ()
-    for _ in range(SWAPS):
+    for _ in range(_SWAPS):
         rivals = selection.rivals(model, singles)
         better = selection.better(model, [r for row in rivals for r in row])
         if better is None:

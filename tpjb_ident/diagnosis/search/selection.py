@@ -23,16 +23,16 @@ Progress = Callable[[str, float], None]
 #: Log evidence [nats] below which two fits of the same candidates are one.
 CLEARLY = 1.0
 #: Candidates of every round that are compared with derivatives of their own.
-FIRST = 3
+_FIRST = 3
 #: Of these, the ones that may yet be the best: derivatives from elsewhere mistake a fit by up to 25 nats where it rises
 #: by as many, and by a third of its rise where that is large (`docs/diagnosis.md`).
-NEAR, HALF = 30.0, 0.5
+_NEAR, _HALF = 30.0, 0.5
 #: Effects with a direction that are turned off their grid where a generic term leads.
-TURNED = 2
+_TURNED = 2
 #: Evidence [nats] that no tolerance makes up once an effect is taken away: 45 at the most in all samples.
-HOPELESS = 100.0
+_HOPELESS = 100.0
 #: Candidates that are fitted in the place of every effect.
-RIVALS = 3
+_RIVALS = 3
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ class Selection:
 
     def _leading(self, model: Fit, tried: Sequence[Fit]) -> list[Fit]:
         """Those of the first fits that may yet be the best; behind a generic term, effects with a direction too."""
-        first = tried[:FIRST]
+        first = tried[:_FIRST]
         best = first[0].evidence if first else 0.0
-        least = best - max(NEAR, HALF * (best - model.evidence))
+        least = best - max(_NEAR, _HALF * (best - model.evidence))
         lead = [f for f in first if f.evidence > least]
         if lead and lead[0].names & set(TERMS):
             # free numbers of a term find any direction, an effect on its grid none between
             turned = [f for f in tried if not f.names & set(TERMS) and any(c.refined() != c for c in f.candidates)]
-            lead += [f for f in turned[:TURNED] if not any(f is best_fit for best_fit in lead)]
+            lead += [f for f in turned[:_TURNED] if not any(f is best_fit for best_fit in lead)]
         return lead
 
     def _chosen(self, model: Fit, tried: Sequence[Fit]) -> Fit | None:
@@ -166,7 +166,7 @@ class Selection:
         if less is None:
             return EffectGain(np.inf, np.inf)
         value = effect_gain(self.problem, model, less, model.candidates[index])
-        if self._enough(value) and less is not self.baseline and value.beside < HOPELESS:
+        if self._enough(value) and less is not self.baseline and value.beside < _HOPELESS:
             # what may be off does without the effect all that it can, not to first order only, and from where it
             # stands beside the effect too: else an effect is named for what a tolerance does
             less = converge(self.run, self.problem, less, ROUNDS_ON_THE_WAY)
@@ -192,7 +192,7 @@ class Selection:
             self._places[less.label] = max(self._places.get(less.label, less), less, key=lambda f: f.evidence)
         if indices or less is None:
             return less if indices else self.baseline
-        if model.evidence - max(less.evidence, self.baseline.evidence) > HOPELESS:
+        if model.evidence - max(less.evidence, self.baseline.evidence) > _HOPELESS:
             return self.baseline
         # the way from an effect back to nothing may end at a better place than the way from the drawing
         self._nothing[:] = best_of([self.baseline, converge(self.run, self.problem, less)])[:1]
@@ -241,7 +241,9 @@ class Selection:
                 continue
             used = {gone.label, *(o.label for o in reduced.candidates)}
             table = {c: v for c, v in self.proposed.first.items() if c.label not in used}
-            best = [s for s in scores(self.problem, reduced, table, paths=self.proposed.paths) if s.gain > 0.0][:RIVALS]
+            best = [s for s in scores(self.problem, reduced, table, paths=self.proposed.paths) if s.gain > 0.0][
+                :_RIVALS
+            ]
             fits = self.proposed.fits([with_model(reduced, s, table, self.proposed.paths) for s in best])
             if gone.name in TERMS:  # an effect that lies off its grid does not do what free numbers do
                 fits = self.run.together([functools.partial(self.proposed.refined, f) for f in fits])

@@ -20,18 +20,18 @@ from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.search.search import Search
 
 #: A smaller principal value below this share of the larger one makes a term one of one direction.
-ONE_WAY = 0.2
+_ONE_WAY = 0.2
 #: What a pad by itself may be off by: kind, effect and parameter that say it, unit.
-PADS = {
+_PADS = {
     "clearance_scatter": ("clearance by pad", "pad_offset", "radial_offset", "m"),
     "pivot_stiffness_scatter": ("pivot law of a pad", "soft_pivot", "stiffness_factor", "1"),
 }
 #: What an amplitude could change over, with the number of levels it takes to tell.
 OVER = (("static_load", "load", 3), ("shaft_speed", "speed", 2), ("excitation", "excitation", 4))
 #: Rise of the log evidence from which a drift counts: odds of 150.
-NOTABLE = 5.0
+_NOTABLE = 5.0
 #: Relative change over the range below which an amplitude is the same for all practical ends.
-SAME = 0.1
+_SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,10 @@ def _pads(problem: Problem, fitted: Fit) -> list[Behaviour]:
     variance = np.diag(fitted.assessment.covariance)[count:]
     out = []
     for nuisance, m, v in zip(problem.nuisances, free, variance, strict=True):
-        if nuisance.name not in PADS or abs(m) < STAND_IN * math.sqrt(max(1.0 - v, 1e-12)):
+        if nuisance.name not in _PADS or abs(m) < STAND_IN * math.sqrt(max(1.0 - v, 1e-12)):
             continue
         pad, change, spread = int(nuisance.place.split()[-1]), float(m * nuisance.sigma), float(math.sqrt(v) / abs(m))
-        kind, effect, parameter, unit = PADS[nuisance.name]
+        kind, effect, parameter, unit = _PADS[nuisance.name]
         if effect == "pad_offset":
             size, words = change, f"pad #{pad} stands {1e6 * change:+.1f} um from where the drawing has it"
         else:
@@ -100,7 +100,7 @@ def _described(name: str, form: str, matrix: FloatArray, spread: float, values: 
         direction = (angle + 90.0) % 180.0 - 90.0
         second = float(sizes[1 - first])
         how = f"in one direction, {direction:.0f} deg"
-        if abs(second) > ONE_WAY * abs(size):
+        if abs(second) > _ONE_WAY * abs(size):
             how = f"unequal: {direction:.0f} deg and, {second / size:.2f} times as much, across"
     if name == "series_compliance":
         size = 1.0 / size if size else math.inf
@@ -135,7 +135,7 @@ def drifts(problem: Problem, fitted: Fit) -> tuple[Drift, ...]:
             continue
         found = [_over(problem, fitted, candidate, at.start, row) for row in OVER]
         best = max((f for f in found if f is not None), key=lambda f: f[0], default=None)
-        if best is not None and best[0] > NOTABLE:
+        if best is not None and best[0] > _NOTABLE:
             out.append(best[1])
     return tuple(out)
 
@@ -161,7 +161,7 @@ def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drif
     origin = float(candidate.origin[0])
     ends = [_value(candidate, origin, moved, growth, v / middle - 1.0) for v in (finite_values[0], finite_values[-1])]
     size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
-    if size < SAME:
+    if size < _SAME:
         return None
     parameter = candidate.free[0]
     words = _words(ends, finite_values, name)

@@ -29,7 +29,7 @@ class Plausible:
 
 #: Effect and parameter: what its source allows. What is not here is bounded by three typical sizes of the library,
 #: whose sources stand with the effects.
-RANGES = {
+_RANGES = {
     ("oil_viscosity", "factor"): (0.9, 1.1, "ISO 3448 holds a grade within 10 %"),
     ("pivot_flexibility", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
     ("soft_pivot", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
@@ -48,8 +48,8 @@ def plausible(name: str, parameter: str, pads: int) -> Plausible | None:
     """Range of an effect's parameter; None where nothing bounds it (a direction, a generic term)."""
     kind = kind_of(name)
     described = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
-    if (name, parameter) in RANGES:
-        return Plausible(*RANGES[(name, parameter)])
+    if (name, parameter) in _RANGES:
+        return Plausible(*_RANGES[(name, parameter)])
     if described is None or described.neutral != described.neutral or math.isnan(described.typical):
         return None
     origin, reach = described.to_linear(described.neutral), 3.0 * described.typical_step

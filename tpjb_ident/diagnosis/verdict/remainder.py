@@ -17,9 +17,9 @@ from tpjb_ident.diagnosis.search.problem import Problem
 from tpjb_ident.diagnosis.verdict.verdict import Disagreement
 
 #: Share of its prior variance that the data take from something that may be off, before they say anything about it.
-TOLD = 0.05
+_TOLD = 0.05
 #: Rows of the list of disagreements.
-MOST = 12
+_MOST = 12
 
 
 def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagreement, ...]:
@@ -33,7 +33,7 @@ def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagr
             square = float(np.sum(z[part] ** 2))
             rows.append(Disagreement(name, where, math.sqrt(square / part.sum()), square / total if total else 0.0))
     rows.sort(key=lambda d: -d.share)
-    return tuple(rows[:MOST])
+    return tuple(rows[:_MOST])
 
 
 def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]
@@ -82,7 +82,7 @@ def excess(problem: Problem, fitted: Fit) -> Excess:
     first = len(fitted.errors)
     remaining = 1.0 - np.diag(assessment.covariance)[first:]
     for nuisance, m, spread in zip(problem.nuisances, assessment.free[first:], remaining, strict=True):
-        if spread > TOLD:
+        if spread > _TOLD:
             tests.append((2.0 * float(ndtr(-abs(m) / np.sqrt(spread))), f"{nuisance.name} {nuisance.place}".strip()))
     p, where = min(tests)
     return Excess(min(1.0, p * len(tests)), where)

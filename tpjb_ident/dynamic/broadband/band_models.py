@@ -20,12 +20,12 @@ from tpjb_ident.dynamic.broadband.line_rows import LineRows
 
 MODELS: dict[str, Basis] = {"K-C": k_c, "K-C-M": k_c_m}
 #: Lines to either side whose noise goes into a line's weight.
-NEIGHBOURS = 4
+_NEIGHBOURS = 4
 #: Parts of the band in which a model is held against h.
-PARTS = 8
+_PARTS = 8
 #: A model is refused below this probability of its chi-square.
-REFUSED = 0.01
-ROUNDS = 3
+_REFUSED = 0.01
+_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class BandModel:
     @property
     def refused(self) -> bool:
         """Whether the lines refuse the model."""
-        return self.spare > 0 and self.probability < REFUSED
+        return self.spare > 0 and self.probability < _REFUSED
 
     @property
     def standard_error(self) -> FloatArray:
@@ -151,7 +151,7 @@ def _solve(sums: list[list[RunSums]]) -> _Solution | None:
     theta: FloatArray = np.zeros((2, q))
     inverse: FloatArray = np.zeros((2 * q, 2 * q))
     noise: list[list[ComplexArray]] = []
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         normal, moment = np.zeros((2 * q, 2 * q)), np.zeros(2 * q)
         for line, weight in zip(sums, weights):
             for run, w in zip(line, weight):
@@ -173,7 +173,7 @@ def _weights(sums: list[list[RunSums]], noise: list[list[ComplexArray]]) -> list
     floor = 1e-20 * float(np.mean([np.abs(run.B).mean() for line in sums for run in line])) ** 2 + 1e-300
     out = []
     for k in range(len(sums)):
-        near = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
+        near = slice(max(k - _NEIGHBOURS, 0), k + _NEIGHBOURS + 1)
         share = dof[near] / dof[near].sum(axis=0)
         pooled = np.einsum("lr,lrik->rik", share, spreads[near])
         out.append([np.linalg.inv(each + floor * np.eye(2)) for each in pooled])
@@ -214,7 +214,7 @@ def _parts(
     solution, middle, basis = model
     order = _by_kind(2)
     parts = []
-    for part in np.array_split(np.arange(len(rows)), min(PARTS, len(rows) // 2)):
+    for part in np.array_split(np.arange(len(rows)), min(_PARTS, len(rows) // 2)):
         sums = [line_sums(_left(rows[k], solution.theta, middle, basis), middle, complex_h, instrument) for k in part]
         alone = _solve(sums)
         if alone is None:

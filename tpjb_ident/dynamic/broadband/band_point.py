@@ -22,12 +22,12 @@ from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.errors import BadInputError
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
-TELL_CLOCKS = ("multisine", "random", "impact")
-SINE = "sine"
+_TELL_CLOCKS = ("multisine", "random", "impact")
+_SINE = "sine"
 #: Parts of the band that are judged one by one: a lag shows at the top, a sign everywhere.
-PARTS = 8
+_PARTS = 8
 #: Lines that a part has at least.
-LEAST = 6
+_LEAST = 6
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def read_point(
 def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
     """The settings with the differences between clocks that the group's runs show together."""
     clocks = []
-    for run in group.runs if group.kind in TELL_CLOCKS else ():
+    for run in group.runs if group.kind in _TELL_CLOCKS else ():
         try:
             clocks.append(run_clocks(run, settings))
         except RigDataError:  # its own transform says so
@@ -138,7 +138,7 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
 
 def is_broadband(run: Run) -> bool:
     """Whether a run is excited over a band, not by a sine."""
-    return getattr(run, "excitation_kind", SINE) != SINE
+    return getattr(run, "excitation_kind", _SINE) != _SINE
 
 
 def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
@@ -173,7 +173,7 @@ def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition
     if spectra[0].phasors.acceleration is None:
         return 0.0, ()
     free = np.flatnonzero(~np.any([s.taken for s in spectra], axis=0))
-    parts = np.array_split(free, min(PARTS, max(len(free) // LEAST, 1)))
+    parts = np.array_split(free, min(_PARTS, max(len(free) // _LEAST, 1)))
     verdicts = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
     conditions = merged(*(verdicts[f].conditions for f in sorted(verdicts, reverse=True)))
     if "accelerometers-contradict-cells" in conditions:  # where the housing's inertia is larger

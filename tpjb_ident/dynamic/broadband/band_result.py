@@ -24,7 +24,7 @@ from tpjb_ident.schema import KINDS, STATIC_COLUMNS
 if TYPE_CHECKING:
     import pandas as pd
 
-KEY_COLUMNS = (*STATIC_COLUMNS, "excitation")
+_KEY_COLUMNS = (*STATIC_COLUMNS, "excitation")
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class BandResult:
         """Columns that name the result."""
         p = self.point
         values = (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, self.kind)
-        return dict(zip(KEY_COLUMNS, values))
+        return dict(zip(_KEY_COLUMNS, values))
 
 
 def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.DataFrame:

@@ -17,13 +17,13 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_take
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
 #: Pieces of a record,
-PIECES = 8
+_PIECES = 8
 #: bins of a piece next to a disturbing line that tell nothing,
-BESIDE = 3.0
+_BESIDE = 3.0
 #: standard errors beyond which a difference is one,
-CLEAR = 6.0
+_CLEAR = 6.0
 #: and phase [rad] over the record at the top of the band that it must come to.
-NOTABLE = 5e-3
+_NOTABLE = 5e-3
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str
         weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])
         rate = float(np.sum(weight * [clock.rate for clock in clocks]) / weight.sum())
         pooled = ClockRate(rate, float(weight.sum() ** -0.5))
-        if abs(rate) > CLEAR * pooled.error and abs(rate) * reach > NOTABLE:
+        if abs(rate) > _CLEAR * pooled.error and abs(rate) * reach > _NOTABLE:
             table[quantity] = pooled
     return table
 
@@ -69,22 +69,22 @@ def _clock_rate(
     samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Disturbance, ...]
 ) -> ClockRate:
     """Rate of a quantity's clock against the probes'."""
-    length = samples.length // PIECES
+    length = samples.length // _PIECES
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / samples.rate), dtype=float)
     seconds = length / samples.rate
-    used = (frequency >= band[0]) & (frequency <= band[1]) & ~bins_taken(frequency, lines, seconds, BESIDE)
-    if used.sum() < PIECES:
+    used = (frequency >= band[0]) & (frequency <= band[1]) & ~bins_taken(frequency, lines, seconds, _BESIDE)
+    if used.sum() < _PIECES:
         return ClockRate(0.0, np.inf)
     D, z = (_pieces(samples.values[q], length)[:, :, used] for q in ("displacement", quantity))
     cross = np.sum(z * D.conj(), axis=0)
-    first, second = np.triu_indices(PIECES, 1)
+    first, second = np.triu_indices(_PIECES, 1)
     apart = (second - first)[:, None] * seconds
     turn = cross[second] * cross[first].conj()
     weight = np.sqrt(np.abs(turn))
     weight = np.minimum(weight, 3 * np.median(weight) + 1e-300)
     lever = 2 * np.pi * frequency[used] * apart
     rate = 0.0
-    for step in (1, 3, PIECES - 1):  # from near pieces to far ones: turns wrap, and are counted from what is known
+    for step in (1, 3, _PIECES - 1):  # from near pieces to far ones: turns wrap, and are counted from what is known
         near = (second - first) <= step
         remaining = np.angle(turn * np.exp(-1j * rate * lever))[near]
         rate += float(np.sum((weight * lever)[near] * remaining) / np.sum((weight * lever**2)[near]))
@@ -96,6 +96,6 @@ def _clock_rate(
 
 def _pieces(rows: FloatArray, length: int) -> ComplexArray:
     """Spectra (2, PIECES, n) of equal pieces under a Hann window."""
-    folded = rows[:, : PIECES * length].reshape(2, PIECES, length)
+    folded = rows[:, : _PIECES * length].reshape(2, _PIECES, length)
     folded = folded - folded.mean(axis=2, keepdims=True)
     return np.asarray(np.fft.rfft(folded * np.hanning(length), axis=2))

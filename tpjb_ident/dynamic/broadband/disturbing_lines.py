@@ -14,11 +14,11 @@ from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples
 
 #: Highest harmonics of shaft and mains that are looked for.
-SHAFT_HARMONICS, MAINS_HARMONICS = 8, 5
+_SHAFT_HARMONICS, _MAINS_HARMONICS = 8, 5
 #: Highest power of time in a line's amplitude.
-CREEP = 3
+_CREEP = 3
 #: How far shaft (per harmonic) and mains may be from where they are expected [Hz].
-SHAFT_WANDER, MAINS_WANDER = 0.08, 0.15
+_SHAFT_WANDER, _MAINS_WANDER = 0.08, 0.15
 #: Bins next to a line that are left out, in whole-record bins.
 LEFT_OUT = 4.0
 #: The same of a period, in its own bins: lines between its bins are told from it by all its repeats.
@@ -39,12 +39,12 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
     reach = min(0.45 * samples.rate, 1.5 * top)
     candidates = []
     if speed > 0:
-        shaft = _shown(samples, speed, SHAFT_WANDER)
-        turns = SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
+        shaft = _shown(samples, speed, _SHAFT_WANDER)
+        turns = _SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
         candidates += [Disturbance(f"{k}X", k * shaft, k) for k in range(1, turns + 1) if k * shaft < reach]
     if mains > 0:
-        shaft = _shown(samples, mains, MAINS_WANDER)
-        names = ["mains", *(f"mains {k}" for k in range(2, MAINS_HARMONICS + 1))]
+        shaft = _shown(samples, mains, _MAINS_WANDER)
+        names = ["mains", *(f"mains {k}" for k in range(2, _MAINS_HARMONICS + 1))]
         candidates += [Disturbance(name, k * shaft) for k, name in enumerate(names, 1) if k * shaft < reach]
     resolved: list[Disturbance] = []
     for line in candidates:
@@ -98,7 +98,7 @@ def _columns(samples: Samples, lines: tuple[Disturbance, ...]) -> FloatArray:
     """Cosine and sine of every line times powers of time, (n_columns, n)."""
     n = samples.length
     t = np.arange(n) / samples.rate
-    legendre = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), CREEP).T
+    legendre = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), _CREEP).T
     rows = []
     for line in lines:
         angle = 2 * np.pi * line.frequency * t
@@ -119,6 +119,6 @@ def bins_taken(
     """Bins that a line may have spoiled, (n,)."""
     disturbed = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
-        wander = SHAFT_WANDER * line.order if line.order else MAINS_WANDER
+        wander = _SHAFT_WANDER * line.order if line.order else _MAINS_WANDER
         disturbed |= np.abs(frequencies - line.frequency) <= max(width / seconds, wander)
     return disturbed

@@ -37,11 +37,11 @@ from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun, named_run
 
 Progress = Callable[[str, int, int], None]
 #: Share of the lines that must be told from noise.
-LEAST_LINES = 0.5
+_LEAST_LINES = 0.5
 #: Condition number of the directions of motion from which errors are strongly amplified.
-ILL_CONDITIONED = 30.0
+_ILL_CONDITIONED = 30.0
 #: Coherence below which a band is doubted where no instrument speaks for it.
-LOW_COHERENCE = 0.9
+_LOW_COHERENCE = 0.9
 
 
 @dataclass(frozen=True)
@@ -230,10 +230,10 @@ def _band_conditions(
     if len(estimates) and np.median(conditions) > 1e6:
         text = "the runs move the shaft along one line; excite in two directions, or with two actuators at once"
         flags.append(Condition("fewer-than-two-directions", text))
-    elif len(lines) < LEAST_LINES * len(estimates):
+    elif len(lines) < _LEAST_LINES * len(estimates):
         text = f"{len(lines)} of {len(estimates)} lines stand {STRONG:g} times (F ratio) above the noise"
         flags.append(Condition("excitation-too-weak", text))
-    elif np.median(conditions) > ILL_CONDITIONED:
+    elif np.median(conditions) > _ILL_CONDITIONED:
         text = f"condition number {np.median(conditions):.0f} (median over the band)"
         flags.append(Condition("ill-conditioned", text))
     if spectra[0].disturbances:
@@ -246,7 +246,7 @@ def _band_conditions(
         low = float(np.median([line.coherence.min() for line in lines]))
         text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
         flags.append(Condition("no-instrument", text))
-        if low < LOW_COHERENCE:
+        if low < _LOW_COHERENCE:
             flags.append(Condition("low-coherence", f"{low:.2f}, median over the band"))
     if spectra[0].phasors.acceleration is None and spectra[0].phasors.housing_mass > 0:
         flags.append(Condition("inertia-not-corrected", "no accelerometers"))

@@ -19,9 +19,9 @@ from tpjb_ident.dynamic.broadband.local_regression import H_ORDER, local_fit, wi
 #: F ratio from which an excitation tells the displacements from their noise.
 STRONG = 10.0
 #: Coherence of the force with the displacements that a line needs where nothing else tells signal from noise.
-LEAST_COHERENCE = 0.5
+_LEAST_COHERENCE = 0.5
 #: Share of a channel's power that is taken for noise at least, so that exact data can be solved.
-ROUNDING = 1e-24
+_ROUNDING = 1e-24
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class LineEstimates:
         if not fit.found:
             return False
         if self.method == "hv":
-            return bool(np.nanmin(self.coherence) > LEAST_COHERENCE)
+            return bool(np.nanmin(self.coherence) > _LEAST_COHERENCE)
         return fit.strength > STRONG
 
     @property
@@ -127,7 +127,7 @@ def _through(z: ComplexArray, spreads: ComplexArray, counts: FloatArray) -> tupl
     if len(z) == 2:
         return np.asarray(np.linalg.solve(z[:, :2], z[:, 2:]).T, dtype=complex), z
     weight = (counts - 1) / (counts - 1).sum()
-    pooled = np.einsum("r,rab->ab", weight, spreads) + np.diag(ROUNDING + 1e-6 * np.mean(np.abs(spreads)) * np.ones(4))
+    pooled = np.einsum("r,rab->ab", weight, spreads) + np.diag(_ROUNDING + 1e-6 * np.mean(np.abs(spreads)) * np.ones(4))
     root = np.linalg.cholesky(pooled)
     # rows z^T: noise covariance of row vectors is the transpose
     white = np.linalg.solve(root, z.T).T * np.sqrt(counts)[:, None]

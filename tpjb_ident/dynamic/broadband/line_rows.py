@@ -16,11 +16,11 @@ from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.errors import BadInputError
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
-LINES, BINS = 60, 18
+_LINES, _BINS = 60, 18
 #: Bins of a line that must be left when those of shaft and mains are gone.
-LEAST_BINS = 12
+_LEAST_BINS = 12
 #: Lines that a band must give.
-LEAST_LINES = 3
+_LEAST_LINES = 3
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,17 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
         chosen = np.flatnonzero(free)
         return LinePlan(tuple(np.array([k]) for k in chosen), frequencies[chosen], 0.0)
     n = len(frequencies)
-    width = max(BINS, math.ceil(n / LINES))
+    width = max(_BINS, math.ceil(n / _LINES))
     count = n // width
-    if count < LEAST_LINES:
+    if count < _LEAST_LINES:
         have = 1 / (frequencies[1] - frequencies[0]) if n > 1 else 0.0
-        need = have * LEAST_LINES * BINS / max(n, 1)
+        need = have * _LEAST_LINES * _BINS / max(n, 1)
         raise BadInputError(
-            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {LEAST_LINES * BINS} are "
+            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
             f"needed; record {need:.3g} s or excite a wider band"
         )
     bins = [part[free[part]] for part in np.array_split(np.arange(n), count)]
-    bins = [part for part in bins if len(part) >= LEAST_BINS]
+    bins = [part for part in bins if len(part) >= _LEAST_BINS]
     middles = np.array([0.5 * (frequencies[b[0]] + frequencies[b[-1]]) for b in bins])
     return LinePlan(tuple(bins), middles, 0.5 * width * float(frequencies[1] - frequencies[0]))
 

@@ -19,7 +19,7 @@ from tpjb_ident.dynamic.broadband.line_rows import LineRows
 #: Highest power of frequency, of h over the bins of a line,
 H_ORDER = 2
 #: and of what the ends of the record leak into them: for K, C and M it is of the first already.
-ENDS_ORDER = 2
+_ENDS_ORDER = 2
 
 
 def local_fit(rows: LineRows, instrument: ComplexArray | None = None, order: int = H_ORDER) -> LineFit:
@@ -76,7 +76,7 @@ def ends_columns(rows: LineRows) -> ComplexArray:
     """Columns for the ends of every run's record, (n, n_runs (ENDS_ORDER + 1)); none where they are at rest."""
     if not rows.ends:
         return np.empty((len(rows.D), 0), dtype=complex)
-    powers = rows.place[:, None] ** np.arange(ENDS_ORDER + 1)
+    powers = rows.place[:, None] ** np.arange(_ENDS_ORDER + 1)
     return np.concatenate([np.where((rows.run == r)[:, None], powers, 0.0) for r in range(rows.n_runs)], axis=1) + 0j
 
 

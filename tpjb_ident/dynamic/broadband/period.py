@@ -15,16 +15,16 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
 #: Periods that a record must hold.
-MIN_PERIODS = 3
+_MIN_PERIODS = 3
 #: Share of the band's power that must repeat, beyond what chance repeats.
-REPEATS = 0.5
+_REPEATS = 0.5
 #: Phase [rad] by which the top of the band may run off over the record before it is resampled.
-MAX_SLIP = 0.01
+_MAX_SLIP = 0.01
 
 
 def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArray) -> float | None:
     """Period in samples of what excites the band, None where it does not repeat; `disturbed` (n // 2 + 1,)."""
-    least, most = int(2 * samples.rate / band[0]), samples.length // MIN_PERIODS
+    least, most = int(2 * samples.rate / band[0]), samples.length // _MIN_PERIODS
     best = _first_peak(_correlation(samples, band, disturbed), least // 2, most + 1)
     if best is None:
         return None
@@ -32,7 +32,7 @@ def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArra
     share = _repeating_share(samples, period, band, disturbed)
     count = int(samples.length // period)
     chance = 1.0 / max(count, 1)
-    if count < MIN_PERIODS or share < chance + REPEATS * (1 - chance):
+    if count < _MIN_PERIODS or share < chance + _REPEATS * (1 - chance):
         return None
     return period
 
@@ -117,7 +117,7 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     q = round(period)
     count = int((samples.length + 1e-6 * period) // period)
     slip = 2 * np.pi * top / samples.rate * abs(period - q) * count
-    if slip <= MAX_SLIP:
+    if slip <= _MAX_SLIP:
         count = samples.length // q
         return _each(samples, samples.rate, lambda rows: rows[..., : count * q])
     at = np.asarray(np.arange(count * q) * (period / q), dtype=float)

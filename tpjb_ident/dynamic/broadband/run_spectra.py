@@ -29,7 +29,7 @@ from tpjb_ident.dynamic.records.run_data import RunPhasors, oil_force
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
 
 #: Kinds that may repeat themselves; those that never do are not asked.
-MAY_REPEAT = ("multisine", "random", "sweep")
+_MAY_REPEAT = ("multisine", "random", "sweep")
 #: Kinds whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
@@ -134,7 +134,7 @@ def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
 
 
 def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> float | None:
-    if run.excitation_kind not in MAY_REPEAT:
+    if run.excitation_kind not in _MAY_REPEAT:
         return None
     frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
     period = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))

@@ -11,15 +11,15 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 
-QUANTITIES = ("displacement", "force", "acceleration")
+_QUANTITIES = ("displacement", "force", "acceleration")
 #: Share of a channel's samples that may be missing and bridged by straight lines,
-MAX_LOST = 0.01
+_MAX_LOST = 0.01
 #: and from which share on it is said.
-TOLD_LOST = 1e-4
+_TOLD_LOST = 1e-4
 #: Time stamps may stray this share of a sample from the even grid.
-MAX_JITTER = 0.05
+_MAX_JITTER = 0.05
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
-TAPS, KAISER = 24, 9.0
+_TAPS, _KAISER = 24, 9.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
     present = {c.quantity for c in run.channels.values()}
-    quantities = [q for q in QUANTITIES if q in present or q != "acceleration"]
+    quantities = [q for q in _QUANTITIES if q in present or q != "acceleration"]
     found = run.row_reader(quantities).read(0, n)
     if found.time is not None:
         _even(run, found.time, rate)
@@ -52,7 +52,7 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
         values[quantity], share = _bridged(run, quantity, rows)
         lost = max(lost, share)
     conditions = (
-        (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > TOLD_LOST else ()
+        (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > _TOLD_LOST else ()
     )
     return Samples(rate, values, _command(run, n), _angle(run, n, rate), conditions)
 
@@ -68,7 +68,7 @@ def _even(run: Run, time: FloatArray, rate: float) -> None:
     place = np.flatnonzero(finite)
     off = (time[finite] - time[finite][0]) * rate - (place - place[0])
     drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
-    if np.abs(off - drift).max() > MAX_JITTER:
+    if np.abs(off - drift).max() > _MAX_JITTER:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise _error(run, "time", text, "Resample the record, or export it without gaps")
 
@@ -79,7 +79,7 @@ def _bridged(run: Run, place: str, rows: FloatArray) -> tuple[FloatArray, float]
     if not missing.any():
         return rows, 0.0
     share = float(missing.mean(axis=1).max())
-    if share > MAX_LOST:
+    if share > _MAX_LOST:
         raise _error(run, place, f"{share:.1%} of its samples are missing", "Repeat the run")
     out = rows.copy()
     at = np.arange(rows.shape[1])
@@ -123,9 +123,9 @@ def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
     share = at - base
     out = np.zeros((len(rows), len(at)))
     last = rows.shape[1] - 1
-    norm = np.i0(KAISER)
-    for tap in range(-TAPS + 1, TAPS + 1):
+    norm = np.i0(_KAISER)
+    for tap in range(-_TAPS + 1, _TAPS + 1):
         distance = share - tap
-        window = np.i0(KAISER * np.sqrt(np.maximum(1 - (distance / TAPS) ** 2, 0.0))) / norm
+        window = np.i0(_KAISER * np.sqrt(np.maximum(1 - (distance / _TAPS) ** 2, 0.0))) / norm
         out += rows[:, np.clip(base + tap, 0, last)] * (np.sinc(distance) * window)
     return out

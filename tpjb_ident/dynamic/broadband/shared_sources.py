@@ -32,9 +32,9 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Probability of chance below which runs differ,
-DIFFERENT = 1e-3
+_DIFFERENT = 1e-3
 #: and the relative difference that is too much for one bearing.
-TOO_MUCH = 0.05
+_TOO_MUCH = 0.05
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     gain = np.sum([fit.apart.left for fit in fits], axis=0) / power
     noise = np.sum([fit.apart.variance for fit in fits], axis=0) / power**2
     spare = 2 * (n_runs - 2)
-    if not chdtrc(spare, float(np.sum(2 * np.abs(gain) ** 2 / noise))) < DIFFERENT:
+    if not chdtrc(spare, float(np.sum(2 * np.abs(gain) ** 2 / noise))) < _DIFFERENT:
         return RunScatter(0.0, draws)
     shown = _left_of_gains(fits)
     # of gains with variance s^2 the residuals show s^2 tr(A^T A); Satterthwaite's degrees of freedom of that sum
@@ -151,7 +151,7 @@ def run_scatter(fits: Sequence[LineFit], n: int) -> RunScatter:
     dof = float(np.trace(part) ** 2 / np.trace(part @ part))
     size = float(np.sqrt(np.sum(np.abs(gain) ** 2) / np.trace(part)))
     conditions: tuple[Condition, ...] = ()
-    if size > TOO_MUCH:
+    if size > _TOO_MUCH:
         conditions = (Condition("runs-disagree", f"runs differ by {100 * size:.1f} % in force over displacement"),)
     return RunScatter(size * float(stdtrit(dof, 0.975)) / 1.96, draws, conditions)
 

@@ -15,12 +15,12 @@ from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition
 
 #: Set points must differ by this share for a zero to be told from a gain.
-MIN_RANGE = 0.15
+_MIN_RANGE = 0.15
 #: Standard errors beyond which an intercept is one,
-CLEAR = 5.0
+_CLEAR = 5.0
 #: and share of the smallest load that it must have.
-NOTABLE = 0.004
-MIN_RUNS = 4
+_NOTABLE = 0.004
+_MIN_RUNS = 4
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
-    if len(y) < MIN_RUNS or (np.ptp(np.abs(x)) < MIN_RANGE * np.abs(x).max() and _one_direction(x)):
+    if len(y) < _MIN_RUNS or (np.ptp(np.abs(x)) < _MIN_RANGE * np.abs(x).max() and _one_direction(x)):
         return CellZero()
     size = np.abs(x)
     design = np.stack([x, np.ones_like(x)], axis=1) / size[:, None]
@@ -62,13 +62,13 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
     covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
     zero, error = complex(coefficients[1]), float(np.sqrt(covariance[1, 1]))
-    there = abs(zero) > CLEAR * error and abs(zero) > NOTABLE * size.min()
+    there = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
     allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
     return CellZero(zero, error) if there and allowed else CellZero()
 
 
 def _one_direction(set_points: ComplexArray) -> bool:
-    return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < MIN_RANGE)
+    return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < _MIN_RANGE)
 
 
 def cell_zero_uncertainty(campaign: Campaign) -> float:

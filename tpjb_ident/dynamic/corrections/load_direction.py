@@ -29,14 +29,14 @@ from tpjb_ident.dynamic.runs.point_data import PointData
 #: Plausible relative slope [1/rad] and its change per unit of ln W, one standard deviation.
 PLAUSIBLE = (1.5, 0.75)
 #: Equations beyond the parameters that a fit needs, for its residuals to say how far it holds.
-SPARE = 4
+_SPARE = 4
 #: Huber's constant, in standard deviations.
 HUBER = 1.345
 #: Mean square of normal residuals of unit variance, clipped there.
 CLIPPED_SQUARE = 0.7102
-ROUNDS = 20
+_ROUNDS = 20
 #: Relative residual below which nothing is told apart: keeps the algebra alive on exact data.
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _family(ratios: list[RunRatios]) -> Sequence[DirectionSensitivity | None]:
         return [None for _ in ratios]
     design, answer = (np.concatenate(part) for part in zip(*parts, strict=True))
     parameters = int(np.count_nonzero(np.abs(design).max(axis=0) > 1e-9 * np.abs(design).max(initial=0.0)))
-    if len(answer) < parameters + SPARE:  # with one load and few directions the runs do not tell
+    if len(answer) < parameters + _SPARE:  # with one load and few directions the runs do not tell
         return [None for _ in ratios]
     fits = [_ridge(design, answer[:, row]) for row in range(2)]
     return [_turn(r, b, fits) for r, b in zip(ratios, blocks, strict=True)]
@@ -141,12 +141,12 @@ def _ridge(design: FloatArray, answer: FloatArray) -> tuple[FloatArray, FloatArr
     """Robust ridge regression: parameters (8,) and their covariance (8, 8)."""
     prior = np.diag(1.0 / np.repeat(PLAUSIBLE, 4) ** 2)
     coefficients, covariance = np.zeros(design.shape[1]), np.linalg.inv(prior)
-    scale, spent = 1.4826 * float(np.median(np.abs(answer))) + ROUNDING, 0.0
-    for _ in range(ROUNDS):
+    scale, spent = 1.4826 * float(np.median(np.abs(answer))) + _ROUNDING, 0.0
+    for _ in range(_ROUNDS):
         residual = np.abs(answer - design @ coefficients)
         clipped = float(np.sum(np.minimum(residual, HUBER * scale) ** 2))
         # Huber's proposal 2; what the parameters have taken out of the residuals is put back
-        scale = math.sqrt(clipped / CLIPPED_SQUARE / max(len(answer) - spent, 1.0)) + ROUNDING
+        scale = math.sqrt(clipped / CLIPPED_SQUARE / max(len(answer) - spent, 1.0)) + _ROUNDING
         weight = np.minimum(1.0, HUBER * scale / np.maximum(residual, 1e-300)) / scale**2
         information = design.T @ (weight[:, None] * design)
         covariance = np.linalg.inv(information + prior)

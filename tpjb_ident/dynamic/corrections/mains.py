@@ -30,7 +30,7 @@ MIN_RUNS = 6
 #: How well the probes' phases must agree over the runs to count as one pattern.
 LOCKED = 0.95
 #: Along a pattern every run leaves one real equation, and H has four numbers there.
-MIN_DIRECTIONS = 4
+_MIN_DIRECTIONS = 4
 #: Degrees of freedom with which the scatter seen at the other points is believed.
 _PRIOR_DOF = 8.0
 
@@ -78,7 +78,7 @@ def fit_mains(data: PointData, pickup: Pickup, scatter: float) -> MainsFit | Non
         return None
     D, F = means
     spare = 4 * len(D) - 8 - len(pickup.patterns) * len(D)
-    if spare < 1 or len(D) < MIN_DIRECTIONS:
+    if spare < 1 or len(D) < _MIN_DIRECTIONS:
         return None
     problem = MainsEquations(D, F, pickup.patterns, scatter * np.linalg.norm(F, axis=1))
     minima = problem.solve()

@@ -32,9 +32,9 @@ MAX_MISS = 0.05
 #: The same for its direction [rad].
 MAX_SIDEWAYS = 0.05
 #: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
-CONTRADICTS = (0.7, 1.4)
+_CONTRADICTS = (0.7, 1.4)
 #: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
-CONTRADICTS_TURN = 0.5
+_CONTRADICTS_TURN = 0.5
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ def _common_conditions(common: complex) -> tuple[Condition, ...]:
     if size == 0.0:
         text = "the cells show no static force: whether the loads meet their set points is not known"
         return (Condition("no-static-force", text),)
-    if not CONTRADICTS[0] <= size <= CONTRADICTS[1]:
+    if not _CONTRADICTS[0] <= size <= _CONTRADICTS[1]:
         return (
             Condition(
                 "cells-contradict-set-points",
@@ -221,7 +221,7 @@ def _common_conditions(common: complex) -> tuple[Condition, ...]:
             ),
         )
     aside = f"the static load by the cells points {np.degrees(turn):+.1f} deg away from its set direction in all runs"
-    if abs(turn) > CONTRADICTS_TURN:
+    if abs(turn) > _CONTRADICTS_TURN:
         return (Condition("cells-contradict-set-points", f"{aside}: a cell is inverted, or the cells are exchanged"),)
     conditions = []
     if abs(turn) > MAX_SIDEWAYS:

@@ -28,16 +28,16 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
 from tpjb_ident.dynamic.records.line_means import complex_median
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
-MIN_SPARE_REPEATS = 8.0
+_MIN_SPARE_REPEATS = 8.0
 #: |sum| over sum of moduli of a direction's windows below which its phase counts as wandering.
 LOCKED = 0.9
 #: A direction with less than this share of its windows accepted counts as rejected.
-REJECTED = 0.2
+_REJECTED = 0.2
 #: Share of its windows that must agree with one another for it to be a candidate.
-AGREEING = 0.6
+_AGREEING = 0.6
 #: How improbable its distance must be for the rejection to stand.
-SIGNIFICANCE = 1e-4
-MIN_OTHERS = 4
+_SIGNIFICANCE = 1e-4
+_MIN_OTHERS = 4
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _pooled(
     count = one_hot.sum(axis=1)
     mean = one_hot @ z / np.maximum(count, 1e-12)[:, None]
     spare = float(np.maximum(count - 1, 0.0).sum())
-    if spare < MIN_SPARE_REPEATS or (count > 0.5).sum() < 2:
+    if spare < _MIN_SPARE_REPEATS or (count > 0.5).sum() < 2:
         return None
     deviation = z - mean[table.direction]
     noise = (weights[:, None] * deviation).T @ deviation.conj() / (spare * shrinkage)
@@ -226,17 +226,17 @@ def windows_used_again(table: PhasorTable, weights: FloatArray) -> FloatArray:
     """
     size = np.bincount(table.direction, minlength=table.n_directions)
     share = np.bincount(table.direction, weights=weights > 0.2, minlength=table.n_directions) / size
-    doubtful = np.flatnonzero((share < REJECTED) & (size >= 3))
+    doubtful = np.flatnonzero((share < _REJECTED) & (size >= 3))
     if not len(doubtful):
         return weights
     remaining = repeats(table, np.where(np.isin(table.direction, doubtful), 0.0, weights))
     if remaining is None:
         return weights
-    few = len(remaining.means) < MIN_OTHERS
+    few = len(remaining.means) < _MIN_OTHERS
     result = weights.copy()
     for direction in doubtful:
         core = _agreeing(table, int(direction), remaining)
-        if core.sum() >= AGREEING * size[direction] and (few or _explained(table, core, remaining)):
+        if core.sum() >= _AGREEING * size[direction] and (few or _explained(table, core, remaining)):
             result[core] = 1.0
     return result
 
@@ -261,4 +261,4 @@ def _explained(table: PhasorTable, core: BoolArray, remaining: Repeats) -> bool:
     spread = 2.0 * max(fit.chi_square, 1.0) * noise / count
     distance = float((residual.conj() @ np.linalg.solve(spread, residual)).real) / 2.0
     spare = 4.0 * (len(remaining.means) - 2)
-    return distance <= float(fdtri(4, spare, 1.0 - SIGNIFICANCE))
+    return distance <= float(fdtri(4, spare, 1.0 - _SIGNIFICANCE))

@@ -21,9 +21,9 @@ from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeat
 from tpjb_ident.errors import ArgumentError
 
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
-MAX_CONDITION = 30.0
+_MAX_CONDITION = 30.0
 #: Share of windows without weight beyond which the answer needs a look.
-MAX_REJECTED = 0.4
+_MAX_REJECTED = 0.4
 #: A window counts as rejected below this weight.
 REJECTED_WEIGHT = 0.3
 MIN_COHERENCE = 0.9
@@ -202,10 +202,10 @@ def _iv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
     return _result(table, omega, name, numbers, fit.weights, fit.conditions)
 
 
-Numbers = tuple[ComplexArray, FloatArray, FloatArray, float]
+_Numbers = tuple[ComplexArray, FloatArray, FloatArray, float]
 
 
-def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float) -> Numbers:
+def _regression(table: PhasorTable, h: ComplexArray, weights: FloatArray, correction: float) -> _Numbers:
     """Covariance of a weighted regression: from the repeats where there are any, else from residuals."""
     repeated = with_repeats(table, h, weights, correction)
     if repeated is not None:
@@ -218,7 +218,7 @@ def _result(
     table: PhasorTable,
     omega: float,
     name: str,
-    numbers: Numbers,
+    numbers: _Numbers,
     weights: FloatArray,
     conditions: tuple[Condition, ...],
 ) -> DynamicStiffness:
@@ -247,7 +247,7 @@ def _result(
 
 
 def _ill_conditioned(condition: float) -> Condition | None:
-    if condition <= MAX_CONDITION:
+    if condition <= _MAX_CONDITION:
         return None
     return Condition("ill-conditioned", f"condition number {condition:.3g} of the displacement directions > 30")
 
@@ -262,7 +262,7 @@ def _no_spare(directions: int) -> Condition | None:
 
 def _many_rejected(weights: FloatArray) -> Condition | None:
     share = float((weights < REJECTED_WEIGHT).mean())
-    if share <= MAX_REJECTED:
+    if share <= _MAX_REJECTED:
         return None
     return Condition("many-windows-rejected", f"{100 * share:.0f} % of the windows got no weight (limit 40 %)")
 

@@ -19,7 +19,7 @@ STARTS = 60
 _KEPT = 4
 _STEPS = 12
 #: Share of the mean power of all components that each has at least in the metric.
-METRIC_FLOOR = 0.01
+_METRIC_FLOOR = 0.01
 #: Share of the windows in the smaller core that is looked for besides the half.
 _SMALL_CORE = 0.38
 
@@ -40,7 +40,7 @@ class Regression:
         #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
         #: A little of every component keeps it regular where some follow from the others exactly.
         self.metric = scatter(products(self._y), np.ones(self.n), self.q)
-        self.metric += METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
+        self.metric += _METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
     def fit(self, weights: FloatArray) -> ComplexArray:
         """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""

@@ -20,7 +20,7 @@ from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, e
 from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant
 
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
-MIN_WINDOWS = 8
+_MIN_WINDOWS = 8
 #: The start looks at no more windows than this: as many tell what the majority is, and its memory grows with them.
 MANY_WINDOWS = 640
 _MAX_ITERATIONS = 200
@@ -40,7 +40,7 @@ class RobustFit:
 def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:
     """Robust multivariate complex regression of Y on X; `X` (n, 2), `Y` (n, q), `direction` (n,)."""
     n, q = len(Y), Y.shape[1]
-    if n < max(MIN_WINDOWS, 2 * (q + 1) + 2):
+    if n < max(_MIN_WINDOWS, 2 * (q + 1) + 2):
         return _least_squares_only(X, Y)
     regression = Regression(X, Y)
     subset = evenly_chosen(direction, MANY_WINDOWS)

@@ -39,11 +39,11 @@ NORMS = {
     "least-squares": "LeastSquares",
 }
 #: Thresholds in scales, statsmodels' own.
-HUBER, TUKEY = 1.345, 4.685
+_HUBER, _TUKEY = 1.345, 4.685
 #: Median of the absolute value of a standard normal variable.
-NORMAL_MAD = 0.6744897501960817
+_NORMAL_MAD = 0.6744897501960817
 #: Weight psi(z) / z, psi(z) and its derivative of residuals z over their scale.
-NormValues = tuple[FloatArray, FloatArray, FloatArray]
+_NormValues = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
 
 
 def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
-    if settings.norm in QUICK_NORMS and settings.scale == "mad" and not settings.library:
+    if settings.norm in _QUICK_NORMS and settings.scale == "mad" and not settings.library:
         return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
     from statsmodels.robust.robust_linear_model import RLM
 
@@ -170,7 +170,7 @@ def robust_fit(
 
     `design` (m, p), `response` (m,).
     """
-    norm_of = QUICK_NORMS[norm]
+    norm_of = _QUICK_NORMS[norm]
     inverse = np.linalg.pinv(design)
     params, weights = inverse.dot(response), np.ones(len(response))
     residual = response - design.dot(params)
@@ -191,10 +191,10 @@ def robust_fit(
 
 
 def _mad(residual: FloatArray) -> float:
-    return float(np.median(np.abs(residual) / NORMAL_MAD))
+    return float(np.median(np.abs(residual) / _NORMAL_MAD))
 
 
-def _variance_factor(norm: NormValues, scale: float, rank: int) -> float:
+def _variance_factor(norm: _NormValues, scale: float, rank: int) -> float:
     """Variance of a coefficient over that of the plain design: H1 of Huber 1973 with the small-sample factor k."""
     _, psi, slope = norm
     n = len(slope)
@@ -204,15 +204,15 @@ def _variance_factor(norm: NormValues, scale: float, rank: int) -> float:
     return float(k**2 * square / ((1 / n * np.sum(slope)) ** 2))
 
 
-def _huber(z: FloatArray) -> NormValues:
+def _huber(z: FloatArray) -> _NormValues:
     size = np.abs(z)
-    return HUBER / np.maximum(size, HUBER), np.clip(z, -HUBER, HUBER), (size <= HUBER).astype(float)
+    return _HUBER / np.maximum(size, _HUBER), np.clip(z, -_HUBER, _HUBER), (size <= _HUBER).astype(float)
 
 
-def _tukey(z: FloatArray) -> NormValues:
-    inside = np.abs(z) <= TUKEY
-    root = inside * (1 - (z / TUKEY) ** 2)
-    return root**2, z * root**2, root**2 - (4 * z**2 / TUKEY**2) * root
+def _tukey(z: FloatArray) -> _NormValues:
+    inside = np.abs(z) <= _TUKEY
+    root = inside * (1 - (z / _TUKEY) ** 2)
+    return root**2, z * root**2, root**2 - (4 * z**2 / _TUKEY**2) * root
 
 
-QUICK_NORMS: dict[str, Callable[[FloatArray], NormValues]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}
+_QUICK_NORMS: dict[str, Callable[[FloatArray], _NormValues]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}

@@ -17,9 +17,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
 
 #: Up to so many directions their effects are pooled over directions and axes: a jackknife of three or four is none.
-FEW_DIRECTIONS = 5
+_FEW_DIRECTIONS = 5
 #: Degrees of freedom per spare direction of the pooled variance: effects are real gains as a rule, not circular noise.
-POOLED_DOF = 3.0
+_POOLED_DOF = 3.0
 #: Significance from which direction effects take part in weighting the directions.
 CLEAR = 1e-3
 
@@ -115,11 +115,11 @@ def spread_of(
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
     jackknife = (g - 1) / g * moved.T @ moved
-    if pooled is not None and g <= FEW_DIRECTIONS:
+    if pooled is not None and g <= _FEW_DIRECTIONS:
         # an effect that strikes one entry alone shows in the jackknife, and is spread over all in the pooled variance
         stretch = np.sqrt(np.maximum(np.diag(jackknife) / np.diag(pooled), 1.0))
         total = repeat_noise + certain * pooled * np.outer(stretch, stretch)
-        between = np.full(8, POOLED_DOF * (g - 2))
+        between = np.full(8, _POOLED_DOF * (g - 2))
         return total, mixed_dof(np.diag(total), np.diag(repeat_noise), dof_repeat, between)
     # Beyond repeat noise, in coordinates where that is the unit matrix; never negative.
     root = np.linalg.cholesky(repeat_noise)

@@ -19,10 +19,10 @@ SIGNIFICANCE = 0.01
 NOTABLE = 0.01
 #: G is expected to be below this many times what the second harmonic lets expect, one standard deviation:
 #: loose, as the runs themselves tell better.
-LOOSE = 2.0
-ROUNDS = 5
+_LOOSE = 2.0
+_ROUNDS = 5
 #: Windows this many times farther from the middle of their run than half of them are left out.
-FAR = 4.0
+_FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def zero_amplitude(data: PointData, h: ComplexArray, expected: float) -> ZeroAmp
     square = np.einsum("ra,ra->r", D, D.conj()).real
     square = square / square.mean()
     size = float(np.linalg.norm(h)) / np.sqrt(2)
-    prior = LOOSE * max(expected, abs(slope.stiffening) if slope.significant else 0.0) * size
+    prior = _LOOSE * max(expected, abs(slope.stiffening) if slope.significant else 0.0) * size
     fits = [_row(D, F[:, row], square, noise[:, row], prior) for row in range(2)]
     change = np.array([found[2:] for found, _ in fits])
     remaining = np.zeros((8, 8))
@@ -147,7 +147,7 @@ def _beside_repeats(data: PointData) -> FloatArray:
         if len(places):
             turned = _one_phase(data.D[places], data.F[places])
             off = np.max([np.abs(z - complex_median(z)).max(axis=1) / np.abs(z).max() for z in turned], axis=0)
-            good[places] = off <= FAR * np.median(off)
+            good[places] = off <= _FAR * np.median(off)
     return good
 
 
@@ -184,7 +184,7 @@ def _row(
     force = np.abs(F) ** 2 + np.mean(np.abs(F) ** 2)
     loose = np.diag([0.0, 0.0, 1 / prior**2, 1 / prior**2])
     share = 1e-6
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         variance = noise**2 + share * force
         root = 1 / np.sqrt(variance)[:, None]
         gram = (design * root).conj().T @ (design * root)

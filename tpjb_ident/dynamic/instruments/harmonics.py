@@ -23,23 +23,23 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.records.line_means import LineMean
 
 #: Change of h per squared second harmonic.
-CHANGE = 4.5
+_CHANGE = 4.5
 #: From so many runs on the harmonic is held against the squares of the motion,
-MIN_RUNS = 5
+_MIN_RUNS = 5
 #: and what goes with them is beyond doubt where it is this many times what does not, per degree of freedom.
-DISTINCT = 6.0
+_DISTINCT = 6.0
 #: A linear film's harmonics count as a little bent in one of so many points.
-CHANCE = 0.2
+_CHANCE = 0.2
 #: Changes below this share are not worth telling [share of h].
-NOTHING = 2e-4
+_NOTHING = 2e-4
 #: From here on no interval can be answered for.
-REFUSED = 0.05
+_REFUSED = 0.05
 #: Share of the clearance from which a motion may be too large for a linear film, if the harmonics do not tell,
 MAX_AMPLITUDE = 0.05
 #: and from which none is linear: where it looks so, the motion is not what the probes say.
 NEVER_LINEAR = 0.3
 #: A change is known to be no larger than the figure above; as a standard deviation it is this part of it.
-AS_DEVIATION = 1 / 1.6
+_AS_DEVIATION = 1 / 1.6
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,15 @@ def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStif
     doubled = est.h.real + 2j * est.h.imag
     usable = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
     alone = [pair for pair in usable if not pair[1].shared]
-    if len(usable) >= MIN_RUNS:
+    if len(usable) >= _MIN_RUNS:
         share, unseen = _quadratic_share(usable, doubled)
-        change, hidden = CHANGE * share, CHANGE * unseen
+        change, hidden = _CHANGE * share, _CHANGE * unseen
     else:
         shares = [_share(first, second, doubled) for first, second in alone]
-        change = CHANGE * float(np.median(shares)) if shares else 0.0
+        change = _CHANGE * float(np.median(shares)) if shares else 0.0
         noise = [_noise(second, doubled) / float(np.linalg.norm(first.force)) for first, second in alone]
-        hidden = CHANGE * (2 * float(np.median(noise))) ** 2 if noise else np.inf
-    return FilmChange(change if change > NOTHING else 0.0, hidden)
+        hidden = _CHANGE * (2 * float(np.median(noise))) ** 2 if noise else np.inf
+    return FilmChange(change if change > _NOTHING else 0.0, hidden)
 
 
 def _noise(second: LineMean, doubled: ComplexArray) -> float:
@@ -92,15 +92,15 @@ def _quadratic_share(usable: Sequence[tuple[LineMean, LineMean]], doubled: Compl
     fitted = squares @ np.linalg.lstsq(squares, bent, rcond=None)[0]
     explained = float(np.sum(np.abs(fitted) ** 2)) / 3
     remaining = float(np.sum(np.abs(bent - fitted) ** 2)) / (len(usable) - 3)
-    unseen = 3 * (DISTINCT - 1) * remaining / len(usable)
+    unseen = 3 * (_DISTINCT - 1) * remaining / len(usable)
     # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
-    chance = remaining * float(fdtri(6, 2 * (len(usable) - 3), 1.0 - CHANCE))
+    chance = remaining * float(fdtri(6, 2 * (len(usable) - 3), 1.0 - _CHANCE))
     return max(3 * (explained - chance) / len(usable), 0.0), unseen
 
 
 def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
     """Covariance (8, 8) of H when its entries may be off by a common share."""
-    shift = AS_DEVIATION * change * np.abs(est.vector)
+    shift = _AS_DEVIATION * change * np.abs(est.vector)
     return np.diag(shift**2)
 
 
@@ -111,9 +111,9 @@ def change_conditions(
 
     A large motion alone is no fault where the harmonics show that the film answers it as a linear one.
     """
-    if uncertain > REFUSED:
+    if uncertain > _REFUSED:
         text = (
-            f"the film answers at twice the excitation frequency with {100 * np.sqrt(change.share / CHANGE):.0f} % of"
+            f"the film answers at twice the excitation frequency with {100 * np.sqrt(change.share / _CHANGE):.0f} % of"
         )
         return (
             Condition(

@@ -20,25 +20,25 @@ from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Phase between cells and accelerometers [rad] beyond which one of them is late; housings on bolted joints have 0.01.
-MAX_PHASE = 0.04
+_MAX_PHASE = 0.04
 #: Asymmetry, and cross over direct, beyond which channels are exchanged.
-MAX_CROSS = 0.5
+_MAX_CROSS = 0.5
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
 HARMLESS = 2e-3
 #: The ratio must stand this many standard errors above nothing to be judged.
-CLEAR = 8.0
+_CLEAR = 8.0
 #: A lag of the cells counts from so many standard errors on.
-CLEAR_LAG = 2.0
+_CLEAR_LAG = 2.0
 #: Smaller singular value of the directions of force, of six runs or less, below which they are one.
-ONE_LINE = 0.3
-MIN_RUNS = 3
+_ONE_LINE = 0.3
+_MIN_RUNS = 3
 #: No housing stands on springs as stiff as this [N/m]: a steel bar of 1 m^2 and 2 m has it. One that seems to does not
 #: move for its accelerometers, which are dead.
-STIFFEST = 1e11
+_STIFFEST = 1e11
 #: Springs that a housing is taken to stand on [N/m] where its accelerometers cannot tell: those of soft cells.
 SOFT = 3e8
 #: Windows this many times farther from the middle of their run than half of them are left out.
-FAR = 4.0
+_FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _one_phase(z: ComplexArray, d: ComplexArray) -> ComplexArray:
 def _ordinary(z: ComplexArray) -> BoolArray:
     """Windows that are not far from the middle of them all."""
     off = np.linalg.norm(z - complex_median(z), axis=1)
-    return np.asarray(off <= FAR * np.median(off))
+    return np.asarray(off <= _FAR * np.median(off))
 
 
 def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
@@ -105,7 +105,7 @@ def balances(runs: Sequence[BalanceRun]) -> dict[float, Balance]:
     groups: dict[float, list[BalanceRun]] = {}
     for run in runs:
         groups.setdefault(frequency_key(run.frequency), []).append(run)
-    table = {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= MIN_RUNS}
+    table = {frequency: _judge(group) for frequency, group in groups.items() if len(group) >= _MIN_RUNS}
     lag = _shared_lag([(2 * np.pi * f, verdict) for f, verdict in table.items()])
     return {f: replace(verdict, phase=2 * np.pi * f * lag) for f, verdict in table.items()}
 
@@ -119,7 +119,7 @@ def _shared_lag(verdicts: Sequence[tuple[float, Balance]]) -> float:
     weight = 1 / np.maximum(errors, 1e-12) ** 2
     lag, error = float(np.sum(weight * lags) / weight.sum()), float(1 / np.sqrt(weight.sum()))
     # cells that come late make it positive; what damping the housing's supports have makes it negative
-    return lag if lag > CLEAR_LAG * error else 0.0
+    return lag if lag > _CLEAR_LAG * error else 0.0
 
 
 def frequency_key(frequency: float) -> float:
@@ -131,7 +131,7 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     cells = np.array([run.cells for run in group])
     accelerations = np.array([run.acceleration for run in group])
     size = np.linalg.norm(cells, axis=1, keepdims=True)
-    if np.linalg.svd(cells / size, compute_uv=False)[-1] < ONE_LINE * max(1.0, np.sqrt(len(cells) / 6)):
+    if np.linalg.svd(cells / size, compute_uv=False)[-1] < _ONE_LINE * max(1.0, np.sqrt(len(cells) / 6)):
         return Balance()
     # the accelerometers' noise is the same in all runs: a run counts by its force and its windows
     usual = float(np.median([run.variance for run in group]))
@@ -140,20 +140,20 @@ def _judge(group: Sequence[BalanceRun]) -> Balance:
     if fit is None:
         return Balance()
     G, error = fit
-    if not np.abs(np.diag(G)).min() > CLEAR * error:
-        if np.abs(G).max() > CLEAR * error and np.abs(G - np.diag(np.diag(G))).max() > MAX_CROSS * np.abs(G).max():
+    if not np.abs(np.diag(G)).min() > _CLEAR * error:
+        if np.abs(G).max() > _CLEAR * error and np.abs(G - np.diag(np.diag(G))).max() > _MAX_CROSS * np.abs(G).max():
             return Balance(0.0, _contradiction(group, G, "each answers the force along the other's axis"))
         return Balance(0.0, _silence(group, G, error))
     direct = np.diag(G)
     cross = float(np.sqrt(abs(G[0, 1] * G[1, 0]) / abs(direct[0] * direct[1])))
-    if cross > MAX_CROSS:
+    if cross > _MAX_CROSS:
         return Balance(0.0, _contradiction(group, G, "each answers the force along the other's axis"))
     if (direct.real > 0).any():
         return Balance(0.0, _contradiction(group, G, "they move with the cells' force, and not against it"))
     phases = np.angle(-direct)
     doubt = error / np.abs(direct)
     worst = int(np.argmax(np.abs(phases) - 3 * doubt))
-    if abs(phases[worst]) > MAX_PHASE + 3 * doubt[worst]:
+    if abs(phases[worst]) > _MAX_PHASE + 3 * doubt[worst]:
         return Balance(0.0, (_out_of_phase(group, float(phases[worst])),))
     weight = 1 / np.maximum(doubt, 1e-12) ** 2
     return Balance(float(np.sum(weight * phases) / weight.sum()), (), float(1 / np.sqrt(weight.sum())))
@@ -194,8 +194,8 @@ def _contradiction(group: Sequence[BalanceRun], G: ComplexArray, what: str) -> t
 def _silence(group: Sequence[BalanceRun], G: ComplexArray, error: float) -> tuple[Condition, ...]:
     """Accelerometers that show nothing of a force that must move the housing."""
     omega = 2 * np.pi * group[0].frequency
-    stiffness = omega**2 / (np.abs(np.diag(G)) + CLEAR * error)
-    silent = [axis for axis, k in zip("XY", stiffness, strict=True) if k > STIFFEST]
+    stiffness = omega**2 / (np.abs(np.diag(G)) + _CLEAR * error)
+    silent = [axis for axis, k in zip("XY", stiffness, strict=True) if k > _STIFFEST]
     if not silent:
         return ()
     share = group[0].mass * omega**2 / SOFT

@@ -21,19 +21,19 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 
 #: Samples that are looked at.
-RHYTHM_LOOK = 2**13
+_RHYTHM_LOOK = 2**13
 #: Share of the samples that must be straight (or flat), at least.
-STRAIGHT = 0.15
+_STRAIGHT = 0.15
 #: A bend is none below this share of the usual one.
-NO_BEND = 0.01
+_NO_BEND = 0.01
 #: How much of the bends must come in one rhythm, of what a strict one has,
-RHYTHM = 0.8
+_RHYTHM = 0.8
 #: and how far their number may be off.
-COUNT_OFF = 0.25
+_COUNT_OFF = 0.25
 #: Samples from the start that are looked at.
-LOOK = 2**14
+_LOOK = 2**14
 #: A channel with more of its samples at a limit than this is of no use.
-CLIPPED = 0.05
+_CLIPPED = 0.05
 
 
 @dataclass(frozen=True)
@@ -106,13 +106,13 @@ def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | 
     (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as
     a filter is. What gives such a channel away is that its bends (or steps) come in a strict rhythm.
     """
-    values = readings[:RHYTHM_LOOK]
+    values = readings[:_RHYTHM_LOOK]
     if len(values) < 200 or not np.isfinite(values).all():
         return None
     for held, changes in ((True, np.abs(np.diff(values))), (False, np.abs(np.diff(values, 2)))):
         usual = 2 * float(changes.mean())
-        bent = changes > NO_BEND * usual
-        if not usual > 0 or bent.mean() > 1 - STRAIGHT:
+        bent = changes > _NO_BEND * usual
+        if not usual > 0 or bent.mean() > 1 - _STRAIGHT:
             continue
         rate = _rhythm(bent.astype(float), export_rate, held)
         if rate is not None:
@@ -138,8 +138,8 @@ def _rhythm(bent: FloatArray, export_rate: float, held: bool) -> float | None:
     # a corner between two samples of the export bends the line at both
     each = 1 if held or bent.mean() < 1.5 / ratio else 2
     expected = each / ratio
-    strict = abs(bent.mean() / expected - 1) < COUNT_OFF and spectrum[peak] > RHYTHM * np.sinc(expected) * bent.sum()
-    return _sharpened(bent, peak * step, export_rate) if strict and expected < 1 - STRAIGHT else None
+    strict = abs(bent.mean() / expected - 1) < _COUNT_OFF and spectrum[peak] > _RHYTHM * np.sinc(expected) * bent.sum()
+    return _sharpened(bent, peak * step, export_rate) if strict and expected < 1 - _STRAIGHT else None
 
 
 def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
@@ -163,7 +163,7 @@ def inspect_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[
     if not isinstance(run, Run):
         return {}, ()
     names = [c.name for c in run.channels.values() if c.quantity in VECTOR_QUANTITIES and c.axis is not None]
-    readings = run.reader.read(names, 0, min(run.length, LOOK))
+    readings = run.reader.read(names, 0, min(run.length, _LOOK))
     slower: dict[str, SlowerChannel] = {}
     clipped: list[Problem] = []
     rate = run.sample_rate
@@ -185,7 +185,7 @@ def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:
     statistics = ChannelStatistics()
     statistics.add(values)
     share = 0.0 if statistics.constant else statistics.clipped_share()
-    if share <= CLIPPED:
+    if share <= _CLIPPED:
         return []
     unit = run.channels[name].unit
     text = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"

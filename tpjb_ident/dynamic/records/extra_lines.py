@@ -16,21 +16,21 @@ from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
 from tpjb_ident.dynamic.records.windows import line_design
 
 #: Samples that are looked at.
-LOOK = 2**15
+_LOOK = 2**15
 #: A line stands this many times above the noise floor around it,
-PROMINENCE = 15.0
+_PROMINENCE = 15.0
 #: has at least this share of the excitation's amplitude (less cannot bend its phasor),
 MIN_SHARE = 2e-3
 #: and lies below this many times the highest excitation frequency.
 REACH = 4.0
 MAX_LINES = 10
 #: Bins of the Hann window's main lobe about a known line that tell nothing.
-LOBE = 4.0
+_LOBE = 4.0
 
 
 def unexpected_lines(run: MeasuredRun, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
     """Frequencies of lines beside the known ones [Hz], and what to say about them."""
-    n = min(run.length, LOOK)
+    n = min(run.length, _LOOK)
     known = result.lines.frequencies
     frequencies: list[float] = []
     lines = None
@@ -83,10 +83,10 @@ class _KnownLines:
         frequency = np.fft.rfftfreq(n, 1 / self.rate)
         floor = median_filter(amplitude, size=min(61, max(n // 20, 3)), mode="nearest")
         step = self.rate / n
-        candidate = amplitude > np.maximum(PROMINENCE * floor, smallest)
-        candidate[frequency < LOBE * step] = False
+        candidate = amplitude > np.maximum(_PROMINENCE * floor, smallest)
+        candidate[frequency < _LOBE * step] = False
         for f in self.frequencies:
-            candidate[np.abs(frequency - f) < LOBE * step] = False
+            candidate[np.abs(frequency - f) < _LOBE * step] = False
         candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
         candidate[[0, -1]] = False
         return [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]

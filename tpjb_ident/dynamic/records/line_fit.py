@@ -19,9 +19,9 @@ SCALE_LIMIT = 1.5
 #: Samples left out on either side of a glitch.
 GLITCH_MARGIN = 3
 #: A window that has lost more than this share of its samples gives no phasor.
-MAX_LOST = 0.5
+_MAX_LOST = 0.5
 #: Change of a residual over the usual one at which least absolute deviations have settled.
-SETTLED = 0.02
+_SETTLED = 0.02
 _LAD_ROUNDS = 15
 _ROUNDS = 12
 
@@ -55,7 +55,7 @@ def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArr
     present = np.asarray(np.isfinite(values).all(axis=1))
     q = values.shape[1]
     nothing = np.full((q, design.shape[1]), np.nan), np.full(q, np.nan), np.zeros(len(values), dtype=bool)
-    if present.mean() < 1 - MAX_LOST or present.sum() <= 2 * design.shape[1]:
+    if present.mean() < 1 - _MAX_LOST or present.sum() <= 2 * design.shape[1]:
         return RobustLines(*nothing, float(1 - present.mean()))
     full, y = design[present], values[present]
     u, scale = _verdicts(full, y, usual)
@@ -66,7 +66,7 @@ def fit_without_glitches(design: FloatArray, values: FloatArray, usual: FloatArr
     used = np.array(present)
     used[beside(bad)] = False
     lost = float(1 - used.mean())
-    if lost > MAX_LOST:
+    if lost > _MAX_LOST:
         return RobustLines(*nothing, lost)
     return RobustLines(_least_squares(design[used], values[used]).T, scale, used, lost)
 
@@ -76,7 +76,7 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: FloatArray) -> tuple[Float
     weights, size = np.ones(len(y)), np.full_like(y, np.inf)
     for _ in range(_LAD_ROUNDS):
         previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
-        if (np.abs(size - previous).max(axis=0) <= SETTLED * np.median(size, axis=0)).all():
+        if (np.abs(size - previous).max(axis=0) <= _SETTLED * np.median(size, axis=0)).all():
             break  # nothing moves any more that could make a verdict
         relative = (size / np.maximum(np.median(size, axis=0), np.finfo(float).tiny)).max(axis=1)
         weights = 1 / np.maximum(relative, 0.1)
@@ -86,9 +86,9 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: FloatArray) -> tuple[Float
         scale = np.minimum(1.4826 * np.median(size, axis=0), SCALE_LIMIT * usual)
         u = (size / np.maximum(scale, np.finfo(float).tiny)).max(axis=1) / GLITCH_LIMIT
         previous, weights = weights, np.maximum(1 - u**2, 0.0) ** 2
-        if weights.mean() < 1 - MAX_LOST or np.abs(weights - previous).max() < 1e-3:
+        if weights.mean() < 1 - _MAX_LOST or np.abs(weights - previous).max() < 1e-3:
             break
-    return (None if weights.mean() < 1 - MAX_LOST else u), scale
+    return (None if weights.mean() < 1 - _MAX_LOST else u), scale
 
 
 def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 
 #: How far the mains and the shaft's speed may be from what is stated [Hz].
-MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
+_MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
 NAMED_HARMONICS = 3
 
@@ -103,7 +103,7 @@ def _candidates(driven: tuple[Line, ...], speed: float, settings: LineSettings) 
         Line(f"harmonic {n}", n * e.frequency, 1e-6) for e in driven for n in range(2, settings.drive_harmonics + 1)
     ]
     mains = [
-        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT)
+        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, _MAINS_DRIFT)
         for n in range(1, settings.mains_harmonics + 1)
         if settings.mains > 0
     ]

@@ -17,13 +17,13 @@ from rigdata.problem import RigDataError
 from rigdata.run import Run
 
 #: Excitations this near to one of them make the question matter [Hz].
-NEAR = 0.3
+_NEAR = 0.3
 #: Runs and samples that are looked at.
-MAX_RUNS, LOOK = 6, 2**14
+_MAX_RUNS, _LOOK = 6, 2**14
 #: A line stands this many times above what is around it,
-CLEAR = 6.0
+_CLEAR = 6.0
 #: other lines are farther away than this [Hz].
-APART = 1.0
+_APART = 1.0
 
 
 def mains_frequency(campaign: Campaign, usual: float) -> float:
@@ -32,7 +32,7 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
     if nominal is not None:
         return float(nominal)
     dynamic = campaign.of_kind("dynamic")
-    coincident = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < NEAR for run in dynamic)]
+    coincident = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < _NEAR for run in dynamic)]
     if not coincident or usual not in MAINS_FREQUENCIES:
         return usual
     votes = {c: _votes(campaign.runs, c) for c in MAINS_FREQUENCIES}
@@ -46,11 +46,11 @@ def _votes(runs: Sequence[Run], choice: float) -> int:
     """In how many runs a line stands at `choice` where nothing else does."""
     count = visible = 0
     for run in runs:
-        if visible >= MAX_RUNS:
+        if visible >= _MAX_RUNS:
             break
         point = run.point
         others = [k * point.excitation_hz for k in (1, 2, 3)] + [k * point.shaft_speed_hz for k in range(1, 7)]
-        if any(abs(f - choice) < APART for f in others):
+        if any(abs(f - choice) < _APART for f in others):
             continue
         shown = _stands_out(run, choice)
         if shown is not None:
@@ -61,7 +61,7 @@ def _votes(runs: Sequence[Run], choice: float) -> int:
 
 def _stands_out(run: Run, choice: float) -> bool | None:
     try:
-        rate, length = run.sample_rate, min(run.length, LOOK)
+        rate, length = run.sample_rate, min(run.length, _LOOK)
         if rate < 3 * choice or length < rate:
             return None
         records = [run.vector(q, 0, length).values for q in ("displacement", "force")]
@@ -80,4 +80,4 @@ def _line_in(values: FloatArray, rate: float, choice: float) -> bool:
     width = max(0.2, 2 * rate / n)
     line = np.abs(frequency - choice) <= width
     around = (np.abs(frequency - choice) > 2 * width) & (np.abs(frequency - choice) < 2 * width + 4.0)
-    return bool(amplitude[line].max() > CLEAR * np.median(amplitude[around]))
+    return bool(amplitude[line].max() > _CLEAR * np.median(amplitude[around]))

@@ -15,7 +15,7 @@ from tpjb_ident.dynamic.records.line_fit import GLITCH_LIMIT, SCALE_LIMIT, besid
 from tpjb_ident.dynamic.records.windows import line_design
 
 #: Outlying samples up to this share are told by leaving them out, again and again, until fit and verdict agree.
-FEW = 0.1
+_FEW = 0.1
 _FEW_ROUNDS = 8
 #: Samples of a block.
 BLOCK = 256
@@ -148,7 +148,7 @@ class LineFitter:
             previous, left_out = left_out, beside(size > GLITCH_LIMIT * scale[:, None])
             if previous is not None and np.array_equal(previous, left_out):
                 return solution, scale, len(left_out) / self.length
-            if len(left_out) > FEW * self.length:
+            if len(left_out) > _FEW * self.length:
                 return None
             rows = self.design[left_out]
             # the residual of the left-out samples is what they contributed beyond the fit

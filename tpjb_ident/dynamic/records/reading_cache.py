@@ -22,7 +22,7 @@ from rigdata.run import Run
 from tpjb_ident.dynamic.records.run_data import MeasuredRun
 
 #: What the checks look at: so many samples, or so many seconds if that is more, of those that are kept.
-LOOK, SECONDS = 2**14, 2.0
+_LOOK, SECONDS = 2**14, 2.0
 #: Samples per channel up to which a run is kept, and that are looked at of a longer one.
 SHORT = 2**17
 
@@ -66,7 +66,7 @@ class ShortRecord:
         return self._run.opened()
 
 
-class ReadingCache:
+class _ReadingCache:
     """A run's reader that keeps the first samples of all channels."""
 
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
@@ -106,10 +106,10 @@ class ReadingCache:
         return self._kept
 
 
-class Beginning:
+class _Beginning:
     """A run's reader that ends after the first samples."""
 
-    def __init__(self, reader: ReadingCache, samples: int) -> None:
+    def __init__(self, reader: _ReadingCache, samples: int) -> None:
         self._reader, self._length = reader, min(samples, reader.samples)
 
     def __getattr__(self, name: str) -> Any:
@@ -125,12 +125,12 @@ def with_kept_beginning(run: Run) -> Run:
     if not isinstance(run, Run):
         return run
     names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
-    return replace(run, reader=ReadingCache(run.reader, names))
+    return replace(run, reader=_ReadingCache(run.reader, names))
 
 
 def beginning_of(run: Run) -> Run | None:
     """The first seconds of a run whose readings are kept, as a run of its own; None where they are not."""
     reader = getattr(run, "reader", None)
-    if not isinstance(reader, ReadingCache):
+    if not isinstance(reader, _ReadingCache):
         return None
-    return replace(run, reader=Beginning(reader, max(LOOK, round(SECONDS * run.sample_rate))))
+    return replace(run, reader=_Beginning(reader, max(_LOOK, round(SECONDS * run.sample_rate))))

@@ -17,11 +17,11 @@ FIRST_LOOK = 2**17
 #: A tachometer this far from the set point is not believed.
 MAX_DEPARTURE = 0.05
 #: Mean of the unit phasors of pulses or windows below which drive and shaft are not locked.
-LOCKED = 0.98
+_LOCKED = 0.98
 #: The 1X line stands so many times above its scatter over the windows, or tells no phase.
-CLEAR = 10.0
+_CLEAR = 10.0
 #: Samples of the keyphasor that are looked at.
-LOOK = 2**17
+_LOOK = 2**17
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
             continue
         finite_values = turns[np.isfinite(turns)]
         mean = complex(np.sum(finite_values**n)) / max(len(finite_values), 1)
-        if abs(mean) > LOCKED:
+        if abs(mean) > _LOCKED:
             phases[i] = mean / abs(mean)
     return phases
 
@@ -96,7 +96,7 @@ def _by_keyphasor(run: MeasuredRun, turning: float) -> ComplexArray | None:
     names = [c.name for c in run.channels.values() if c.quantity == "keyphasor"]
     if not names or not isinstance(run, Run):
         return None
-    record = run.record(names[0], 0, min(run.length, LOOK))
+    record = run.record(names[0], 0, min(run.length, _LOOK))
     pulses = pulse_times(record.values, record.time)
     pulses = pulses[np.isfinite(pulses)]
     return np.exp(-2j * np.pi * turning * pulses) if len(pulses) > 2 else None
@@ -112,6 +112,6 @@ def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray | None:
     middle = phasors.start + 0.5 * phasors.length
     z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (lines[place[0]].frequency - turning) * middle)
     good = z[np.isfinite(z)]
-    if not len(good) or not abs(good.mean()) > CLEAR * good.std() / np.sqrt(len(good)):
+    if not len(good) or not abs(good.mean()) > _CLEAR * good.std() / np.sqrt(len(good)):
         return None
     return np.asarray(z / np.abs(z))

@@ -21,8 +21,8 @@ from tpjb_ident.errors import ArgumentError
 #: A model is refused below this probability of its chi-square.
 REFUSED = 0.01
 #: Draws of a chi-square with measured covariances, and their seed; above so many degrees of freedom one is known.
-DRAWN, LARGE_DOF = (4000, 5), 1e4
-MODELS = {"K-C": 8, "K-C-M": 12}
+_DRAWN, _LARGE_DOF = (4000, 5), 1e4
+_MODELS = {"K-C": 8, "K-C-M": 12}
 
 
 @dataclass(frozen=True)
@@ -72,24 +72,24 @@ def chance_of(chi_square: float, dof: int, noise_dof: tuple[float, ...]) -> floa
     variance of nu / 2 is.
     """
     plain = float(chdtrc(dof, chi_square)) if dof > 0 else np.nan
-    finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < LARGE_DOF])
+    finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < _LARGE_DOF])
     if not len(finite) or plain > 0.5:
         return plain
-    rng = np.random.default_rng(DRAWN[1])
+    rng = np.random.default_rng(_DRAWN[1])
     each = dof / len(noise_dof)
-    total = np.zeros(DRAWN[0])
+    total = np.zeros(_DRAWN[0])
     for nu in noise_dof:
-        share = rng.chisquare(each, DRAWN[0])
+        share = rng.chisquare(each, _DRAWN[0])
         half = max(nu / 2, 1.0)
-        total += share / (rng.chisquare(half, DRAWN[0]) / half) if nu < LARGE_DOF else share
+        total += share / (rng.chisquare(half, _DRAWN[0]) / half) if nu < _LARGE_DOF else share
     above = float((total >= chi_square).mean())
     return max(above, plain)
 
 
 def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> FrequencyFit:
     """Fit one model to the dynamic stiffnesses of one load."""
-    if model not in MODELS:
-        raise ArgumentError(unknown_name("model", model, MODELS))
+    if model not in _MODELS:
+        raise ArgumentError(unknown_name("model", model, _MODELS))
     usable = [e for e in estimates if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
     omegas = np.array([e.omega for e in usable])
     needed = 1 if model == "K-C" else 2
@@ -98,7 +98,7 @@ def fit_over_frequency(estimates: list[DynamicStiffness], model: str) -> Frequen
     # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
     middle = float(np.sqrt(omegas.min() * omegas.max()))
     size = float(np.mean([np.abs(e.h).max() for e in usable]))
-    normal, moment, total = np.zeros((MODELS[model],) * 2), np.zeros(MODELS[model]), 0.0
+    normal, moment, total = np.zeros((_MODELS[model],) * 2), np.zeros(_MODELS[model]), 0.0
     for est in usable:
         design = _design(est.omega / middle, model)
         y = est.vector / size
@@ -162,7 +162,7 @@ def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
         estimates = [p.stiffness for p in members]
         if len({round(e.omega, 6) for e in estimates}) < 2:
             continue
-        fits = {model: fit_over_frequency(estimates, model) for model in MODELS}
+        fits = {model: fit_over_frequency(estimates, model) for model in _MODELS}
         accepted = [name for name, fit in fits.items() if fit.dof > 0 and not fit.refused]
         result.append(LoadFits(tuple(members), fits, accepted[0] if accepted else "raw H"))
     return result

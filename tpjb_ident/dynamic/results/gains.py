@@ -21,15 +21,15 @@ from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Readings below which a sweep says nothing of a probe.
-FEWEST = 100
+_FEWEST = 100
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
-TRAVEL = (0.5, 2.5)
+_TRAVEL = (0.5, 2.5)
 #: Distance between two mean positions over the clearance, at most.
-APART = 3.0
+_APART = 3.0
 #: Clearance times stiffness over load, at least: pivots that give let the shaft move by more than the clearance.
-LEAST_STIFF = 0.5
+_LEAST_STIFF = 0.5
 #: Name of the condition.
-RUN_GAIN_OFF = "run-gain-off"
+_RUN_GAIN_OFF = "run-gain-off"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def _of_sweep(run: Run) -> list[SweptProbe]:
             continue
         values = readings[name]
         finite_values = values[np.isfinite(values)]
-        low, high = np.quantile(finite_values, [0.01, 0.99]) if len(finite_values) >= FEWEST else (np.nan, np.nan)
+        low, high = np.quantile(finite_values, [0.01, 0.99]) if len(finite_values) >= _FEWEST else (np.nan, np.nan)
         centre = swept_centre(load, values) if load is not None and len(load) == len(values) else None
         swept.append(SweptProbe(run.id, name, 0.5 * float(high - low), centre))
     return swept
@@ -118,7 +118,7 @@ def with_probe_doubts(
 def _sweeps(sweeps: Sequence[SweptProbe], clearance: float) -> list[str]:
     table: dict[str, str] = {}
     for probe in sweeps:
-        if probe.half_travel <= TRAVEL[0] * clearance or probe.half_travel >= TRAVEL[1] * clearance:
+        if probe.half_travel <= _TRAVEL[0] * clearance or probe.half_travel >= _TRAVEL[1] * clearance:
             um = 1e6 * probe.half_travel
             table[probe.name] = f"{probe.name} travels {um:.3g} um to either side in the sweep {probe.run}"
     return list(table.values())
@@ -129,7 +129,7 @@ def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
     if len(places) < 2:
         return []
     distance = float(np.hypot(*np.ptp(places, axis=0)))
-    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > APART * clearance else []
+    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > _APART * clearance else []
 
 
 def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
@@ -138,7 +138,7 @@ def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
         load, direction = p.point.static_load, p.point.static_load_direction
         along = np.array([np.cos(direction), np.sin(direction)])
         stiffness = float(along @ p.stiffness.k @ along)
-        if load > 0 and 0 < stiffness < LEAST_STIFF * load / clearance:
+        if load > 0 and 0 < stiffness < _LEAST_STIFF * load / clearance:
             soft_points.append((stiffness * clearance / load, load, stiffness))
     if not soft_points:
         return []
@@ -185,7 +185,7 @@ def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
     for gain in sorted(gains, key=lambda f: f.run):
         names = [pairs.names[i] for i in gain.channels]
         doubts.append(f"{data.runs[complete[gain.run]].run}: {names[0]} {gain_in_words(gain, names)}")
-    return (Condition(RUN_GAIN_OFF, "; ".join(doubts)),) if doubts else ()
+    return (Condition(_RUN_GAIN_OFF, "; ".join(doubts)),) if doubts else ()
 
 
 def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -34,11 +34,11 @@ _FIT_FIGURES = (
     "largest_misfit",
 )
 _FIT_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
-FIT_COLUMNS = (*STATIC_COLUMNS, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
-WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_COLUMNS)
+_FIT_COLUMNS = (*STATIC_COLUMNS, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
+_WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_COLUMNS)
 #: Sources that scatter from run to run; all others are common to the runs.
-RANDOM = ("random", "load miss", "mains")
-BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
+_RANDOM = ("random", "load miss", "mains")
+_BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,14 +127,14 @@ class Identification(Presented):
             for p in self.points
             for w in p.rejected
         ]
-        return pd.DataFrame(rows, columns=list(WINDOW_COLUMNS))
+        return pd.DataFrame(rows, columns=list(_WINDOW_COLUMNS))
 
     def budget_frame(self) -> pd.DataFrame:
         """What every source adds to every coefficient's uncertainty: ``budget.csv``."""
         import pandas as pd
 
         rows = [row for p in self.points for row in _budget_rows(point_columns(p), p.stiffness, p.budget)]
-        return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *BUDGET_COLUMNS])
+        return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *_BUDGET_COLUMNS])
 
     def frequency_fits(self) -> list[LoadFits]:
         """K-C and K-C-M over the excitation frequencies, for every load that was run at several."""
@@ -145,7 +145,7 @@ class Identification(Presented):
         import pandas as pd
 
         rows = [_fit_row(group, fit) for group in self.frequency_fits() for fit in group.fits.values()]
-        return pd.DataFrame(rows, columns=list(FIT_COLUMNS))
+        return pd.DataFrame(rows, columns=list(_FIT_COLUMNS))
 
     def remarks(self) -> tuple[str, ...]:
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
@@ -273,10 +273,10 @@ def _budget_rows(
                     "coefficient": f"{symbol}{ENTRIES[i % 4]}",
                     "unit": unit,
                     "source": name,
-                    "kind": "random" if name in RANDOM else "systematic",
+                    "kind": "random" if name in _RANDOM else "systematic",
                     "standard_uncertainty": float(np.sqrt(variance[i])) * factor,
                     "share": float(variance[i] / total[i]) if total[i] > 0 else 0.0,
-                    "dof": float(est.dof[i]) if name in RANDOM else np.inf,
+                    "dof": float(est.dof[i]) if name in _RANDOM else np.inf,
                 }
             )
     return rows

@@ -13,11 +13,11 @@ from tpjb_ident.dynamic.results.point_result import WindowVerdict
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Share of the windows without phasors beyond which what is left may not stand for the record.
-MAX_LOST = 0.6
+_MAX_LOST = 0.6
 #: Share of the force that H leaves in the runs' means beyond which they have no H in common.
-MAX_DISAGREEMENT = 0.06
+_MAX_DISAGREEMENT = 0.06
 #: What a few runs show of a force of random phase may be so many times its size.
-KNOWN_SCATTERS = 1.5
+_KNOWN_SCATTERS = 1.5
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
@@ -104,7 +104,7 @@ def _missing(data: PointData) -> list[Condition]:
     empty = [run.run for i, run in enumerate(data.runs) if not complete[data.run_index == i].any()]
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
-    if complete.mean() < 1 - MAX_LOST:
+    if complete.mean() < 1 - _MAX_LOST:
         text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
         return [Condition("most-windows-lost", text)]
     if complete.mean() < 0.9:
@@ -168,7 +168,7 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, know
         return None
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
-    if share <= np.hypot(MAX_DISAGREEMENT, KNOWN_SCATTERS * known / float(np.mean(sizes))):
+    if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * known / float(np.mean(sizes))):
         return None
-    text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * MAX_DISAGREEMENT:.0f} %)"
+    text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
     return Condition("runs-disagree", text)

@@ -12,7 +12,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 
-CONTRADICTED, DOUBTFUL = "records-contradicted", "records-doubtful"
+_CONTRADICTED, _DOUBTFUL = "records-contradicted", "records-doubtful"
 
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
@@ -41,7 +41,7 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
 def check_conditions(result: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
     """What the checks say of one point."""
     members = list(runs)
-    groups = ((CONTRADICTED, result.shared), (DOUBTFUL, result.doubtful))
+    groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful))
     told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
     return tuple(Condition(name, _sentence(problems)) for name, problems in told if problems)
 

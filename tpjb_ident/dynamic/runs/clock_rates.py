@@ -17,10 +17,10 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: Standard errors beyond which a difference is one,
-CLEAR = 6.0
+_CLEAR = 6.0
 #: and phase [rad] over a run of usual length that it must come to: less is nothing to the coefficients.
-NOTABLE = 2e-3
-MIN_WINDOWS = 4
+_NOTABLE = 2e-3
+_MIN_WINDOWS = 4
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def rate_samples(data: PointData) -> RateSamples:
 def _drift(z: ComplexArray, d: ComplexArray, start: FloatArray) -> tuple[float, float] | None:
     """Slope of the phase of `z` against `d` (n, 2) over time [rad/s], and its standard error."""
     good = np.isfinite(z).all(axis=1) & np.isfinite(d).all(axis=1)
-    if good.sum() < MIN_WINDOWS or not np.abs(z[good]).max() > 0 or not np.abs(d[good]).max() > 0:
+    if good.sum() < _MIN_WINDOWS or not np.abs(z[good]).max() > 0 or not np.abs(d[good]).max() > 0:
         return None
     z, d, t = z[good], d[good], start[good]
     steps = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj()) * np.einsum("ni,ni->n", d[:-1], d[1:].conj()))
@@ -134,5 +134,5 @@ def _shared(rates: FloatArray) -> tuple[float, float]:
         middle = float(np.sum(robust * rate) / np.sum(robust))
     spread = float(np.sum(robust * distance**2) / np.sum(robust)) / max(len(rate) - 1, 1)
     doubt = float(np.sqrt(max(1 / np.sum(weight), spread if len(rate) > 1 else 0.0)))
-    notable = np.median(np.abs(rates[:, 2])) > NOTABLE
-    return (middle, doubt) if abs(middle) > CLEAR * doubt and notable else (0.0, doubt)
+    notable = np.median(np.abs(rates[:, 2])) > _NOTABLE
+    return (middle, doubt) if abs(middle) > _CLEAR * doubt and notable else (0.0, doubt)

@@ -13,7 +13,7 @@ from rigdata.run import Run
 from tpjb_ident.dynamic.records.run_phasors import RunPhasors
 
 #: Samples from which a run's temperatures are taken.
-TEMPERATURE_SAMPLES = 2**17
+_TEMPERATURE_SAMPLES = 2**17
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def mean_temperatures(run: Run) -> dict[int, float]:
     for sensor in run.temperatures():
         if sensor.pad is None:
             continue
-        values = run.record(sensor.name, 0, TEMPERATURE_SAMPLES).values
+        values = run.record(sensor.name, 0, _TEMPERATURE_SAMPLES).values
         finite_values = values[np.isfinite(values)]
         if len(finite_values):
             table.setdefault(sensor.pad, []).append(float(finite_values.mean()))

@@ -31,9 +31,9 @@ from tpjb_ident.runtime.executors import InProcessWorkers, Workers, as_completed
 
 Progress = Callable[[str, int, int], None]
 #: A channel whose lines are below this share of the vector's may be dead.
-NOTHING = 1e-6
+_NOTHING = 1e-6
 #: The same of its mean: what rounding leaves of a constant.
-ROUNDING = 1e-10
+_ROUNDING = 1e-10
 
 
 def all_runs(
@@ -191,4 +191,4 @@ def _silent(block: PhasorBlock, axis: float) -> bool:
     vector, mean = block.phasors[finite], block.mean[finite]
     along = np.array([np.cos(axis), np.sin(axis)])
     size = float(np.abs(vector @ along).max())
-    return size <= max(NOTHING * float(np.abs(vector).max()), ROUNDING * float(np.abs(mean).max()))
+    return size <= max(_NOTHING * float(np.abs(vector).max()), _ROUNDING * float(np.abs(mean).max()))

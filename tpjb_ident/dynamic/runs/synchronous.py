@@ -18,11 +18,11 @@ from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.records.shaft import shaft_order
 from tpjb_ident.dynamic.runs.point_data import PointData
 
-FITTED = "shaft lines fitted"
+_FITTED = "shaft lines fitted"
 #: Runs that tell H and what turns with the shaft: three unknowns for each force.
-MIN_RUNS = 3
+_MIN_RUNS = 3
 #: Condition number of the motions, without what follows the shaft, from which errors are strongly amplified.
-ILL_CONDITIONED = 30.0
+_ILL_CONDITIONED = 30.0
 
 
 def without_shaft(data: PointData) -> PointData:
@@ -47,7 +47,7 @@ def without_shaft(data: PointData) -> PointData:
     text = f"{n}X as of {1e6 * np.linalg.norm(r):.3g} um of runout, by the shaft's phase in {len(s)} runs"
     # taken off the displacements: what the load does to H acts on the motion without it
     moved = data.D - s[data.run_index][:, None] * r
-    return replace(_saying(data, name, Condition(FITTED, text)), D=moved, shaft=s)
+    return replace(_saying(data, name, Condition(_FITTED, text)), D=moved, shaft=s)
 
 
 def without_synchronous(data: PointData) -> PointData:
@@ -84,8 +84,8 @@ def _unknown(n: int, s: ComplexArray) -> str:
         if n == 1:
             return "no keyphasor tells the shaft's phase, or the drive is not locked to it. Record one"
         return "neither a keyphasor nor a steady 1X line tells the shaft's phase. Record a keyphasor"
-    if len(s) < MIN_RUNS:
-        return f"{len(s)} runs; excite in {MIN_RUNS} directions at least"
+    if len(s) < _MIN_RUNS:
+        return f"{len(s)} runs; excite in {_MIN_RUNS} directions at least"
     return ""
 
 
@@ -93,7 +93,7 @@ def _too_alike(means: list[ComplexArray], s: ComplexArray) -> str:
     """Why the runs do not tell motion and shaft apart; "" where they do."""
     combine = np.linalg.svd(s[None, :])[2][1:].conj()
     condition = float(np.linalg.cond(combine @ np.array(means)[:, :2]))
-    if condition < ILL_CONDITIONED:
+    if condition < _ILL_CONDITIONED:
         return ""
     return (
         f"the runs' motions follow the shaft's phase alike (condition number {condition:.0f}). Repeat them with the "

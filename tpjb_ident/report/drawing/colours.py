@@ -34,7 +34,7 @@ VARIANT_LABEL = {
     "kirk-secant": "Kirk, secant",
     "measured": "measured pivots",
 }
-PAD_STYLE: tuple[tuple[str, Any, str], ...] = (
+_PAD_STYLE: tuple[tuple[str, Any, str], ...] = (
     ("blue", "-", "o"),
     ("red", (0, (5, 2)), "s"),
     ("green", (0, (3, 1, 1, 1)), "^"),
@@ -49,5 +49,5 @@ SEQUENTIAL = LinearSegmentedColormap.from_list("tpjb-sequential", ["#f6f7f8", "#
 
 def style_of_pad(pad: int) -> tuple[str, Any, str]:
     """Colour, line style and marker of a pad (from 1)."""
-    colour, dashes, marker = PAD_STYLE[(pad - 1) % len(PAD_STYLE)]
+    colour, dashes, marker = _PAD_STYLE[(pad - 1) % len(_PAD_STYLE)]
     return LIGHT[colour], dashes, marker

@@ -18,12 +18,12 @@ from matplotlib.legend import Legend
 
 from tpjb_ident.report.drawing.colours import GREY, INK, RULE
 
-WIDTH, HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
+_WIDTH, _HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
 FONT_SIZE = 9.0
-LEFT, RIGHT, BOTTOM, TOP = 0.8, 0.15, 0.55, 0.15  # margins [inches]
-LINE = 0.172  # height of one line of text with its leading [inches]
+LEFT, _RIGHT, _BOTTOM, _TOP = 0.8, 0.15, 0.55, 0.15  # margins [inches]
+_LINE = 0.172  # height of one line of text with its leading [inches]
 CHARACTER = 0.074  # mean width of a character [inches]
-NOTEBOOK_DPI = 120
+_NOTEBOOK_DPI = 120
 
 
 class Picture(Figure):
@@ -31,12 +31,12 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
-        self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        self.savefig(buffer, format="png", dpi=_NOTEBOOK_DPI)
         return buffer.getvalue()
 
 
 def new_picture(
-    x_label: str, y_label: str, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
+    x_label: str, y_label: str, *, title: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
 ) -> tuple[Picture, Axes]:
     """Make a picture with one empty panel."""
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=height)
@@ -45,17 +45,17 @@ def new_picture(
 
 
 def new_pictures(
-    rows: int, columns: int, *, title: str | None = None, width: float = WIDTH, height: float = HEIGHT
+    rows: int, columns: int, *, title: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
 ) -> tuple[Picture, list[list[Axes]]]:
     """Make a picture with rows times columns of empty panels, each with its own margins."""
-    head = 1.6 * LINE if title else 0.0
+    head = 1.6 * _LINE if title else 0.0
     size = (columns * width, rows * height + head)
     figure = Picture(figsize=size, facecolor="white")
     FigureCanvasAgg(figure)
     grid = [
         [
-            _panel(figure, (j * width + LEFT, (rows - 1 - i) * height + BOTTOM, width - LEFT - RIGHT,
-                            height - BOTTOM - TOP))
+            _panel(figure, (j * width + LEFT, (rows - 1 - i) * height + _BOTTOM, width - LEFT - _RIGHT,
+                            height - _BOTTOM - _TOP))
             for j in range(columns)
         ]
         for i in range(rows)
@@ -88,7 +88,7 @@ def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) ->
     axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=INK)
     axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=INK)
     if heading:
-        shrink(axes, top=1.2 * LINE)
+        shrink(axes, top=1.2 * _LINE)
         axes.set_title(heading, fontsize=FONT_SIZE, color=INK, pad=4.0)
 
 
@@ -114,8 +114,8 @@ def add_legend(
     columns = columns or _columns(names, width - 0.1 if across else width * box.width + 0.4 * LEFT)
     columns = math.ceil(len(drawn) / math.ceil(len(drawn) / columns))  # no wider than the rows need
     centre = (0.5 - box.x0) / box.width if across else 0.5
-    heading = 1.4 * LINE if axes.get_title() else 0.0
-    shrink(axes, top=LINE * math.ceil(len(drawn) / columns) + 0.03)
+    heading = 1.4 * _LINE if axes.get_title() else 0.0
+    shrink(axes, top=_LINE * math.ceil(len(drawn) / columns) + 0.03)
     legend = axes.legend(
         handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
         bbox_to_anchor=(centre, 1.0 + heading / _height(axes)), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
