@@ -17,6 +17,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +63,11 @@ def read_sandboxed(module: str, path: Path) -> list[Series]:
     heads = json.loads(head)
     if isinstance(heads, dict):
         raise refuse("", "", str(heads["error"]), _AGAIN)
+    return _unpack(heads, body)
+
+
+def _unpack(heads: list[Any], body: bytes) -> list[Series]:
+    """Undo `_send`."""
     numbers, start = np.frombuffer(body, dtype=float), 0
     series = []
     for name, unit, group, length, is_timed in heads:
