@@ -30,10 +30,13 @@ def points(loads: Sequence[float], pads: int = 0, excitations: Sequence[float] =
     return dynamic(loads, excitations, SPEED, -math.pi / 2, pads)
 
 
-def whole_layout(loads: Sequence[float], frequencies: Sequence[float] = (15.0, 25.0, 35.0, 45.0)) -> Layout:
-    """Frequencies [Hz] at 5 kN, other loads at 25 Hz, a locus, every pad dry, a polygon."""
-    sweep = points([5000.0], 5, [2 * math.pi * f for f in frequencies])
-    return Layout((*sweep, *points(loads, 5)), around(5000.0, 5, SPEED), dry(range(1, 6)), 200.0)
+def whole_layout(
+    loads: Sequence[float], frequencies: Sequence[float] = (15.0, 25.0, 35.0, 45.0), sweep_first: bool = True
+) -> Layout:
+    """Frequencies [Hz] at 5 kN, other loads at 25 Hz, a locus, every pad dry, a polygon; noise goes by their order."""
+    sweep, steps = points([5000.0], 5, [2 * math.pi * f for f in frequencies]), points(loads, 5)
+    dynamic_points = (*sweep, *steps) if sweep_first else (*steps, *sweep)
+    return Layout(dynamic_points, around(5000.0, 5, SPEED), dry(range(1, 6)), 200.0)
 
 
 def noisy(planned, value, seed: int):

@@ -71,7 +71,7 @@ def test_neutral_slope_is_a_parabolas():
 def test_a_fit_finds_its_way_past_pads_that_come_out_of_contact(start):
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
     setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
-    layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0))
+    layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0), sweep_first=False)
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)
     hidden = forward.fresh()([Effect("thermal_growth", clearance_change=1.1e-5)])
