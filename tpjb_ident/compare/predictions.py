@@ -118,7 +118,12 @@ def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = 
     """Build prediction.csv: one row per operating point."""
     import pandas as pd
 
-    return pd.DataFrame([_row(prediction, mesh_error) for prediction in predictions])
+    return pd.DataFrame(prediction_rows(predictions, mesh_error))
+
+
+def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> list[dict[str, Any]]:
+    """Rows of `prediction_frame`, for a process that loads no pandas."""
+    return [_row(prediction, mesh_error) for prediction in predictions]
 
 
 def _row(point_prediction: PointPrediction, mesh_error: bool) -> dict[str, Any]:
