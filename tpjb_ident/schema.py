@@ -6,6 +6,7 @@ what is derived from a column (an interval's ends, a standard error) adds its ow
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -52,6 +53,13 @@ def coefficient_column(name: str) -> str:
     return KINDS[name[0]].column(name[1:])
 
 
+#: Least value of a quantity in a table, and endings that are widths; anything else may be negative.
+_LEAST = {"force": 0.0, "frequency": 0.0, "count": 0.0}
+_WIDTHS = ("_se", "_se_systematic", "_random95", "_systematic95", "_dof")
+#: What may be infinite, apart from the limits and widths of what is not known at all.
+_UNBOUNDED = ("dof", "condition_number")
+
+
 @dataclass(frozen=True)
 class Column:
     """One column of a table."""
@@ -61,6 +69,14 @@ class Column:
     unit: str
     meaning: str
     endings: tuple[str, ...] = ()
+
+    def least(self, ending: str = "") -> float:
+        """Least value that a cell can hold."""
+        return 0.0 if ending in _WIDTHS else -math.inf if ending else _LEAST.get(self.quantity, -math.inf)
+
+    def may_be_infinite(self, ending: str = "") -> bool:
+        """Whether a cell may hold an infinite number."""
+        return ending in (*_WIDTHS, "_lo", "_hi") or self.name in _UNBOUNDED
 
     def pattern(self) -> str:
         """Regular expression of the names that this column stands for."""

@@ -33,7 +33,9 @@ def test_values_errors_and_missing_cells(tmp_path):
     [
         (("5000,22,25,6e7,2e8,1e6,2e4",), "nothing says how far it holds"),
         (("5000,22,25,,,1e6,2e4", "5000,22,25,,,1e6,2e4"), "second row for the same point"),
-        (("-5,22,25,,,1e6,2e4",), "must be positive"),
+        (("-5,22,25,,,1e6,2e4",), "line 2, static_load_N: -5 is below 0"),
+        (("0,22,25,,,1e6,2e4",), "must be positive"),
+        (("5000,22,25,6e7,,1e6,inf",), "nothing says how far it holds"),
         (("5000,22,25,,,high,2e4",), "is no number"),
         (("5000,22,25,,,,",), "holds no coefficient"),
     ],

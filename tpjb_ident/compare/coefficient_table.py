@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rigdata.near_names import nearest_name
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import ENTRIES
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 HZ = 2.0 * math.pi
 _UNITS = {"k": "N_per_m", "c": "Ns_per_m"}
-_KNOWN = tuple(f"{part}{entry}_{unit}" for part, unit in _UNITS.items() for entry in ENTRIES)
+_NEEDED = ("static_load_N", "shaft_speed_Hz")
 #: A column that looks like a coefficient: misspelt, it would be silently left out.
-_COEFFICIENT = re.compile(r"([A-Za-z]{1,5}_Ns?_per_m)(_se|_lo|_hi|)")
+_COEFFICIENT = re.compile(r"[A-Za-z]{1,5}_Ns?_per_m(_se|_lo|_hi|)")
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,8 @@ def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[T
     """Read a table of coefficients."""
     rows: list[TableRow] = []
     points: set[tuple[float, ...]] = set()
-    for number, row in enumerate(_read(path).to_dict("records"), start=2):
+    frame = read_table(path, _NEEDED, _COEFFICIENT)
+    for number, row in zip(frame.attrs["lines"], frame.to_dict("records"), strict=True):
         row_name = f"{path.name}, line {number}"
         place = _place(row, row_name)
         coefficients = _coefficients(row, reading_error, row_name)
@@ -62,43 +59,9 @@ def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[T
     return tuple(rows)
 
 
-def _read(path: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    try:
-        frame = pd.read_csv(path, sep=None, engine="python", comment="#", encoding="utf-8-sig")
-    except (OSError, ValueError, csv.Error) as error:  # csv.Error: no delimiter is to be found, as in an empty file
-        raise BadInputError(
-            f"{path}: cannot be read as a table ({error}). Save it as CSV with a line of names."
-        ) from error
-    columns = [str(name) for name in frame.columns]
-    for name in ("static_load_N", "shaft_speed_Hz"):
-        if name not in columns:
-            near = nearest_name(name, columns)
-            hint = f"; {near!r} is not it" if near else ""
-            raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
-    for name in columns:
-        stem = _COEFFICIENT.fullmatch(name)
-        if stem is not None and stem[1] not in _KNOWN:
-            near = nearest_name(stem[1], _KNOWN)
-            raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}{stem[2]}?")
-    return frame
-
-
-def _number(row: Mapping[Any, Any], name: str, row_name: str) -> float:
-    value = row.get(name)
-    try:
-        return float(value) if value is not None and value != "" else math.nan
-    except (TypeError, ValueError) as error:
-        raise BadInputError(
-            f"{row_name}, {name}: {value!r} is no number. Leave the cell empty where nothing is known."
-        ) from error
-
-
 def _place(row: Mapping[Any, Any], row_name: str) -> tuple[float, float, float, float]:
-    load, speed = _number(row, "static_load_N", row_name), HZ * _number(row, "shaft_speed_Hz", row_name)
-    direction = _number(row, "static_load_direction_deg", row_name)
-    line = HZ * _number(row, "excitation_Hz", row_name)
+    load, speed = row["static_load_N"], HZ * row["shaft_speed_Hz"]
+    direction, line = row.get("static_load_direction_deg", math.nan), HZ * row.get("excitation_Hz", math.nan)
     if not (load > 0.0 and speed > 0.0):
         raise BadInputError(f"{row_name}: static_load_N and shaft_speed_Hz must be positive numbers.")
     return load, math.radians(-90.0 if math.isnan(direction) else direction), speed, speed if math.isnan(line) else line
@@ -110,15 +73,14 @@ def _coefficients(row: Mapping[Any, Any], reading_error: float | None, row_name:
     for part, unit in _UNITS.items():
         for entry in ENTRIES:
             name = f"{part}{entry}_{unit}"
-            value = _number(row, name, row_name)
+            value, error, low, high = (row.get(name + ending, math.nan) for ending in ("", "_se", "_lo", "_hi"))
             if math.isnan(value):
                 continue
-            error = _number(row, f"{name}_se", row_name)
             if math.isnan(error):
-                error = (_number(row, f"{name}_hi", row_name) - _number(row, f"{name}_lo", row_name)) / (2 * 1.96)
-            if math.isnan(error) and reading_error is not None:
+                error = (high - low) / (2 * 1.96)
+            if not math.isfinite(error) and reading_error is not None:
                 error = reading_error * abs(value)
-            if not error >= 0.0:
+            if not math.isfinite(error):
                 raise BadInputError(
                     f"{row_name}, {name}: nothing says how far it holds. "
                     f"Add {name}_se, _lo and _hi, or --reading-error."

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import Chosen, ExportError, export_format, static_points
 from tpjb_ident.exports.table import write_intervals
+from tpjb_ident.runtime.output_folder import contradiction
+from tpjb_ident.runtime.table_reader import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,22 +101,14 @@ def result_table(path: Path) -> Path | None:
     return next((path / name for name in _RESULT_TABLES if (path / name).is_file()), None)
 
 
-def read_result_table(path: Path) -> pd.DataFrame:
-    """Read a table of coefficients."""
-    import pandas as pd
-
-    try:
-        return pd.read_csv(path)
-    except (ValueError, UnicodeDecodeError) as error:  # pandas' own errors are ValueErrors
-        raise ExportError(f"{path}: is no table ({error}). Give the results of tpjb identify.") from error
-
-
 def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataFrame, str]:
     if isinstance(source, (str, Path)):
         path = result_table(Path(source))
         if path is None:
             raise ExportError(f"{source}: holds neither {' nor '.join(_RESULT_TABLES)}. Give results of tpjb identify.")
-        return read_result_table(path), path.parent.resolve().name
+        if reason := contradiction(path):
+            raise ExportError(f"{path}: {reason}. Run the command again, or move the file out of its results.")
+        return read_table(path), path.parent.resolve().name
     from tpjb_ident.dynamic.results.identification import Identification
 
     if isinstance(source, Identification):

@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.documents import read_document, schema
+from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_text
 
-__all__ = ["RECORD", "former_runs", "output_folder"]
+__all__ = ["RECORD", "contradiction", "former_runs", "output_folder"]
 
 #: Full: the disk, the user's share of it, or the largest file that the system allows.
 _FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
@@ -92,17 +94,33 @@ READY = ".tpjb-moving-in"
 def former_runs(folder: Path) -> dict[str, dict]:
     """Return what run.json of an output folder tells, by command; empty if there is none."""
     try:
-        data = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        commands = read_document(folder / RECORD, "tpjb-run").get("commands")
+    except BadInputError:
         return {}
-    if not isinstance(data, dict) or data.get("schema") != "tpjb-run/1" or not isinstance(data.get("commands"), dict):
-        return {}
-    return {k: v for k, v in data["commands"].items() if isinstance(v, dict)}
+    return {k: v for k, v in commands.items() if isinstance(v, dict)} if isinstance(commands, dict) else {}
+
+
+def contradiction(path: Path) -> str:
+    """What run.json beside a file says against it: it is not what was computed. "" where there is no record of it."""
+    folder = path.parent
+    if (folder / READY).is_dir():
+        return "a command was killed while its results moved in"
+    if path.name == RECORD or not (folder / RECORD).exists():
+        return ""
+    entries = former_runs(folder)
+    if not entries:
+        return f"{RECORD} beside it cannot be read"
+    tables = [entry.get("outputs_sha256") for entry in entries.values()]
+    recorded = {table[path.name] for table in tables if isinstance(table, dict) and path.name in table}
+    if recorded and path.is_file() and sha256(path) not in recorded:
+        return f"is not what was computed (its SHA-256 is not that of {RECORD})"
+    return ""
 
 
 def record_text(commands: Mapping[str, Any]) -> str:
     """Text of run.json."""
-    return json.dumps({"schema": "tpjb-run/1", "commands": dict(commands)}, indent=1, ensure_ascii=False) + "\n"
+    document = {"schema": schema("tpjb-run"), "commands": dict(commands)}
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
 
 
 def _move_in(staging: Path, target: Path, command: str) -> None:

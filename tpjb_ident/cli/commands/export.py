@@ -78,11 +78,12 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
 
 def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str]:
     """Table of coefficients of a results folder, or of a campaign that is identified for it, and its name."""
-    from tpjb_ident.exports.write import read_result_table, result_table
+    from tpjb_ident.exports.write import result_table
+    from tpjb_ident.runtime.table_reader import read_table
 
     path = result_table(source)
     if path is not None:
-        return read_result_table(c.file(path)), path.parent.resolve().name
+        return read_table(c.file(path, refuses_changed=True)), path.parent.resolve().name
     from tpjb_ident.dynamic.identify import identify as run_identification
 
     campaign = c.open(source)

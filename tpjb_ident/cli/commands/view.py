@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ from tpjb_ident.cli.common.command import Command, campaign_place, command
 from tpjb_ident.cli.common.options import DEMO, BearingOption
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import former_runs
+from tpjb_ident.schema import TABLES
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
@@ -43,7 +44,7 @@ def view(
 
     place = campaign_place(source)
     if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
-        session = Session(name=place.resolve().name, tables=_tables(place))
+        session = Session(name=place.resolve().name, tables=_tables(c, place))
     else:
         session = _campaign_session(c, source, bearing)
     from tpjb_ident.view.server import serve
@@ -78,18 +79,30 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
     return session
 
 
-def _tables(folder: Path) -> dict[str, Any]:
+def _tables(c: Command, folder: Path) -> dict[str, Any]:
     """Tables of a results folder, and the problems that `check` found."""
-    import pandas as pd
+    from tpjb_ident.runtime.documents import read_document
+    from tpjb_ident.runtime.table_reader import read_table
 
-    tables: dict[str, Any] = {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
+    tables: dict[str, Any] = {}
+    for path in sorted(folder.glob("*.csv")):
+        if path.stem in TABLES:
+            tables[path.stem] = read_table(c.file(path))
     findings = folder / "check.json"
     if findings.exists():
-        problems = json.loads(findings.read_text(encoding="utf-8")).get("problems", [])
-        tables["problems"] = pd.DataFrame(problems or [{"what": "none"}])
+        tables["problems"] = _problems(read_document(c.file(findings), "tpjb-check"))
     if not tables:
         raise BadInputError(f"{folder}: holds no tables. Give a campaign, or the --out folder of another command.")
     return tables
+
+
+def _problems(document: Mapping[str, Any]) -> Any:
+    """Problems of a check, one row each."""
+    import pandas as pd
+
+    problems = document.get("problems")
+    rows = [entry for entry in problems if isinstance(entry, dict)] if isinstance(problems, list) else []
+    return pd.DataFrame(rows or [{"what": "none"}]).astype(str)
 
 
 def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str, Any]:

@@ -27,7 +27,8 @@ import typer
 from rigdata.problem import RigError
 from tpjb_ident.cli.common.terminal import Terminal
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
-from tpjb_ident.runtime.output_folder import RECORD, former_runs, output_folder, record_text
+from tpjb_ident.runtime.documents import TABLE_SCHEMA
+from tpjb_ident.runtime.output_folder import RECORD, contradiction, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import sha256, versions
 from tpjb_ident.runtime.tables import write_table, write_text
 
@@ -76,9 +77,17 @@ class Command(Terminal):
         self._opened.append(campaign)
         return campaign
 
-    def file(self, path: Path) -> Path:
-        """Note an ordinary file that the command reads; devices and pipes are refused."""
+    def file(self, path: Path, refuses_changed: bool = False) -> Path:
+        """Note an ordinary file that the command reads; devices and pipes are refused.
+
+        A result that is not what run.json beside it recorded is named, and refused where the command `refuses_changed`.
+        """
         refuse_special(path)
+        if reason := contradiction(path):
+            message = f"{path}: {reason}"
+            if refuses_changed:
+                raise BadInputError(f"{message}. Run the command again, or move the file out of its results.")
+            self.warn(message)
         self._opened.append(path)
         return path
 
@@ -297,6 +306,7 @@ def write_record(
     """
     outputs = sorted(p.relative_to(staging).as_posix() for p in staging.rglob("*") if p.is_file())
     record = {
+        "tables": TABLE_SCHEMA,
         "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "settings": {name: _plain(value) for name, value in settings.items()},
         "versions": versions(),

@@ -1,0 +1,183 @@
+"""Tables that come back are held to the schema, cell by cell; what run.json contradicts is named or refused."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pandas as pd
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.exports.formats import ExportError
+from tpjb_ident.exports.write import export
+from tpjb_ident.runtime.documents import read_document, schema
+from tpjb_ident.runtime.output_folder import contradiction, record_text
+from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.table_reader import column_of, read_table
+from tpjb_ident.runtime.tables import write_table
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
+
+HEAD = "static_load_N,shaft_speed_Hz,kxx_N_per_m,kxx_N_per_m_lo,kxx_N_per_m_hi,kxx_N_per_m_se,quality,condition_number"
+GOOD = "5000,22,2e8,1.9e8,2.1e8,4e6,ok,1.5"
+
+
+def saved(tmp_path, *lines, head=HEAD, name="coefficients.csv", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(("\n".join([head, *lines]) + "\n").encode(encoding))
+    return path
+
+
+def coefficients(tmp_path, folder="out"):
+    """A folder of results with its run.json."""
+    out = tmp_path / folder
+    out.mkdir()
+    row = dict.fromkeys(POINT_COLUMNS, 20.0) | dict.fromkeys(COEFFICIENT_COLUMNS, 1e8) | {"quality": "ok"}
+    paths = write_table(out, "coefficients", pd.DataFrame([row]))
+    entry = {"outputs": [p.name for p in paths], "outputs_sha256": {p.name: sha256(p) for p in paths}}
+    (out / "run.json").write_text(record_text({"identify": entry}), encoding="utf-8")
+    return out / "coefficients.csv"
+
+
+def test_numbers_texts_and_gaps_are_read_with_their_lines(tmp_path):
+    frame = read_table(saved(tmp_path, "# read off figure 3", "", GOOD, "5000,22,,,,,,inf"))
+    assert frame.attrs["lines"] == [4, 5]
+    assert frame["kxx_N_per_m"][0] == 2e8
+    assert math.isnan(frame["kxx_N_per_m"][1])
+    assert frame["quality"].tolist() == ["ok", ""]
+    assert frame["condition_number"][1] == math.inf
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_the_delimiter_is_that_of_the_names(tmp_path, delimiter):
+    path = saved(tmp_path, GOOD.replace(",", delimiter), head=HEAD.replace(",", delimiter))
+    assert read_table(path)["static_load_N"].tolist() == [5000.0]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (f"{GOOD},", "line 2: has 9 cells, the names are 8"),
+        (GOOD.removesuffix(",1.5"), "has 7 cells"),
+        (GOOD.replace("22", "22 Hz"), "line 2, shaft_speed_Hz: '22 Hz' is no number"),
+        (GOOD.replace("22", "1_000"), "is no number"),
+        (GOOD.replace("22", "٢٢"), "is no number"),
+        (GOOD.replace("5000", "inf"), "'inf' is no number"),
+        (GOOD.replace("5000", "1e999"), "is no number"),
+        (GOOD.replace("5000", "-5000"), "static_load_N: -5000 is below 0"),
+        (GOOD.replace("22", "-22"), "shaft_speed_Hz: -22 is below 0"),
+        (GOOD.replace("4e6", "-4e6"), "kxx_N_per_m_se: -4e6 is below 0"),
+        (GOOD.replace("2e8", "2.2e8"), "kxx_N_per_m: 2.2e.08 is not within 1.9e.08 to 2.1e.08"),
+        (GOOD.replace("2e8", ""), None),
+        ("5000,22,,2.1e8,1.9e8,,ok,1", "is not within 2.1e.08 to 1.9e.08"),
+        ('5000,22,"2e8', "cannot be read as a table"),
+    ],
+)
+def test_a_line_that_does_not_hold_to_the_schema_is_refused_at_its_place(tmp_path, line, message):
+    path = saved(tmp_path, line)
+    if message is None:
+        assert len(read_table(path)) == 1
+        return
+    with pytest.raises(BadInputError, match=f"coefficients.csv.*{message}"):
+        read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        (f"{HEAD},", "column 9 has no name"),
+        (f"{HEAD},kxx_N_per_m", "'kxx_N_per_m' is there twice"),
+        (f"{HEAD},  quality ", "'quality' is there twice"),
+    ],
+)
+def test_one_column_one_name(tmp_path, head, message):
+    with pytest.raises(BadInputError, match=f"line 1: column .*{message.removeprefix('column ')}"):
+        read_table(saved(tmp_path, f"{GOOD},", head=head))
+
+
+def test_missing_names_other_encodings_and_nothing_at_all_are_refused(tmp_path):
+    with pytest.raises(BadInputError, match="column excitation_Hz is missing"):
+        read_table(saved(tmp_path, GOOD), ("excitation_Hz",))
+    with pytest.raises(BadInputError, match="utf-8"):
+        read_table(saved(tmp_path, GOOD.replace("ok", "Öl"), encoding="cp1252"))
+    with pytest.raises(BadInputError, match="is empty"):
+        read_table(saved(tmp_path, head=""))
+    with pytest.raises(BadInputError, match="No such file"):
+        read_table(tmp_path / "none.csv")
+
+
+def test_a_column_is_found_with_its_ending_in_its_table_first():
+    assert column_of("kyx_N_per_m_se_systematic")[1] == "_se_systematic"
+    column, ending = column_of("model", "frf_models")
+    assert column is not None
+    assert (column.quantity, ending) == ("text", "")
+    assert column_of("not_ours") == (None, "")
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    path = coefficients(tmp_path)
+    frame = read_table(path)
+    pd.testing.assert_frame_equal(frame, pd.read_csv(path), check_dtype=False)
+
+
+def change(path):
+    path.write_text(path.read_text(encoding="utf-8").replace("20.0", "21.0"), encoding="utf-8")
+
+
+def unread(path):
+    (path.parent / "run.json").write_text("{", encoding="utf-8")
+
+
+def newer(path):
+    text = (path.parent / "run.json").read_text(encoding="utf-8")
+    (path.parent / "run.json").write_text(text.replace(schema("tpjb-run"), "tpjb-run/99"), encoding="utf-8")
+
+
+def half_moved(path):
+    (path.parent / ".tpjb-moving-in").mkdir()
+
+
+@pytest.mark.parametrize("damage", [change, unread, newer, half_moved])
+def test_what_the_record_contradicts_is_not_exported(tmp_path, damage):
+    path = coefficients(tmp_path)
+    assert contradiction(path) == ""
+    assert tpjb("export", path.parent, "--to", "csv", "--out", tmp_path / "before").exit_code == 0
+    damage(path)
+    result = tpjb("export", path.parent, "--to", "csv", "--out", tmp_path / "o")
+    assert result.exit_code == 2, result.output
+    assert contradiction(path).split()[0] in result.output
+    assert not (tmp_path / "o").exists()
+    with pytest.raises(ExportError, match="Run the command again"):
+        export(path, "csv", tmp_path / "o")
+
+
+def test_others_name_it_and_go_on(tmp_path, rocker_file):
+    path = coefficients(tmp_path)
+    change(path)
+    result = tpjb("compare", "--coefficients", path, "--bearing", rocker_file, "--out", tmp_path / "o")
+    assert "is not what was computed" in " ".join(result.output.split())
+
+
+def test_a_table_alone_has_no_record_to_contradict(tmp_path):
+    path = coefficients(tmp_path)
+    (path.parent / "run.json").unlink()
+    change(path)
+    assert contradiction(path) == ""
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[" * 100_000, "[]", '"text"', '{"schema": "tpjb-check/2"}', '{"schema": 1}', "\x00"]
+)
+def test_documents_that_are_none_are_refused(tmp_path, text):
+    path = tmp_path / "check.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInputError, match="check.json"):
+        read_document(path, "tpjb-check")
+
+
+def test_every_version_so_far_is_read(tmp_path):
+    path = tmp_path / "run.json"
+    for version in ("tpjb-run/1", "tpjb-run/2"):
+        path.write_text(json.dumps({"schema": version, "commands": {"locus": {}}}), encoding="utf-8")
+        assert read_document(path, "tpjb-run")["commands"] == {"locus": {}}

@@ -1,0 +1,51 @@
+"""JSON files that we wrote and read back: their schema with its version, and how an older version becomes today's."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tpjb_ident.errors import BadInputError
+
+Document = dict[str, Any]
+#: Larger documents are refused before they are read [bytes].
+_LARGEST = 2**26
+
+
+def _run_from_1(document: Document) -> Document:
+    """Version 1 did not say where a file is that an option may name in place of a word, as --pivots."""
+    return document
+
+
+#: Kind of document: one step per version before today's, so that today's version is their number plus one.
+_STEPS: dict[str, tuple[Callable[[Document], Document], ...]] = {"tpjb-run": (_run_from_1,), "tpjb-check": ()}
+#: Version of all tables: stated in run.json and in the metadata of Parquet files.
+TABLE_SCHEMA = "tpjb-tables/1"
+
+
+def schema(kind: str) -> str:
+    """Today's schema of a kind of document."""
+    return f"{kind}/{len(_STEPS[kind]) + 1}"
+
+
+def read_document(path: Path, kind: str) -> Document:
+    """Content of a JSON file as of today's version; refused where it is none, or of a newer one."""
+    remedy = f"Give the folder as tpjb wrote it, or run the command again; {schema(kind)} is read"
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise BadInputError(f"{path}: is larger than {_LARGEST >> 20} MB. {remedy}.")
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read ({error.strerror}). {remedy}.") from error
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"{path}: is no JSON ({type(error).__name__}). {remedy}.") from error
+    stated = document.get("schema") if isinstance(document, dict) else None
+    steps = _STEPS[kind]
+    versions = [f"{kind}/{number}" for number in range(1, len(steps) + 2)]
+    if stated not in versions:
+        raise BadInputError(f"{path}: its schema is {str(stated)[:40]!r}. {remedy} and what is older.")
+    for step in steps[versions.index(stated) :]:
+        document = step(document)
+    return dict(document)

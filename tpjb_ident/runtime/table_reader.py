@@ -1,0 +1,163 @@
+"""The one reader of tables that come back: results, or another program's, held to the schema cell by cell.
+
+A table is refused, with file, line and column, where a line has another number of cells than there are names, a name is
+missing or twice there, a number is text, infinite or below what its quantity can be, or a value is outside its own
+interval. Columns that the schema does not know are passed on as text.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import itertools
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigdata.near_names import nearest_name
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Larger tables are refused before they are read [bytes].
+_LARGEST = 2**28
+_DELIMITERS = (",", ";", "\t")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", re.ASCII)
+_NOTHING = ("", "nan", "NaN")
+_INFINITE = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf}
+_TRUTH = {"True": True, "False": False, "": None}
+#: Name, column of the schema, and ending.
+_Header = list[tuple[str, Column | None, str]]
+
+
+def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str] | None = None) -> pd.DataFrame:
+    """Table of a CSV file; `needed` are columns that must be there, `misspelt` what a wrong name looks like.
+
+    Numbers are floats, NaN where a cell is empty; `lines` in the frame's attributes holds the line of each row.
+    """
+    import pandas as pd
+
+    rows = _lines(path)
+    number, names = next(rows, (1, []))
+    if not names:
+        raise BadInputError(f"{path.name}: is empty. Give a table with a line of names.")
+    header = _header(path, number, names, needed, misspelt)
+    cells: list[list[object]] = [[] for _ in names]
+    lines: list[int] = []
+    for number, row in rows:
+        place = f"{path.name}, line {number}"
+        if len(row) != len(names):
+            remedy = "A delimiter at a line's end counts as one; save the table again"
+            raise BadInputError(f"{place}: has {len(row)} cells, the names are {len(names)}. {remedy}.")
+        values = {}
+        for column, (name, known, ending), cell in zip(cells, header, row, strict=True):
+            values[name] = _value(cell.strip(), known, ending, f"{place}, {name}")
+            column.append(values[name])
+        _check_intervals(values, place)
+        lines.append(number)
+    frame = pd.DataFrame(dict(zip(names, cells, strict=True)), columns=names)
+    frame.attrs["lines"] = lines
+    return frame
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of every line that is neither blank nor a remark; the names come first."""
+    remedy = "Save it as CSV with a line of names, in UTF-8"
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise BadInputError(f"{path.name}: is larger than {_LARGEST >> 20} MB. Is it the right file?")
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            head = next((line for line in stream if _is_content(line)), "")
+            stream.seek(0)
+            reader = csv.reader(stream, delimiter=max(_DELIMITERS, key=head.count), strict=True)
+            for row in reader:
+                if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
+                    yield reader.line_num, row
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise BadInputError(f"{path.name}: cannot be read as a table ({reason}). {remedy}.") from error
+
+
+def _is_content(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _header(
+    path: Path, line: int, names: list[str], needed: Sequence[str], misspelt: re.Pattern[str] | None
+) -> _Header:
+    """What each column is by the schema; the names are stripped in place."""
+    names[:] = [name.strip() for name in names]
+    place = f"{path.name}, line {line}"
+    for index, name in enumerate(names):
+        if not name:
+            raise BadInputError(f"{place}: column {index + 1} has no name. Delete the delimiter, or name the column.")
+        if name in names[:index]:
+            raise BadInputError(f"{place}: column {name!r} is there twice. Delete one of them.")
+    for name in needed:
+        if name not in names:
+            near = nearest_name(name, names)
+            hint = f"; {near!r} is not it" if near else ""
+            raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
+    header = [(name, *column_of(name, path.stem)) for name in names]
+    for name, known, _ in header:
+        if known is None and misspelt is not None and misspelt.fullmatch(name):
+            near = nearest_name(name, _coefficient_names())
+            raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}?")
+    return header
+
+
+@functools.cache
+def _coefficient_names() -> tuple[str, ...]:
+    """Names of K and C with their endings."""
+    return tuple(name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi"))
+
+
+@functools.lru_cache(maxsize=4096)
+def column_of(name: str, table: str = "") -> tuple[Column | None, str]:
+    """Column of the schema that a name stands for, first of a table's own, and its ending; None where there is none."""
+    for column in (*TABLES.get(table, ()), *itertools.chain.from_iterable(TABLES.values())):
+        match = re.fullmatch(column.pattern(), name)
+        if match is not None:
+            ending = next((e for e in sorted(column.endings, key=len, reverse=True) if name.endswith(e)), "")
+            return column, ending
+    return None, ""
+
+
+def _value(cell: str, column: Column | None, ending: str, place: str) -> object:
+    """Text, truth value or number of a cell."""
+    if column is None or column.quantity == "text":
+        return cell
+    if column.quantity == "truth value":
+        if cell not in _TRUTH:
+            raise BadInputError(
+                f"{place}: {cell[:40]!r} is neither True nor False. Correct the cell, or leave it empty."
+            )
+        return _TRUTH[cell]
+    if cell in _NOTHING:
+        return math.nan
+    if cell in _INFINITE and column.may_be_infinite(ending):
+        return _INFINITE[cell]
+    number = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+    if not math.isfinite(number):
+        remedy = "Leave the cell empty where nothing is known"
+        raise BadInputError(f"{place}: {cell[:40]!r} is no number. {remedy}.")
+    least = column.least(ending)
+    if number < least:
+        raise BadInputError(f"{place}: {cell[:40]} is below {least:g}, the least that it can be. Correct the cell.")
+    return number
+
+
+def _check_intervals(values: dict[str, object], place: str) -> None:
+    """Refuse a value outside its own interval."""
+    for name, low in values.items():
+        base = name.removesuffix("_lo")
+        high, value = values.get(f"{base}_hi"), values.get(base, math.nan)
+        if base == name or not (isinstance(low, float) and isinstance(high, float) and isinstance(value, float)):
+            continue
+        if low > high or value < low or value > high:
+            shown = f"{value:g} is not within {low:g} to {high:g}"
+            raise BadInputError(f"{place}, {base}: {shown}, its interval. Correct the cells.")
