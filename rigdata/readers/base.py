@@ -10,12 +10,17 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem
+from rigdata.problem import Problem, refuse
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
 #: One request for more samples of one channel than this is rejected (it would be 4 GB) [samples].
 MAX_REQUEST = 2**29
+#: What a file may claim to hold, unpacked and as numbers of eight bytes: so much in any case [bytes], and so many times
+#: its size; a program that needs more sets them before it loads a campaign.
+CLAIM_FREE, CLAIM_MULTIPLES = 2**28, 64
+#: Bytes of a sample as it is read.
+SAMPLE = 8
 #: Sample rates beyond these are none [Hz]: times counted from them overflow.
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
@@ -82,6 +87,13 @@ class RunReader(Protocol):
 
     def problems(self) -> tuple[Problem, ...]:
         """Report what does not stop the run from being used."""
+
+
+def refuse_claim(claimed: int, size: int, file: str, run: str | None = None) -> None:
+    """Refuse a file of `size` bytes whose headers claim far more than it can hold, before any of it is read."""
+    if claimed > CLAIM_FREE + CLAIM_MULTIPLES * size:
+        fault = f"claims {claimed / 1e6:.0f} MB of samples in a file of {size / 1e6:.3g} MB"
+        raise refuse(file, "", fault, "Copy it again from the logger, or split the run", run)
 
 
 def undescribed(names: Sequence[str], members: str, file: str, run: str) -> tuple[Problem, ...]:

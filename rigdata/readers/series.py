@@ -13,7 +13,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, refuse
-from rigdata.readers.base import MAX_REQUEST, rate_of_time
+from rigdata.readers.base import SAMPLE, rate_of_time, refuse_claim
 
 #: Longer channels are in a file without a name, and are read from there in pieces [bytes].
 IN_MEMORY = 2**23
@@ -132,8 +132,8 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
         return Columns({channel.name: channel.values for channel in channels})
     master = max(timed, key=lambda channel: (channel.rate, len(channel)))
     clock = _rising_times(master, file, run)
-    if len(clock) * len(channels) > MAX_REQUEST:
-        raise refuse(file, "", f"has {len(clock)} samples of {len(channels)} channels", "Split the run", run)
+    stored = sum(len(channel) for channel in channels)
+    refuse_claim(SAMPLE * len(clock) * len(channels), SAMPLE * stored, file, run)
     values, interpolated = {}, []
     for channel in channels:
         values[channel.name] = channel.values

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from rigdata.problem import RigDataError
-from rigdata.readers.formats import mat
+from rigdata.readers import base
 from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.formats.mat import check_mat5
 
@@ -76,8 +76,8 @@ def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monke
     path = tmp_path / "bomb.mat"
     path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
     assert path.stat().st_size < 2**14
-    monkeypatch.setattr(mat, "LARGEST", 2**20)
-    with pytest.raises(RigDataError, match="unpacks to more than 1 MB"):
+    monkeypatch.setattr(base, "CLAIM_FREE", 2**20)
+    with pytest.raises(RigDataError, match="claims 34 MB"):
         read_foreign(path, "bomb.mat")
 
 

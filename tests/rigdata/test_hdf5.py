@@ -13,6 +13,7 @@ import pytest
 
 import rigdata
 from rigdata.problem import RigDataError
+from rigdata.readers import base
 from rigdata.readers.hdf5.guards import too_long_text
 from tests.manifests import PROBES, SWEEP, manifest
 from tpjb_ident.check.campaign import check_campaign
@@ -184,17 +185,20 @@ def test_records_of_every_kind_are_taken(tmp_path, store, value):
     assert reopened(tmp_path / "c.h5").record("X1A").values[5] == pytest.approx(value, nan_ok=True)
 
 
-def test_decompression_bombs(tmp_path):
+def test_decompression_bombs(tmp_path, monkeypatch):
     path = tmp_path / "c.h5"
     with changed(path, "X1A", "X1B") as group:
         group.create_dataset("X1A", shape=(10**13,), dtype="f8", chunks=(1000,), compression="gzip")
         group.create_dataset("X1B", shape=(N,), maxshape=(None,), dtype="f8", chunks=(10**9 // 2,))
-    refused(path, "X1A")
+    refused(path, "claims 80004000 MB")
+    monkeypatch.setattr(base, "CLAIM_FREE", 10**15)
+    refused(path, "X1A: claims 10000000000000 samples")
     with pytest.raises(RigDataError, match="chunks"):
         reopened(path).reader.read(["X1B"], 0, 10)
 
 
-def test_a_request_for_billions_of_samples_is_refused(tmp_path):
+def test_a_request_for_billions_of_samples_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(base, "CLAIM_FREE", 2**40)
     with changed(tmp_path / "c.h5", "X1A", "X1B") as group:
         for name in ("X1A", "X1B"):
             group.create_dataset(name, shape=(2**30,), dtype="f4", chunks=(1000,), fillvalue=1.0)

@@ -172,7 +172,7 @@ def test_a_table_alone_has_no_record_to_contradict(tmp_path):
 def test_documents_that_are_none_are_refused(tmp_path, text):
     path = tmp_path / "check.json"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(BadInputError, match="check.json"):
+    with pytest.raises(BadInputError, match=r"check\.json"):
         read_document(path, "tpjb-check")
 
 

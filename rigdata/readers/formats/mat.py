@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.problem import refuse
+from rigdata.problem import RigDataError, refuse
+from rigdata.readers.base import SAMPLE, refuse_claim
+from rigdata.readers.hdf5.guards import claimed_bytes, foreign_filters
 from rigdata.readers.series import Series, equidistant, is_time, seconds
 
 _RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
@@ -23,8 +25,6 @@ _UNITS = re.compile(r"unit|einheit|unite")
 _SHORTEST, _MOST_NAMES, _LONGEST = 8, 4096, 1000
 _DEEPEST = 4
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-#: Unpacked bytes of all variables above which a file is rejected.
-LARGEST = 2**31
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
 #: Number types of the format; text types come on top.
@@ -88,11 +88,25 @@ def _load(path: Path) -> dict[str, Any]:
         import h5py
 
         with h5py.File(path, "r", locking="best-effort") as file:
+            refuse_claim(_claimed(file, 0), path.stat().st_size, path.name)
             return _group(file, path, 0)
     from scipy.io import loadmat
 
     check_mat5(path)
     return {name: value for name, value in loadmat(path, simplify_cells=True).items() if not name.startswith("__")}
+
+
+def _claimed(group: Any, depth: int) -> int:
+    """Bytes that all datasets of a 7.3 file claim, links within the file counted every time."""
+    import h5py
+
+    claimed = 0
+    for name in group:
+        if name.startswith("#") or depth > _DEEPEST or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        item = group[name]
+        claimed += _claimed(item, depth + 1) if isinstance(item, h5py.Group) else claimed_bytes(item)
+    return claimed
 
 
 def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
@@ -134,8 +148,8 @@ def _cell_texts(item: Any) -> list[str]:
 
 
 def _is_inside(item: Any) -> bool:
-    """Whether a dataset's samples are in the file itself."""
-    return not (item.is_virtual or item.external)
+    """Whether a dataset's samples are in the file itself, and no foreign code unpacks them."""
+    return not (item.is_virtual or item.external or foreign_filters(item))
 
 
 def _is_text(item: Any) -> bool:
@@ -151,7 +165,7 @@ def _flattened(value: Any, name: str, depth: int) -> Iterator[tuple[str, np.ndar
         return
     array = np.asarray(value)
     if array.dtype.kind in "fiu" and array.size and array.ndim <= 2:
-        yield name, array.astype(float)
+        yield name, array.astype(float, copy=False)
     elif array.dtype.kind in "UO" and 0 < array.size <= _MOST_NAMES:
         cells = array.reshape(-1).tolist()
         if all(isinstance(cell, str) for cell in cells):
@@ -220,37 +234,40 @@ def check_mat5(path: Path) -> None:
 
     scipy (1.17) looks the type of an element up in a table without asking whether it is one: a wrong byte there, and
     the process is gone. So types, sizes and nesting are checked here by the layout of MathWorks' "MAT-File Format",
-    chapter 1; compressed variables are unpacked up to a limit, so that a small file cannot fill the memory.
+    chapter 1; compressed variables are unpacked as far as their own head claims, so that a small file cannot fill the
+    memory.
     """
     data = path.read_bytes()
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if len(data) < _HEADER or not any(data[:4]) or order is None:
         return  # version 4, or no MATLAB file
     walk = _Bytes(data, order, _HEADER, len(data))
-    limit = LARGEST
+    claimed = 0
     try:
         while walk.at < walk.end:
             kind, start, size = walk.element(frozenset({_MATRIX, _COMPRESSED}))
             if kind == _COMPRESSED:
-                plain = _unpacked(data[start : start + size], limit)
-                limit -= len(plain)
+                packed = data[start : start + size]
+                _, length = struct.unpack(f"{order}II", _unpacked(packed, 8))
+                claimed += SAMPLE * length  # small numbers take a byte each
+                refuse_claim(claimed, len(data), path.name)
+                plain = _unpacked(packed, length + 16)
                 _inner(_Bytes(plain, order, 0, len(plain)), 0)
             elif size:
                 _matrix(_Bytes(data, order, start, start + size), 0)
-    except ValueError as error:
+    except RigDataError:
+        raise
+    except (ValueError, struct.error) as error:
         remedy = "Copy it again from the logger"
         raise refuse(path.name, f"byte {walk.at}", f"is damaged: {error}", remedy) from error
 
 
 def _unpacked(packed: bytes, limit: int) -> bytes:
-    worker = zlib.decompressobj()
+    """The first bytes of a compressed variable, up to a limit."""
     try:
-        plain = worker.decompress(packed, limit + 1)
+        return zlib.decompressobj().decompress(packed, limit)
     except zlib.error as error:
         raise ValueError(f"a compressed variable cannot be unpacked ({error})") from error
-    if len(plain) > limit:
-        raise ValueError(f"unpacks to more than {LARGEST >> 20} MB")
-    return plain
 
 
 def _matrix(walk: _Bytes, depth: int) -> None:

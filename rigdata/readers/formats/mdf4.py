@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.readers.base import SAMPLE, refuse_claim
 from rigdata.readers.formats.sandbox import read_sandboxed
 from rigdata.readers.series import Series
 
@@ -37,6 +38,8 @@ def read_in_sandbox(path: Path) -> list[Series]:
 
     series = []
     with MDF(path) as file:
+        samples = sum(group.channel_group.cycles_nr * len(group.channels) for group in file.groups)
+        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
         for signal in file.iter_channels(skip_master=True):
             values = signal.samples
             if values.ndim == 1 and np.issubdtype(values.dtype, np.number):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rigdata.readers.base import SAMPLE, refuse_claim
 from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
 
 
@@ -23,11 +24,12 @@ def read_series(path: Path) -> list[Series]:
     columns, units = {}, {}
     with pq.ParquetFile(path) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
-        for column in schema:
-            if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
-                values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
-                columns[column.name] = to_temporary_file(values)
-                units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+        numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
+        refuse_claim(SAMPLE * rows * (len(numeric) + 1), path.stat().st_size, path.name)
+        for column in numeric:
+            values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
+            columns[column.name] = to_temporary_file(values)
+            units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
     clock = next(filter(is_time, columns), None)
     time = None if clock is None else seconds(columns.pop(clock), units[clock])
     rate = (schema.metadata or {}).get(b"sample_rate_hz")

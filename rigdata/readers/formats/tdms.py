@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.readers.base import SAMPLE, refuse_claim
 from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
 
 
@@ -28,6 +29,10 @@ def read_series(path: Path) -> list[Series]:
     series: list[Series] = []
     # opened here: npTDMS leaves a file open that it cannot read
     with path.open("rb") as stream, TdmsFile.open(stream) as file:
+        samples = 0
+        for group in file.groups():
+            samples += sum(len(channel) for channel in group.channels())
+        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
         for group in file.groups():
             channels = [c for c in group.channels() if np.issubdtype(c.dtype or object, np.number)]
             clock = next((c for c in channels if is_time(c.name) and len(c)), None)

@@ -6,13 +6,16 @@ can make it; so such files are found here, by the layout of the HDF5 File Format
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from rigdata.problem import refuse
+from rigdata.problem import RigDataError, refuse
+from rigdata.readers.base import SAMPLE
 
 #: With the version; three reserved bytes follow, which the library does not look at.
 _SIGNATURE, _RESERVED = b"GCOL\x01", b"\0\0\0"
@@ -24,6 +27,8 @@ _LARGEST_HEAP = 2**28
 #: the descriptions of type and shape.
 _REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 _MAX_STEPS = 64
+#: Filters that the library brings along.
+_FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 #: HDF5's class of texts (H5T_STRING), and the classes of what is stored in its own place: integers, floats, texts.
 TEXT = 3
 _PLAIN = (0, 1, TEXT)
@@ -135,6 +140,35 @@ def _parts(path: str) -> list[str]:
 def has_link(group: Any, name: str) -> bool:
     """Whether the group has such a link: a dangling or external one counts and is never followed."""
     return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))
+
+
+def claimed_bytes(member: Any) -> int:
+    """Bytes that a dataset claims to be, as numbers or as one stored chunk; zero of what is none."""
+    import h5py
+
+    if not isinstance(member, h5py.Dataset) or member.shape is None:
+        return 0
+    chunk = 0 if member.chunks is None else math.prod(member.chunks) * member.dtype.itemsize
+    return max(SAMPLE * math.prod(member.shape), chunk)
+
+
+def claimed_by_runs(handle: Any, runs: Sequence[str], names: Sequence[str]) -> int:
+    """Bytes that the described channels of all runs claim together; what cannot be opened is refused by its reader."""
+    import h5py
+
+    claimed = 0
+    for run, name in itertools.product(runs, names):
+        with contextlib.suppress(RigDataError, OSError, RuntimeError, KeyError, ValueError, TypeError):
+            member = resolve(handle, f"runs/{run}/{name}", "")
+            claimed += claimed_bytes(member) if isinstance(member, h5py.Dataset) else 0
+    return claimed
+
+
+def foreign_filters(dataset: Any) -> list[int]:
+    """Filters of a dataset that the HDF5 library does not bring along: they would load foreign code."""
+    creation = dataset.id.get_create_plist()
+    codes = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
+    return [code for code in codes if code not in _FILTERS]
 
 
 def chunk_bytes(group: Any, name: str) -> int:

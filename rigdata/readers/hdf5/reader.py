@@ -15,11 +15,19 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, undescribed
-from rigdata.readers.hdf5.guards import TEXT, broken_heap, chunk_bytes, has_link, is_plain, resolve, too_long_text
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, refuse_claim, undescribed
+from rigdata.readers.hdf5.guards import (
+    TEXT,
+    broken_heap,
+    chunk_bytes,
+    claimed_by_runs,
+    foreign_filters,
+    has_link,
+    is_plain,
+    resolve,
+    too_long_text,
+)
 
-#: Filters that the HDF5 library brings along; any other would load foreign code.
-_FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 _MAX_CHUNK = 256 * 2**20
 _MAX_TEXT = 8 * 2**20
 _PIECE = 2**20
@@ -87,6 +95,12 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
         manifest = _text_attribute(handle, "manifest", file)
         bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
+
+
+def refuse_claims(path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse a file whose runs claim more samples than it can hold."""
+    with open_readonly(path, path.name) as handle:
+        refuse_claim(claimed_by_runs(handle, runs, names), path.stat().st_size, path.name)
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:
@@ -222,10 +236,8 @@ class Hdf5Reader:
         """Reject data that is outside the file, or needs foreign code or vast memory to unpack."""
         if dataset.is_virtual or dataset.external:
             raise self._refuse(place, "holds its data in another file", "Copy the data into this file")
-        for code, *_ in _filters(dataset):
-            if code not in _FILTERS:
-                fault = f"needs HDF5 filter {code}, which is not a built-in one"
-                raise self._refuse(place, fault, "Use gzip")
+        for code in foreign_filters(dataset):
+            raise self._refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
         chunk = dataset.chunks
         if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
             raise self._refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")

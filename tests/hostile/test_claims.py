@@ -1,0 +1,84 @@
+"""Sizes that a header claims are summed before anything is read: refused in 2 s and 300 MB."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigdata import load_campaign
+from rigdata.problem import RigDataError
+from rigdata.readers import base
+from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.series import Series, on_one_clock
+from tests.hostile import claims
+from tests.hostile.fuzz_targets import CSV_MANIFEST
+
+ROOT = Path(__file__).parents[2]
+#: Seconds of processor time, and growth of memory [MB], that a file that is refused may take.
+SECONDS, MEGABYTES = 2.0, 300.0
+
+
+def manifest(runs: int) -> str:
+    """A manifest of clearance runs without times."""
+    head, _, _ = CSV_MANIFEST.partition("[channels.Zeit]")
+    return head + "".join(f'[[runs]]\nid = "c-{number + 1}"\nkind = "clearance"\n' for number in range(runs))
+
+
+@pytest.mark.slow
+def test_files_that_claim_gigabytes_are_refused_before_they_are_read(tmp_path):
+    paths = [claims.hdf5_campaign(tmp_path, manifest(8)), *(make(tmp_path) for make in claims.FOREIGN.values())]
+    assert max(path.stat().st_size for path in paths) < 1e6
+    command = [sys.executable, "-P", "-m", "tests.hostile.claims", *map(str, paths)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=ROOT)
+    answers = [line.split("\t") for line in done.stdout.splitlines()]
+    assert len(answers) == len(paths)
+    for path, (seconds, megabytes, answer) in zip(paths, answers, strict=True):
+        assert float(seconds) < SECONDS, path.name
+        assert float(megabytes) < MEGABYTES, path.name
+        assert f"{path.name}: claims" in answer
+
+
+def test_the_claims_of_all_runs_count_together(tmp_path, monkeypatch):
+    monkeypatch.setattr(base, "CLAIM_FREE", 8 * 2 * 1000 * 3)
+    monkeypatch.setattr(base, "CLAIM_MULTIPLES", 0)
+    for runs, is_refused in ((3, False), (4, True)):
+        folder = tmp_path / str(runs)
+        folder.mkdir()
+        path = claims.hdf5_campaign(folder, manifest(runs), runs, 1000)
+        if is_refused:
+            with pytest.raises(RigDataError, match=r"claims\.h5: claims 0 MB of samples"):
+                load_campaign(path)
+        else:
+            assert len(load_campaign(path).runs) == runs
+
+
+def test_links_within_the_file_count_every_time(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.setattr(base, "CLAIM_FREE", 0)
+    path = claims.hdf5_campaign(tmp_path, manifest(2), 1, 100_000)
+    size = path.stat().st_size
+    monkeypatch.setattr(base, "CLAIM_MULTIPLES", -(-8 * 2 * 100_000 // size))
+    with h5py.File(path, "a") as file:
+        file["runs/c-2"] = file["runs/c-1"]
+    with pytest.raises(RigDataError, match="claims 3 MB"):
+        load_campaign(path)
+
+
+@pytest.mark.parametrize("make", [claims.mat73, claims.mat73_chunk, claims.parquet])
+def test_each_format_is_refused_by_what_it_claims(make, tmp_path):
+    path = make(tmp_path, 2**25) if make is claims.parquet else make(tmp_path)
+    with pytest.raises(RigDataError, match=f"{path.name}: claims"):
+        read_foreign(path, path.name)
+
+
+def test_short_channels_are_not_spread_over_a_long_clock_without_limit():
+    clock = Series("fast", "", np.zeros(1000), np.arange(1000.0))
+    slow = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 999.0])) for i in range(300_000)]
+    with pytest.raises(RigDataError, match="claims 2400 MB"):
+        on_one_clock([clock, *slow], "x.tdms")
