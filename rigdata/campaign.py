@@ -278,7 +278,7 @@ def _load_hdf5(path: Path) -> Campaign:
     clock = next((c for c in manifest.channels.values() if c.quantity == "time"), None)
 
     def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
-        return Hdf5Reader(path, entry.id, path.name, rate, frozenset(manifest.channels), clock)
+        return Hdf5Reader(path, entry.id, path.name, rate, manifest.channels, clock)
 
     return _assembled(manifest, reader_of, problems, path=path, bearing_text=bearing, files=files)
 

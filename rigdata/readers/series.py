@@ -67,6 +67,7 @@ class Columns:
     values: dict[str, FloatArray] = field(repr=False)  #: (n,) each
     time: FloatArray | None = field(repr=False, default=None)  #: (n,), s
     problems: tuple[Problem, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)  #: as the file states them
 
     @property
     def nbytes(self) -> int:
@@ -123,13 +124,14 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
     channels = with_unique_names(series)
     if not channels:
         raise refuse(file, "", "holds no channel of numbers", "Export the run again, with its channels", run)
+    units = {channel.name: channel.unit for channel in channels}
     timed = [channel for channel in channels if channel.time is not None and len(channel) > 1]
     if not timed:
         lengths = {len(channel) for channel in channels}
         if len(lengths) > 1:
             fault = f"has channels of {len(lengths)} different lengths and no times"
             raise refuse(file, "", fault, "Export with a time channel, or channels of one length", run)
-        return Columns({channel.name: channel.values for channel in channels})
+        return Columns({channel.name: channel.values for channel in channels}, units=units)
     master = max(timed, key=lambda channel: (channel.rate, len(channel)))
     clock = _rising_times(master, file, run)
     stored = sum(len(channel) for channel in channels)
@@ -151,7 +153,7 @@ def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) ->
         names = ", ".join(interpolated[:8])
         fault = f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {names}"
         problems = (Problem("note", file, "", fault, "Nothing, if that is meant", run),)
-    return Columns(values, clock, problems)
+    return Columns(values, clock, problems, units)
 
 
 def _rising_times(channel: Series, file: str, run: str | None) -> FloatArray:

@@ -324,7 +324,7 @@ def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, n
     assert too_long_text(path, list(texts), block) is None
     path.write_bytes(data)
     assert too_long_text(path, list(texts), block) == name
-    with pytest.raises(RigDataError, match=f"root attribute {name}: claims a text longer than the file"):
+    with pytest.raises(RigDataError, match=f"attribute {name}: claims a text longer than the file"):
         rigdata.load_campaign(path)
 
 

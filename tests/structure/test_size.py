@@ -15,9 +15,9 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (111.1, 13_550),
+    "measurement": (112.3, 13_710),
     "model": (90.9, 12_050),
-    "rigdata": (62.3, 8_690),
+    "rigdata": (63.0, 8_780),
     "diagnosis": (42.6, 5_220),
     "cli": (25.4, 3_590),
     "report": (24.6, 3_270),

@@ -13,6 +13,7 @@ from rigdata.run import Run
 from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.consistency import check_housing, check_load_ratios, check_positions
 from tpjb_ident.check.findings import Finding, merge
+from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import report_inconsistent_channels
 from tpjb_ident.check.response import check_accelerometers, check_responses
@@ -72,6 +73,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> list[Obse
     if check_static_loads(observations):
         check_load_ratios(observations)
     check_positions(observations)
+    check_magnitudes(observations, campaign.housing_mass)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(observations)

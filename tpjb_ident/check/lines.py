@@ -168,7 +168,7 @@ def turning_frequency(time: FloatArray, values: FloatArray, nominal: float, line
     step = (count - 1) / span / padded
     reach = max(_WITHIN * nominal, 2.0 / span)
     reach = min([reach, *(abs(line - nominal) - _APART / span for line in lines)])
-    low, high = int(np.ceil((nominal - reach) / step)), int((nominal + reach) / step)
+    low, high = int(np.ceil((nominal - reach) / step)), min(int((nominal + reach) / step), padded // 2)
     if reach <= 0 or low < 1 or high - low < 4:
         return nominal
     columns = values[:count, finite]

@@ -16,6 +16,7 @@ from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, suffix_hint, undescribed
 from rigdata.readers.cached_reader import CachedReader
 from rigdata.readers.series import Columns, Series, on_one_clock
+from rigdata.stated_units import unit_problems
 
 #: Larger files are rejected: these formats are read whole [bytes].
 LARGEST = 2**31
@@ -79,4 +80,5 @@ class ForeignReader(CachedReader):
         """Which channels nobody describes, and what was interpolated."""
         columns = self._columns()
         extra = [name for name in columns.values if name not in self.channels]
-        return (*columns.problems, *undescribed(extra, "channels", self.file, self.run))
+        units = unit_problems(self.channels, columns.units, self.file, self.run)
+        return (*columns.problems, *units, *undescribed(extra, "channels", self.file, self.run))

@@ -23,12 +23,15 @@ _HEADER, _OBJECT = 16, 16
 #: Texts in attributes stand near the start or the end; the rest of a large file is samples [bytes].
 _SCANNED = 2**26
 _LARGEST_HEAP = 2**28
+_LONGEST_UNIT = 64
 #: A reference to a text: its length, the address of its heap, its number there; it follows its attribute's name, behind
 #: the descriptions of type and shape.
 _REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 _MAX_STEPS = 64
 #: Filters that the library brings along.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
+#: Attributes of a dataset that state its unit.
+UNIT = ("unit", "units", "Unit", "Units")
 #: HDF5's class of texts (H5T_STRING), and the classes of what is stored in its own place: integers, floats, texts.
 TEXT = 3
 _PLAIN = (0, 1, TEXT)
@@ -191,3 +194,11 @@ def is_plain(attribute: Any, most: int) -> bool:
     kind = attribute.get_type()
     is_within = kind.get_class() in _PLAIN and not (kind.get_class() == TEXT and kind.is_variable_str())
     return is_within and attribute.get_storage_size() <= most
+
+
+def is_text(attribute: Any, path: Path) -> bool:
+    """Whether an attribute is a text that can be read: stored where it is itself, or in a file scanned as a whole."""
+    kind = attribute.get_type()
+    if kind.get_class() != TEXT or attribute.shape != ():
+        return False
+    return is_plain(attribute, _LONGEST_UNIT) or (kind.is_variable_str() and path.stat().st_size <= 2 * _SCANNED)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,15 +18,18 @@ from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, refuse_claim, undescribed
 from rigdata.readers.hdf5.guards import (
     TEXT,
+    UNIT,
     broken_heap,
     chunk_bytes,
     claimed_by_runs,
     foreign_filters,
     has_link,
     is_plain,
+    is_text,
     resolve,
     too_long_text,
 )
+from rigdata.stated_units import unit_problems
 
 _MAX_CHUNK = 256 * 2**20
 _MAX_TEXT = 8 * 2**20
@@ -88,10 +91,10 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
     with open_readonly(path, file) as handle:
         if "manifest" not in handle.attrs:
             raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
-        damaged = too_long_text(path, ("manifest", "bearing"), handle.userblock_size)
+        damaged = too_long_text(path, ("manifest", "bearing", *UNIT), handle.userblock_size)
         if damaged is not None:
             fault = "claims a text longer than the file"
-            raise refuse(file, f"root attribute {damaged}", fault, "Copy the file again from the rig")
+            raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
         manifest = _text_attribute(handle, "manifest", file)
         bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
@@ -139,7 +142,7 @@ class Hdf5Reader:
     run: str
     base: str
     stated_rate: float | None = None
-    described: frozenset[str] = field(default=frozenset(), repr=False)
+    described: Mapping[str, Channel] = field(default_factory=dict, repr=False)
     clock: Channel | None = field(default=None, repr=False)
     cached_facts: dict[tuple[int, int], _Facts] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -360,9 +363,27 @@ class Hdf5Reader:
         return np.arange(start, stop) / self.rate()
 
     def problems(self) -> tuple[Problem, ...]:
-        """Tell which datasets nobody describes."""
+        """Tell which datasets nobody describes, and which state another unit than the manifest."""
         extra = [n for n in self._facts().members if n not in self.described]
-        return undescribed(extra, "datasets", self.file, self.run)
+        units = unit_problems(self.described, self._units(), self.file, self.run)
+        return (*units, *undescribed(extra, "datasets", self.file, self.run))
+
+    def _units(self) -> dict[str, str]:
+        """Units that datasets state in an attribute."""
+        units = {}
+        with self._group() as group:
+            for name in filter(self._facts(group).members.__contains__, self.described):
+                with suppress(RigDataError):  # raised when that channel is asked for
+                    attributes = self._dataset(group, name).attrs
+                    stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
+                    units[name] = _text(attributes[stated[0]]) if stated else ""
+        return units
+
+
+def _text(value: Any) -> str:
+    """A short attribute as text, "" where it is none."""
+    plain = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    return plain if isinstance(plain, str) else ""
 
 
 def _filters(dataset: Any) -> list[Any]:

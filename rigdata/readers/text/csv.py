@@ -19,6 +19,7 @@ from rigdata.readers.series import Columns
 from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
 from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
 from rigdata.readers.text.head import Head, find_head, split_line
+from rigdata.stated_units import unit_problems
 
 #: A file above this size is parsed column by column, not all channels at once [bytes].
 _LARGE_FILE = 2**29
@@ -109,7 +110,9 @@ class CsvReader(CachedReader):
     def problems(self) -> tuple[Problem, ...]:
         """What was repaired while parsing, and which columns nobody describes."""
         extra = [name for name in self.names() if name and name not in self.channels]
-        return (*self._columns(()).problems, *undescribed(extra, "columns", self.file, self.run))
+        head = self._head()
+        units = unit_problems(self.channels, dict(zip(head.names, head.units, strict=True)), self.file, self.run)
+        return (*self._columns(()).problems, *units, *undescribed(extra, "columns", self.file, self.run))
 
 
 @dataclass(frozen=True)

@@ -262,8 +262,9 @@ class _HeadFinder:
     def _units(self, header: _NamesLine, first: int, names: tuple[str, ...]) -> tuple[str, ...]:
         """Units from brackets in the names, or from the line below the names."""
         below: list[str] = []
-        if 0 < header.line < first:
-            below = split_line(self.lines[header.line], header.delimiter)
+        line = self.spec.units_line or header.line + 1
+        if 0 < header.line < line <= first:
+            below = split_line(self.lines[line - 1], header.delimiter)
         units = []
         for i, name in enumerate(names):
             bracket = _UNIT.search(name)

@@ -1,0 +1,109 @@
+"""Bounds of physics on the sizes of a run: rigs of every size pass, descriptions that are far off do not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.operating_point import OperatingPoint
+from tests.good_campaigns import SMALL_PLAN, rocker_rig
+from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
+from tpjb_ident.check.campaign import check_campaign
+from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, check_magnitudes
+from tpjb_ident.check.observation import observe
+from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.dynamic.settings import IdentifySettings
+
+
+def random_rig(rng: np.random.Generator, demo) -> Sizes:
+    """A bearing of 50 to 500 mm under 0.05 to 5 MPa, on cells or hanging free, excited by a share of its load."""
+    diameter, length = rng.uniform(0.05, 0.5), rng.uniform(0.4, 1.0)
+    clearance = diameter * rng.uniform(0.5e-3, 1.2e-3)
+    load = 10 ** rng.uniform(math.log10(5e4), math.log10(5e6)) * diameter**2 * length
+    stiffness = rng.uniform(2.0, 20.0) * load / clearance
+    dynamic = stiffness * math.hypot(1.0, rng.uniform(0.3, 5.0))
+    omega = 2 * math.pi * rng.uniform(5.0, 200.0)
+    motion = max(load * rng.uniform(0.02, 0.2) / dynamic, 5e-8)  # less is lost in the noise of any probe
+    film = motion * dynamic
+    cells = load / rng.uniform(2e-5, 3e-4)  # give way by 20 to 300 um under the static load
+    mass = 25.0 * (diameter / 0.11) ** 3
+    is_free = rng.random() < 0.3
+    acceleration = omega**2 * (motion if is_free else film / cells)
+    static = 0.0 if is_free else load
+    force = abs(film - mass * acceleration) if is_free else film
+    run = replace(demo, point=OperatingPoint(load, -math.pi / 2, 2 * math.pi * 22, omega))
+    travel = {"X1A": 2 * motion + 2e-7, "X1B": 2e-7}
+    return Sizes(run, motion, force, film, acceleration, static, travel)
+
+
+def test_rigs_of_every_size_pass():
+    demo = load_campaign(DEMO).of_kind("dynamic")[0]
+    rng = np.random.default_rng(1)
+    for _ in range(3000):
+        sizes = random_rig(rng, demo)
+        assert [*_probes(sizes), *_film(sizes), *_housing(sizes)] == [], sizes
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "severity"),
+    [
+        ({"motion": 9e-9}, "no motion", "error"),
+        ({"motion": 2.9e-8}, "no motion", "warning"),
+        ({"motion": 3.1e-8}, None, ""),
+        ({"motion": 1e-4}, "beyond clearance", "warning"),
+        ({"motion": 3e-4}, "beyond clearance", "error"),
+        ({"travel": {"X1B": 1.9e-8}}, "still X1B", "error"),
+        ({"travel": {"X1B": 9e-8}}, "still X1B", "warning"),
+        ({"travel": {"X1B": 9e-8}, "noise_free": True}, None, ""),
+        ({"acceleration": 2.6}, "soft cells", "error"),
+        ({"acceleration": 2.4}, None, ""),
+        ({"acceleration": 2.6, "static": 0.0}, None, ""),
+        ({"acceleration": 2.6, "motion": 4e-5}, None, ""),
+        ({"acceleration": 2e-4}, "stiff cells", "warning"),
+    ],
+)
+def test_each_bound_at_its_place(changes, key, severity):
+    demo = load_campaign(DEMO).of_kind("dynamic")[0]
+    run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796))
+    good = Sizes(run, 5e-6, 1e3, 1e3, 0.02, 5000.0, {"X1A": 5e-6, "X1B": 5e-6})
+    sizes = replace(good, **changes)
+    found = [*_probes(sizes), *_film(sizes), *_housing(sizes)]
+    assert [(f[0], f[1]) for f in found] == ([] if key is None else [(key, severity)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("names", "factor", "severity"),
+    [
+        (("X1A", "X1B"), 1000.0, "error"),
+        (("X1A", "X1B"), 0.01, "error"),
+        (("X1A",), 1000.0, "error"),
+        (("A1H", "A1V"), 0.01, "error"),
+    ],
+)
+def test_check_and_identify_both_name_a_description_that_is_far_off(tmp_path, names, factor, severity):
+    with h5py.File(DEMO) as file:
+        text = shortened(str(file.attrs["manifest"]), all_kinds=False)
+    path = written(tmp_path, scaled_sensors(text, names, factor), 1.0)
+    assert severity in {p.severity for p in check_campaign(path)}
+    points = identify(load_campaign(path), IdentifySettings(methods=(), method="ols")).points
+    assert all("records-contradicted" in p.quality for p in points)
+
+
+def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of):
+    campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=(), clearance=()))))
+    observations = [observe(run) for run in campaign.runs]
+    count = sum(len(o.report.found) for o in observations)
+    check_magnitudes(observations, campaign.housing_mass)
+    assert sum(len(o.report.found) for o in observations) == count
+    check_magnitudes(observations, 1600.0)
+    assert {o.report.found[-1].key for o in observations} == {"weight"}
+    slow = replace(campaign.runs[0], reader=replace(campaign.runs[0].reader, stated_rate=4000.0))
+    off = replace(observations[0], run=slow)
+    check_magnitudes([off], 30.0)
+    assert off.report.found[-1].problem.what.startswith("the file shows 1000 Hz, the manifest states 4000 Hz")
