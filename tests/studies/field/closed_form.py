@@ -1,0 +1,282 @@
+"""Rigs of the second field battery in closed form: H(w) = K - w^2 M + i w C between an actuator and a housing.
+
+The housing stands on its load cells or floats on stingers; shafts have inertia and compliance. The actuator makes lines
+or a course in time (late, switched, wandering, noise, sweep, multi-sine, blows), both taken through transfer functions
+in closed form. The truth of a point is H of the film at the set load.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from tests.studies.field.acquisition import Array, Campaign, Channel, Run, Signal, bearing_file, unit_vector
+
+Matrix = tuple[tuple[float, float], tuple[float, float]]
+NONE: Matrix = ((0.0, 0.0), (0.0, 0.0))
+#: Samples of a course per second, and how long it runs before and after the record [s].
+FINE, BEFORE, AFTER = 8000.0, 1.0, 0.25
+LOSS = 0.01
+
+
+@dataclass(frozen=True)
+class Film:
+    """K, C, M at the reference load [SI]; K grows with the load to the power 0.6, C to 0.2."""
+
+    k: Matrix
+    c: Matrix
+    m: Matrix = NONE
+    load: float = 5000.0
+
+    def h(self, frequency: Array | float, load: float) -> Array:
+        """Dynamic stiffness (..., 2, 2) [N/m]."""
+        w = 2 * np.pi * np.asarray(frequency, dtype=float)[..., None, None]
+        ratio = load / self.load if load > 0 and self.load > 0 else 1.0
+        k, c, m = np.array(self.k), np.array(self.c), np.array(self.m)
+        return np.asarray(k * ratio**0.6 - w**2 * m + 1j * w * c * ratio**0.2)
+
+
+USUAL = Film(((9.2e7, 5e6), (-7e6, 1.75e8)), ((3.6e5, 1.2e4), (-6e3, 4.5e5)))
+SMALL = Film(((6.1e6, 4e5), (-3e5, 1.1e7)), ((9e3, 3e2), (-2e2, 1.2e4)), load=300.0)
+LARGE = Film(((1.3e9, 6e7), (-9e7, 2.4e9)), ((1.1e7, 4e5), (-3e5, 1.6e7)), load=1.5e5)
+PLAIN = Film(((2.4e7, 6.5e7), (-6.1e7, 2.8e7)), ((3.1e5, 1e4), (1e4, 3.3e5)), load=0.0)
+NEGATIVE = Film(((-1.6e7, 5.5e7), (-2.9e7, 6.2e7)), ((2.6e5, -3e4), (-3e4, 3.4e5)), load=2000.0)
+HEAVY = Film(((2.2e7, 3e6), (-3e6, 3.1e7)), ((1.1e5, 2e4), (-2e4, 1.3e5)), ((260.0, 12.0), (-12.0, 300.0)), 3000.0)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig and its plan; amplitudes are shares of the clearance or of the drive's force."""
+
+    film: Film = USUAL
+    diameter: float = 0.1
+    clearance: float = 80e-6
+    speed: float = 22.0  #: [Hz]
+    loads: tuple[float, ...] = (5000.0,)
+    load_direction: float = -90.0
+    frequencies: tuple[float, ...] = (25.0, 45.0)
+    directions: tuple[float, ...] = (0.0, 45.0, 90.0, 135.0)
+    repeats: int = 1
+    mount: str = "cells"
+    mass: float = 30.0
+    springs: tuple[float, float] = (4e8, 6e8)
+    shaft_mass: float = 0.0
+    shaft_compliance: float = 0.0  #: of a floating stator's shaft [m/N]
+    static: bool = True  #: cells show the static load
+    excitation: str = "sine"
+    band: tuple[float, float] = (6.0, 90.0)
+    notch: tuple[float, float] = (0.0, 0.0)  #: part of the band without power [Hz]
+    amplitude: float = 0.015  #: of the displacement: of a sine the amplitude, of a band the deviation
+    share: tuple[float, float] = (0.0, 1.0)  #: of the record with drive
+    wander: float = 0.0  #: of the drive's frequency [Hz]
+    senses: tuple[float, ...] = (1.0, -1.0)  #: of blows
+    detune: float = 0.0  #: real less stated frequency [Hz]
+    lines: tuple[tuple[float, float], ...] = ()  #: further forces on the film: [Hz], share of the drive
+    unbalance: float = 0.2
+    runout: float = 0.003
+    load_scatter: float = 0.003
+    stiffness_scatter: float = 0.0  #: of the film from run to run
+    temperatures: tuple[float, float] = (40.0, 40.0)  #: of the first and the last run, stated
+    warming: float = 0.0  #: from the first to the last run, not stated [K]
+    tilt: float = 0.0
+    switch: float = 1.0  #: the drive's level after half of the record, at another phase
+    seconds: float = 4.0
+    with_clearance: bool = False
+    head: tuple[str, ...] = ()  #: further lines of [housing]
+
+
+@dataclass(frozen=True)
+class Test:
+    """One dynamic run of a plan."""
+
+    load: float
+    frequency: float
+    direction: float
+
+
+def response(rig: Rig, frequency: Array, load: float, scale: float = 1.0) -> dict[str, Array]:
+    """Motion and cell force per actuator force, by quantity (..., 2, 2); signs of the contract."""
+    h = rig.film.h(frequency, load) * scale
+    w2, unit = (2 * np.pi * frequency[..., None, None]) ** 2, np.eye(2)
+    if rig.mount == "floating":
+        moved = unit + rig.shaft_compliance * h  # housing against shaft, per displacement
+        d = np.linalg.inv(rig.mass * w2 * moved - h)
+        acceleration = w2 * moved @ d
+    else:
+        compliance = unit / (np.array(rig.springs)[:, None] * (1 + 1j * LOSS) - rig.mass * w2)
+        d = np.linalg.inv(h - w2 * rig.shaft_mass * (unit + compliance @ h))
+        acceleration = -w2 * compliance @ h @ d
+    return {"displacement": d, "acceleration": acceleration, "force": h @ d - rig.mass * acceleration}
+
+
+def sine_course(rig: Rig, test: Test, t: Array, rng: np.random.Generator) -> Array:
+    """A sine that may wander by half a period over the record, and go on at another level and phase (n,)."""
+    swing = rig.wander * rig.seconds / np.pi * np.sin(np.pi * t / rig.seconds)
+    later = (rig.switch != 1.0) * (t > rig.seconds / 2)
+    phase = 2 * np.pi * (test.frequency + rig.detune) * t + swing + rng.uniform(0, 6.28) + 1.7 * later
+    return np.asarray(np.sin(phase) * np.where(later, rig.switch, 1.0) * np.clip((t + BEFORE) / 0.3, 0, 1))
+
+
+def band_course(rig: Rig, t: Array, rng: np.random.Generator) -> Array:
+    """Noise, a sweep, a multi-sine of 1 s or blows of 6 ms (n,)."""
+    low, high = rig.band
+    if rig.excitation == "random":
+        f = np.fft.rfftfreq(len(t), 1 / FINE)
+        power = (f >= low) & (f <= high) & ~((f > rig.notch[0]) & (f < rig.notch[1]))
+        return np.fft.irfft(np.fft.rfft(rng.standard_normal(len(t))) * power, len(t))
+    if rig.excitation == "multisine":
+        tones = np.arange(low, high + 0.5)
+        return np.asarray(np.cos(2 * np.pi * np.outer(t, tones) + rng.uniform(0, 6.28, len(tones))).sum(axis=1))
+    if rig.excitation == "sweep":
+        begin, end = rig.share[0] * rig.seconds, rig.share[1] * rig.seconds
+        part = np.clip((t - begin) / (end - begin), 0, 1)
+        return np.asarray(np.sin(2 * np.pi * (low * part + (high - low) * part**2 / 2) * (end - begin)))
+    total = np.zeros_like(t)
+    for i, blow in enumerate(np.arange(0.1, rig.seconds - 0.35, 0.45) + rng.uniform(0, 0.05)):
+        shape = np.cos(np.pi * (t - blow) / 6e-3) ** 2 * (abs(t - blow) < 3e-3)
+        total += rig.senses[i % len(rig.senses)] * shape
+    return total
+
+
+def through(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> dict[str, CubicSpline]:
+    """Signals of a course, by quantity functions of time to (n, 2); `film` is the run's load and scale of H."""
+    t = np.arange(round((BEFORE + rig.seconds + AFTER) * FINE)) / FINE - BEFORE
+    drive = sine_course(rig, test, t, rng) if rig.excitation == "sine" else band_course(rig, t, rng)
+    start = -np.inf if rig.share[0] == 0 else rig.share[0] * rig.seconds
+    end = np.inf if rig.share[1] == 1 else rig.share[1] * rig.seconds
+    drive = drive * np.clip((t - start) / 0.02, 0, 1) * np.clip((end - t) / 0.02, 0, 1)
+    n = len(t)
+    spectrum = np.fft.rfft(drive, 2 * n)[:, None] * unit_vector(test.direction)
+    matrices = response(rig, np.fft.rfftfreq(2 * n, 1 / FINE), *film)
+    matrices["command"] = np.broadcast_to(np.eye(2), matrices["force"].shape)
+    signals = {q: np.fft.irfft((m @ spectrum[..., None])[..., 0], axis=0)[:n] for q, m in matrices.items()}
+    motion = signals["displacement"][(t >= 0) & (t < rig.seconds)]
+    largest = np.abs(motion).max() if rig.excitation in ("impact", "sine") else 0.0
+    size = largest or np.sqrt(np.mean(np.sum(motion**2, axis=1)))
+    return {q: CubicSpline(t, rig.amplitude * rig.clearance / size * values) for q, values in signals.items()}
+
+
+def lines_of(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> list[tuple[float, Any]]:
+    """Every steady line: frequency and phasors by quantity (2,); the drive's first."""
+    f, circle = np.array(test.frequency + rig.detune), np.array([1.0, -1.0j])
+    matrices = response(rig, f, *film)
+    aside = unit_vector(test.direction + 90) * 0.04 * np.exp(1j * rng.uniform(0, 6.28))
+    push = (unit_vector(test.direction) + aside) * np.exp(1j * rng.uniform(0, 6.28))
+    push = push * rig.amplitude * rig.clearance / np.linalg.norm(matrices["displacement"] @ push)
+    force = float(np.linalg.norm(rig.film.h(f, test.load) @ matrices["displacement"] @ push))
+    lines = [(float(f), {q: m @ push for q, m in matrices.items()})]
+    for frequency, share in ((rig.speed, rig.unbalance), *rig.lines):
+        on_film = share * force * circle * np.exp(1j * rng.uniform(0, 6.28))
+        matrices = response(rig, np.array(frequency), *film)
+        d = np.linalg.solve(rig.film.h(frequency, film[0]) * film[1], on_film)
+        push = np.linalg.solve(matrices["displacement"], d)
+        lines.append((frequency, {q: m @ push for q, m in matrices.items()}))
+    for order in (1, 2, 3):
+        eccentric = rig.runout / order * rig.clearance * circle * np.exp(1j * rng.uniform(0, 6.28))
+        lines.append((order * rig.speed, {"displacement": eccentric}))
+    return lines
+
+
+def signal(rig: Rig, test: Test, rng: np.random.Generator) -> Signal:
+    """Everything that a run's sensors could see."""
+    load = test.load * (1 + rig.load_scatter * rng.standard_normal())
+    pull = unit_vector(rig.load_direction + np.degrees(rig.load_scatter * rng.standard_normal()))
+    film = (load, 1 + rig.stiffness_scatter * rng.standard_normal())
+    steady = lines_of(rig, test, rng, film)
+    courses: dict[str, CubicSpline] = {}
+    if (rig.excitation, rig.share, rig.wander, rig.switch) != ("sine", (0.0, 1.0), 0.0, 1.0):
+        steady, courses = steady[1:], through(rig, test, rng, film)
+    means = {"displacement": 0.5 * rig.clearance * pull * (test.load > 0), "force": load * pull * rig.static}
+
+    def values(quantity: str, times: Array) -> Array:
+        total = np.zeros((2, len(times))) + means.get(quantity, np.zeros(2))[:, None]
+        for frequency, phasors in steady:
+            if quantity in phasors:
+                total += np.real(phasors[quantity][:, None] * np.exp(2j * np.pi * frequency * times))
+        return total + courses[quantity](times).T if quantity in courses else total
+
+    return values
+
+
+def clearance_sweep(rig: Rig) -> Signal:
+    """A small load goes round once; the shaft lies against five stiff pads at the clearance."""
+    normals = np.array([unit_vector(-90 + 72 * i) for i in range(5)])
+    load = 0.05 * max(rig.film.load, 100.0)
+    stiffness = load / (0.004 * rig.clearance)
+
+    def values(quantity: str, times: Array) -> Array:
+        angle = 2 * np.pi * times / times[-1]
+        push = load * np.array([np.cos(angle), np.sin(angle)])
+        if quantity != "displacement":
+            return push * (quantity == "force")
+        place = rig.clearance * push / load
+        for _ in range(60):  # Newton on springs that only push
+            over = np.maximum(normals @ place - rig.clearance, 0.0)
+            missing = push - stiffness * normals.T @ over - 1e-4 * stiffness * place
+            k = np.einsum("pn,pi,pj->nij", (over > 0) * stiffness, normals, normals) + 1e-4 * stiffness * np.eye(2)
+            place = place + np.linalg.solve(k, missing.T[..., None])[..., 0].T
+        return np.asarray(place)
+
+    return values
+
+
+def channels_of(rig: Rig, probes: tuple[float, ...] = (45.0, 135.0), stage: float = 0.0) -> tuple[Channel, ...]:
+    """The usual sensors: probes at their angles, cells and accelerometers at `stage` and 90 deg more [deg]."""
+    channels = [Channel(f"X1{'ABCDEF'[i]}", "displacement", axis) for i, axis in enumerate(probes)]
+    for letter, quantity in (("L", "force"), ("A", "acceleration")):
+        channels += [Channel(letter + "1H", quantity, stage), Channel(letter + "1V", quantity, stage + 90)]
+    if rig.excitation != "sine":
+        channels += [Channel("CMDX", "command", 0.0), Channel("CMDY", "command", 90.0)]
+    return tuple(channels)
+
+
+def noise_of(rig: Rig) -> dict[str, float]:
+    """Usual noise of a sample, by quantity."""
+    force = rig.amplitude * rig.clearance * float(np.abs(np.diag(rig.film.h(rig.frequencies[0], rig.film.load))).mean())
+    return {"displacement": 3e-4 * rig.clearance, "force": 0.01 * force, "acceleration": 4e-3, "command": 2e-3 * force}
+
+
+def tests_of(rig: Rig) -> list[Test]:
+    """The plan."""
+    frequencies = rig.frequencies if rig.excitation == "sine" else (sum(rig.band) / 2,)
+    points = [(load, f) for load in rig.loads for f in frequencies]
+    return [Test(load, f, direction) for load, f in points for direction in rig.directions * rig.repeats]
+
+
+def campaign(rig: Rig, channels: tuple[Channel, ...], seed: list[int]) -> Campaign:
+    """All runs of a rig."""
+    rng = np.random.default_rng(seed)
+    return campaign_of(rig, [signal(rig, test, rng) for test in tests_of(rig)], channels)
+
+
+def campaign_of(rig: Rig, signals: list[Signal], channels: tuple[Channel, ...]) -> Campaign:
+    """Signals of all runs with what the manifest says of them."""
+    runs = []
+    for i, (test, values) in enumerate(zip(tests_of(rig), signals)):
+        lines = [f'kind = "dynamic"\nshaft_speed = "{rig.speed:g} Hz"\nstatic_load = "{test.load:g} N"']
+        lines += [f'static_load_direction = "{rig.load_direction:g} deg"']
+        lines += [f'excitation_direction = "{test.direction:g} deg"']
+        if rig.excitation == "sine":
+            lines += [f'excitation_frequency = "{test.frequency:g} Hz"']
+        else:
+            lines += [f'excitation = "{rig.excitation}"\nexcitation_band = "{rig.band[0]:g}..{rig.band[1]:g} Hz"']
+        part, (cold, warm) = i / max(len(signals) - 1, 1), rig.temperatures
+        stated = cold + (warm - cold) * part
+        lines += [f'temperature = "{stated:g} degC"'] if warm != cold else []
+        name = f"d-{i:02d}-{test.load:g}-{test.frequency:g}-{test.direction:g}"
+        runs.append(Run(name, tuple(lines), values, rig.seconds, stated + rig.warming * part, rig.tilt))
+    if rig.with_clearance:
+        runs.append(Run("c-1", ('kind = "clearance"',), clearance_sweep(rig), 8.0))
+    head = ("[housing]", f'mass = "{rig.mass:g} kg"', *rig.head)
+    off = rig.detune if rig.excitation == "sine" else 0.0
+    bearing = bearing_file(rig.diameter, rig.clearance)
+    return Campaign(head, bearing, channels, tuple(runs), lambda w, f: rig.film.h(f + off, w), lambda f: f + off)
+
+
+def changed(channels: tuple[Channel, ...], names: str, **entries: Any) -> tuple[Channel, ...]:
+    """The same channels, those whose name begins with one of the words of `names` with other entries."""
+    starts = tuple(names.split())
+    return tuple(replace(c, **entries) if c.name.startswith(starts) else c for c in channels)

@@ -1,0 +1,94 @@
+"""The generators of the second field battery against closed forms, finer steps and the balance of power."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+from scipy.interpolate import CubicSpline
+
+from tests.studies.field import closed_form as cf
+from tests.studies.field import marched as mr
+
+PLAN = cf.Rig(load_scatter=0.0, frequencies=(25.0,), directions=(0.0, 70.0), seconds=2.0, runout=0.0, speed=97.0)
+HEAVY = replace(PLAN, shaft_mass=200.0, mass=120.0, unbalance=0.001)
+LINEAR = mr.CubicFilm()
+
+
+def stiffness(rig, signals, begin=0.0):
+    """H at 25 Hz by plain least squares on what noise-free sensors see (2, 2)."""
+    t = np.arange(round(begin * 2000), round(rig.seconds * 2000)) / 2000
+    lines = [f(2 * np.pi * n * t) for n in (25.0, rig.speed) for f in (np.cos, np.sin)]
+    design = np.column_stack([np.ones_like(t), *lines])
+
+    def phasor(signal, quantity):
+        part = np.linalg.lstsq(design, signal(quantity, t).T, rcond=None)[0]
+        return part[1] - 1j * part[2]
+
+    d = np.array([phasor(s, "displacement") for s in signals])
+    force = np.array([phasor(s, "force") + rig.mass * phasor(s, "acceleration") for s in signals])
+    return np.linalg.solve(d, force).T
+
+
+@pytest.mark.parametrize(
+    ("changes", "begin", "tolerance"),
+    [
+        ({}, 0.0, 1e-9),
+        ({"film": cf.HEAVY, "mount": "floating", "mass": 60.0}, 0.0, 1e-9),
+        ({"film": cf.NEGATIVE, "springs": (3e7, 4e7), "shaft_mass": 300.0}, 0.0, 1e-9),
+        ({"share": (0.3, 1.0)}, 0.8, 1e-4),
+        ({"share": (0.3, 1.0), "mount": "floating"}, 0.8, 1e-4),
+    ],
+)
+def test_h_is_recovered_from_signals_without_noise(changes, begin, tolerance):
+    rig = replace(PLAN, **changes)
+    signals = [cf.signal(rig, cf.Test(5000.0, 25.0, a), np.random.default_rng(1)) for a in rig.directions]
+    h = rig.film.h(25.0, 5000.0)
+    np.testing.assert_allclose(stiffness(rig, signals, begin), h, atol=tolerance * np.abs(h).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "tolerance"), [(LINEAR, 1e-5), (mr.ShortBearing(), 2e-3)])
+@pytest.mark.parametrize("mount", ["cells", "floating"])
+def test_a_march_has_the_stiffness_of_its_linearised_film(law, tolerance, mount):
+    rig = replace(HEAVY, mount=mount, amplitude=0.005)
+    linear, signals = mr.records(law, rig)
+    h = linear.film.h(25.0, 5000.0)
+    np.testing.assert_allclose(stiffness(rig, signals), h, atol=tolerance * np.abs(h).max())
+
+
+@pytest.mark.slow
+def test_half_the_step_gives_the_same_motion():
+    rig, push = mr.plan(mr.ShortBearing(), replace(HEAVY, seconds=0.1, amplitude=0.05))
+    halves = CubicSpline(np.arange(len(push)), push)(np.arange(0, len(push) - 0.9, 0.5))
+    coarse = mr.march(mr.ShortBearing(), rig, push)["displacement"]
+    fine = mr.march(mr.ShortBearing(), rig, halves, 2 * mr.STEPS)["displacement"][::2]
+    settled = slice(2000, None)  # the push begins at once
+    assert np.abs(coarse - fine)[settled].max() < 1e-6 * np.ptp(fine, axis=0).max()
+
+
+@pytest.mark.slow
+def test_power_of_the_drive_goes_into_motion_film_and_cells():
+    rig, push = mr.plan(LINEAR, replace(HEAVY, seconds=0.2, amplitude=0.05, unbalance=0.0))
+    s = mr.march(LINEAR, rig, push)
+    weight = rig.loads[0] * cf.unit_vector(-90.0)[:, None]
+    d, v = s["displacement"], s["shaft_speed"] - s["housing_speed"]
+    film = np.einsum("ij,njr->nir", rig.film.k, d) + np.einsum("ij,njr->nir", rig.film.c, v)
+    springs = np.array(rig.springs)[:, None]
+    kinetic = rig.shaft_mass * s["shaft_speed"] ** 2 + rig.mass * s["housing_speed"] ** 2
+    stored = 0.5 * (kinetic + springs * s["housing"] ** 2).sum(axis=1)
+    power = (push[0:-1:2] + weight) * s["shaft_speed"] - film * v - mr.CELL_DAMPING * s["housing_speed"] ** 2
+    work = trapezoid(power.sum(axis=1), dx=1 / mr.STEPS, axis=0)
+    drive = trapezoid(np.abs(push[0:-1:2] * s["shaft_speed"]).sum(axis=1), dx=1 / mr.STEPS, axis=0)
+    assert (np.abs(stored[-1] - stored[0] - work) < 1e-4 * drive).all()
+
+
+@pytest.mark.parametrize("e", [0.1, 0.6])
+def test_short_bearing_carries_as_ocvirk_says(e):
+    law = mr.ShortBearing()
+    radial, aside = law.force(np.array([[e * law.clearance], [0.0]]), np.zeros((2, 1)))[:, 0] / law.scale
+    assert radial == pytest.approx(4 * e**2 / (1 - e**2) ** 2)
+    assert aside == pytest.approx(-math.pi * e / (1 - e**2) ** 1.5)
