@@ -19,13 +19,15 @@ from rigdata.problem import Problem
 from rigdata.run import Run
 from rigdata.virtual_rig import Fault, Noise, Timing
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
+from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge
-from tpjb_ident.check.lines import fit_lines, strongest_line
+from tpjb_ident.check.lines import excitation_line, steady_level, strongest_line
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
-from tpjb_ident.dynamic.records.line_fit import GLITCH_MARGIN, fit_without_glitches
-from tpjb_ident.dynamic.records.windows import line_design
+from tpjb_ident.phasors.bad_samples import robust_fit
+from tpjb_ident.phasors.run_phasors import run_phasors
+from tpjb_ident.phasors.windows import line_design
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
 PROBES = (
@@ -84,22 +86,34 @@ def test_coarse_converters_repeat_readings_without_being_stuck():
     assert statistics.longest_flat >= 1500 > 10 * statistics.expected_flat()
 
 
-def test_lines_are_fitted_through_glitches_and_gaps():
+def test_the_excitation_is_seen_through_bad_samples_and_gaps_channel_by_channel():
     rng = np.random.default_rng(2)
     time = np.arange(2000) / 1000
     wave = 3.0 + 0.5 * np.cos(2 * np.pi * 25 * time + 0.3) + 0.2 * np.sin(2 * np.pi * 22 * time)
-    values = np.stack([wave, wave], axis=1) + 0.01 * rng.normal(size=(2000, 2))
-    values[300:340, 0] += 5.0
-    values[900:1000, 0] = np.nan
-    values[:, 1] = np.nan
-    lines = fit_lines(time, values, [25.0, 22.0, 44.0])
-    assert lines.mean[0] == pytest.approx(3.0, abs=2e-3)
-    assert lines.phasor[0] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
-    used = fit_without_glitches(line_design(time, np.array([25.0, 22.0, 44.0])), values[:, :1], np.array([np.inf])).kept
-    assert np.isfinite(values[:, 0]).sum() - used.sum() == 40 + 2 * GLITCH_MARGIN
-    assert lines.floor[0] < 2e-3
-    assert np.isnan(lines.mean[1])
-    assert np.isnan(lines.phasor[1])
+    described = channels(("displacement", "force"))
+    data = {name: wave + 0.01 * rng.normal(size=2000) for name in described}
+    data["DX"][300:340] += 5.0
+    data["DX"][900:1000] = np.nan
+    data["DY"] = np.full(2000, np.nan)
+    phasors = run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)
+    lines = excitation_line(phasors, 0, [described[name] for name in ("FX", "DX", "DY")])
+    assert lines.mean[:2] == pytest.approx(3.0, abs=2e-3)
+    assert lines.phasor[:2] == pytest.approx(0.5 * np.exp(0.3j), abs=2e-3)
+    assert (lines.floor[:2] < 2e-3).all()
+    assert lines.scatter[:2] == pytest.approx(0.01, rel=0.1)
+    assert np.isnan([lines.mean[2], lines.floor[2], lines.scatter[2]]).all()
+    assert np.isnan(lines.phasor[2])
+    used = robust_fit(line_design(time, np.array([25.0, 22.0, 44.0])), data["DX"], np.inf).used
+    assert 1900 - used.sum() == 40 + 2 * 3
+
+
+def test_the_mean_of_a_run_without_excitation_leaves_the_shafts_lines_out():
+    time = np.arange(1030) / 1000
+    values = (3.0 + np.cos(2 * np.pi * 22 * time) + 0.3 * np.cos(2 * np.pi * 50 * time))[:, None]
+    lines = steady_level(values, 1000.0, [22.0, 44.0, 50.0])
+    assert lines.mean == pytest.approx(3.0, abs=1e-9)
+    assert lines.scatter[0] < 1e-9
+    assert np.isnan(lines.phasor).all()
 
 
 def test_strongest_line():

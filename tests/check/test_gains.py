@@ -11,6 +11,7 @@ import pytest
 import rigdata
 from rigdata.virtual_rig import Fault, Noise
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, stiff_rig, written
+from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.gain_evidence import (
     Difference,
@@ -20,10 +21,11 @@ from tpjb_ident.check.gain_evidence import (
     dynamic_difference,
     static_difference,
 )
-from tpjb_ident.check.lines import fit_lines, turning_frequency
+from tpjb_ident.check.lines import excitation_line
 from tpjb_ident.check.observation import observe
 from tpjb_ident.check.one_gain import gain_of_run, wrong_gains
 from tpjb_ident.check.run_gains import probe_centres
+from tpjb_ident.phasors.run_phasors import run_phasors
 
 OMEGA = 2 * math.pi * 25.0
 H = STIFFNESS + 1j * OMEGA * DAMPING
@@ -242,38 +244,14 @@ def test_a_difference_is_weighted_by_its_covariance():
     assert made.evidence(np.zeros(2)) == Evidence(0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("true", [21.7, 21.987, 22.0, 22.02, 22.3])
-def test_the_turning_frequency_is_found(true):
-    time = np.arange(4000) / 1000.0
-    values = np.stack(
-        [1e-6 * np.cos(2 * np.pi * true * time + p) + 2e-6 * np.cos(2 * np.pi * 25 * time) for p in (0, 1)]
-    )
-    noisy = values.T + 2e-8 * np.random.default_rng(1).standard_normal((4000, 2)) + 1e-3
-    assert turning_frequency(time, noisy, 22.0, [25.0, 50.0]) == pytest.approx(true, abs=0.01 / 4)
-
-
-def test_a_turning_frequency_that_does_not_show_is_the_stated_one():
-    time = np.arange(2000) / 1000.0
-    noise = np.random.default_rng(2).standard_normal((2000, 2))
-    line = 50 * np.cos(2 * np.pi * 22.1 * time)[:, None]
-    assert turning_frequency(time, noise, 22.0, [25.0]) == 22.0
-    assert turning_frequency(time, noise + line, 22.0, [22.5]) == 22.0
-    assert turning_frequency(time, noise + line, 0.0, [25.0]) == 0.0
-    assert turning_frequency(time[:40], (noise + line)[:40], 22.0, [25.0]) == 22.0
-    assert turning_frequency(time, np.full((2000, 2), np.nan), 22.0, [25.0]) == 22.0
-    assert turning_frequency(time, np.empty((2000, 0)), 22.0, [25.0]) == 22.0
-
-
 def test_a_speed_that_misses_its_set_point_leaks_nothing_into_the_line_wanted():
     time = np.arange(2000) / 1000.0
-    values = (np.cos(2 * np.pi * 25 * time) + 3 * np.cos(2 * np.pi * 22.02 * time + 1))[:, None]
-    leaky = abs(fit_lines(time, values, [25.0, 22.0, 44.0]).phasor[0] - 1)
-    free = abs(fit_lines(time, values, [25.0, 22.0, 44.0], [22.0, 44.0]).phasor[0] - 1)
-    assert free < 2e-3 < leaky / 5
-    assert abs(fit_lines(time, values, [25.0, 22.02], [22.02]).phasor[0] - 1) < 1e-10
-    # too near to the line wanted to be let free
-    near = fit_lines(time, values, [25.0, 24.5], [24.5])
-    assert near.phasor == pytest.approx(fit_lines(time, values, [25.0, 24.5]).phasor)
+    wave = np.cos(2 * np.pi * 25 * time) + 3 * np.cos(2 * np.pi * 22.04 * time + 1)
+    described = channels(("displacement", "force"))
+    noise = 1e-5 * np.random.default_rng(1).standard_normal((4, 2000))
+    run = run_of(HeldReader(dict(zip(described, wave + noise)), 1000.0), described)
+    phasor = excitation_line(run_phasors(run, 0.0), 0, list(described.values())).phasor
+    assert np.abs(phasor - 1).max() < 2e-3
 
 
 def test_probe_centres_come_from_a_load_that_goes_around(tmp_path):

@@ -11,10 +11,9 @@ from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans
-from tpjb_ident.dynamic.records.lines import known_lines
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
+from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.run_data import RunPhasors, vector_channels
 
 H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
 
@@ -41,11 +40,12 @@ def run(name: str, direction: float, force: float = 500.0, h=FILM_H, load: float
 
 def run_phasors(name: str, direction: float, load: float, D, F, mean_force) -> RunPhasors:
     """A run of six windows at 25 Hz, from its phasors (6, 2) and its mean force [N]."""
-    mean, noise = np.tile(mean_force, (WINDOWS, 1)), np.full((WINDOWS, 2), 1e-9)
-    blocks = (PhasorBlock(z[:, None, :], mean, noise, np.zeros(WINDOWS)) for z in (D, F))
+    z, mean = np.concatenate([D, F], axis=1)[:, None], np.tile(mean_force, (WINDOWS, 2))
+    noise = np.full((WINDOWS, 4), 1e-9)
     start, speeds = 0.25 * np.arange(WINDOWS), np.full(WINDOWS, 22.0)
-    lines = known_lines((25.0,), 22.0, 1000.0)
-    return RunPhasors(name, place(load), direction, lines, start, 0.25, *blocks, None, 30.0, speeds)
+    lines, channels = known_lines((25.0,), 22.0, 1000.0), vector_channels(("displacement", "force"))
+    parts = (channels, z, mean, noise, np.zeros((WINDOWS, 4)), 30.0, speeds)
+    return RunPhasors(name, place(load), direction, lines, start, 0.25, *parts)
 
 
 def place(load: float = 5000.0, direction: float = -90.0, speed: float = 22.0, excitation: float = 25.0):

@@ -140,9 +140,9 @@ def test_whatever_the_method_loads_are_brought_to_their_set_points(runs, result)
 
 
 def test_windows_that_are_rejected_in_one_direction_are_pointed_out(runs):
-    spoilt = runs[2].cell_force.phasors.copy()
-    spoilt[:3] += 300.0 * np.exp(2j * np.arange(3))[:, None, None]
-    odd = replace(runs[2], cell_force=replace(runs[2].cell_force, phasors=spoilt))
+    spoilt = runs[2].z.copy()
+    spoilt[:3, :, 2:] += 300.0 * np.exp(2j * np.arange(3))[:, None, None]
+    odd = replace(runs[2], z=spoilt)
     (p,) = found([*runs[:2], odd, *runs[3:5]]).points
     (told,) = [c for c in p.quality if c == "directional-rejection"]
     assert "gather in 3000-2 at 72 deg (" in told.detail

@@ -13,10 +13,10 @@ from tests.rigs.field_rig import Device, Rig, record
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.identify import identify
-from tpjb_ident.dynamic.records.reading_cache import beginning_of, with_kept_beginning
-from tpjb_ident.dynamic.records.run_data import PhasorSettings
 from tpjb_ident.dynamic.runs.run_store import packed, unpacked
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
+from tpjb_ident.phasors.run_data import PhasorSettings
 
 QUICK = replace(Rig(), seconds=1.5, rate=1000.0)
 ONE_LOAD = plans_of(loads=(5000.0,))

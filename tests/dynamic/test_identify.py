@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.record import VectorRows
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points
-from tests.rigs.held_run import HeldRun
+from tests.rigs.held_run import HeldReader, channels, columns, lines_in_noise, run_of
 from tpjb_ident.dynamic.identify import identify
-from tpjb_ident.dynamic.records.extraction import extract
-from tpjb_ident.dynamic.records.line_tuning import speeds_from_runout
-from tpjb_ident.dynamic.records.lines import known_lines
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.phasors.extraction import extract
+from tpjb_ident.phasors.frequency import speeds_from_runout
+from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.phasors.windows import RecordTooShortError
 
 
 def stiffness(point):
@@ -127,25 +126,24 @@ def test_a_bad_window_is_listed_with_its_run_time_and_reason(campaign):
 def _with_offset(campaign, run_id: str, begin: float, end: float):
     """The campaign with a false 30 Hz line in one run's displacements for a while (too regular for a glitch)."""
 
-    class Spoiled(type(campaign.run(run_id))):
-        def row_reader(self, quantities):
-            return VectorRows(self, quantities)
+    class Spoiled:
+        def __init__(self, reader):
+            self._reader = reader
 
-        def vector(self, quantity, start=None, stop=None):
-            record = super().vector(quantity, start, stop)
-            if quantity != "displacement":
-                return record
-            t = record.time
+        def __getattr__(self, name):
+            return getattr(self._reader, name)
+
+        def read(self, names, start, stop):
+            t = self.time(start, stop)
             wave = np.where((t >= begin) & (t < end), 1.5e-6 * np.cos(2 * np.pi * 30 * t + 1.0), 0.0)
-            return replace(record, values=record.values + wave[:, None])
+            slopes = {c.name: c.slope for c in run.channels.values() if c.quantity == "displacement"}
+            return [
+                v + wave / slopes[n] if n in slopes else v for n, v in zip(names, self._reader.read(names, start, stop))
+            ]
 
-    runs = []
-    for run in campaign.runs:
-        if run.id == run_id:
-            fields = {name: getattr(run, name) for name in run.__dataclass_fields__}
-            run = Spoiled(**fields)
-        runs.append(run)
-    return replace(campaign, runs=tuple(runs))
+    run = campaign.run(run_id)
+    spoiled = replace(run, reader=Spoiled(run.reader))
+    return replace(campaign, runs=tuple(spoiled if r.id == run_id else r for r in campaign.runs))
 
 
 def test_records_too_short_are_refused_with_the_length_needed(campaign):
@@ -178,39 +176,28 @@ def test_several_excitation_lines_in_one_record_are_told_apart(campaign_of):
         assert "unexpected lines" in p.quality
 
 
-class DriftingRun(HeldRun):
+def drifting_run(drift, tach_noise):
     """The shaft slows down by 0.2 Hz in 20 s; the tachometer is noisier than that, or not there at all."""
-
-    tach_noise: float | None = 0.05
-    drift = -0.01
-
-    def __post_init__(self):
-        super().__post_init__()
-        rng = np.random.default_rng(self.seed)
-        shaft = np.exp(2j * np.pi * (22.0 * self.time + 0.5 * self.drift * self.time**2))
-        drive = np.exp(2j * np.pi * 25.0 * self.time)
-        lines = np.outer(drive, [1.0, 0.5j]).real + np.outer(shaft, [2.0, -2.0j]).real
-        self.data["displacement"] = 1e-6 * (lines + 0.05 * rng.standard_normal((self.length, 2)))
-
-    def speed(self, start=None, stop=None):
-        if self.tach_noise is None:
-            return None
-        record = super().speed(start, stop)
-        turns = self.tach_noise * np.random.default_rng(start or 0).standard_normal()
-        return replace(record, values=record.values + 2 * np.pi * (turns + self.drift * record.time))
+    rate, seconds = 1000.0, 20.0
+    data = lines_in_noise(3, rate, seconds)
+    time = np.arange(round(seconds * rate)) / rate
+    shaft = np.exp(2j * np.pi * (22.0 * time + 0.5 * drift * time**2))
+    lines = np.outer(np.exp(2j * np.pi * 25.0 * time), [1.0, 0.5j]).real + np.outer(shaft, [2.0, -2.0j]).real
+    rng = np.random.default_rng(3)
+    data["displacement"] = 1e-6 * (lines + 0.05 * rng.standard_normal((len(time), 2)))
+    turns = np.repeat((tach_noise or 0.0) * rng.standard_normal(20), 1000)
+    speed = 2 * np.pi * (22.0 + turns + drift * time)
+    described = channels(list(data), speed=tach_noise is not None)
+    return run_of(HeldReader(columns(data) | {"K1": speed}, rate), described)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tach_noise", [0.05, None])
 def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
-    class Run(DriftingRun):
-        pass
-
-    Run.tach_noise = tach_noise
-    run = Run("a", 3, sample_rate=1000.0, seconds=20.0)
+    run = drifting_run(-0.01, tach_noise)
     first = extract(run, 30.0, PhasorSettings(), known_lines((25.0,), 22.0, run.sample_rate))
     speeds, doubt = speeds_from_runout(first, run.sample_rate)
-    expected = 22.0 + Run.drift * (first.start + first.length / 2)
+    expected = 22.0 - 0.01 * (first.start + first.length / 2)
     np.testing.assert_allclose(speeds, expected, atol=0.006)
     assert doubt < 1e-3
     phasors = run_phasors(run, 30.0)
@@ -220,10 +207,7 @@ def test_a_drifting_shaft_is_followed_by_its_runout(tach_noise):
 
 
 def test_a_noisy_tachometer_is_no_drift():
-    class Run(DriftingRun):
-        drift = 0.0
-
-    assert "speed drifts" not in run_phasors(Run("a", 3, sample_rate=1000.0, seconds=20.0), 30.0).conditions
+    assert "speed drifts" not in run_phasors(drifting_run(0.0, 0.05), 30.0).conditions
 
 
 @pytest.mark.slow
@@ -266,26 +250,19 @@ def test_a_refusal_travels_whole_between_processes():
 def test_memory_does_not_grow_with_the_record():
     import tracemalloc
 
-    from rigdata.record import VectorRecord
-
-    class Stream(HeldRun):
+    class Stream(HeldReader):
         """Makes its samples when they are asked for."""
 
-        def __post_init__(self) -> None:
-            super().__post_init__()
-            self.block = {q: values[:50_000] for q, values in self.data.items()}
-            self.length = 6_000_000
-            self.data.clear()
+        def length(self):
+            return 6_000_000
 
-        def vector(self, quantity, start=None, stop=None):
-            index = np.arange(*slice(start, stop).indices(self.length))
-            time = index / self.sample_rate
-            return VectorRecord(quantity, self.block[quantity][index % 50_000], time, self.sample_rate, ("A", "B"))
+        def read(self, names, start, stop):
+            index = np.arange(start, stop) % 50_000
+            return [self.data[name][index] for name in names]
 
-        def speed(self, start=None, stop=None):
-            return None
-
-    stream = Stream("long", 1, seconds=5.0)  # 5 s of lines that fit into the block a whole number of times
+    # 5 s of lines that fit into the block a whole number of times
+    block = lines_in_noise(1, 10_000.0, 5.0)
+    stream = run_of(Stream(columns(block), 10_000.0), channels(list(block)))
     whole = 3 * 2 * 8 * stream.length
     tracemalloc.start()
     phasors = run_phasors(stream, 30.0, PhasorSettings())

@@ -15,8 +15,8 @@ from tests.dynamic.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
-from tpjb_ident.dynamic.records.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
 from tpjb_ident.dynamic.runs.point_data import finite_mean, group, point_data
+from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
 
 NORMAL = 1.959963984540054  # of 95 %
 

@@ -15,10 +15,10 @@ from tests.dynamic import phasor_cases
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
-from tpjb_ident.dynamic.records.lines import Line, LineSet, LineSettings, known_lines
-from tpjb_ident.dynamic.records.windows import WindowSettings, line_design, plan_windows, variance_inflation
 from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
 from tpjb_ident.dynamic.runs.baseline import Baseline
+from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
+from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
 
 K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
 C = np.array([[4e5, 2e4], [-1e4, 6e5]])

@@ -34,9 +34,9 @@ from tpjb_ident.dynamic.corrections.mains import (
 from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
-from tpjb_ident.dynamic.records.line_means import mains_line
-from tpjb_ident.dynamic.records.lines import LineSettings, known_lines
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import mains_line
+from tpjb_ident.phasors.lines import LineSettings, known_lines
 
 OMEGA = 2 * math.pi * 50.0
 PATTERN = 1e-7 * np.array([1.0 + 0.5j, -0.6j])

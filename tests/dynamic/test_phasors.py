@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tpjb_ident.dynamic.records.lines import LineSettings, known_lines
-from tpjb_ident.dynamic.records.phasors import LineFitter, fit_uneven
-from tpjb_ident.dynamic.records.run_data import oil_force
-from tpjb_ident.dynamic.records.windows import (
+from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
+from tpjb_ident.phasors.lines import LineSettings, known_lines
+from tpjb_ident.phasors.run_data import oil_force
+from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
     plan_windows,
@@ -39,7 +39,7 @@ def fit(values: np.ndarray, length: int):
 def test_exact_lines_are_found_in_every_window_with_the_phase_of_the_run():
     block = fit(record(1000), 250)
     for i, z in enumerate(TRUE.values()):
-        np.testing.assert_allclose(block.phasors[:, i], np.tile(z, (4, 1)), rtol=0, atol=1e-11)
+        np.testing.assert_allclose(block.z[:, i], np.tile(z, (4, 1)), rtol=0, atol=1e-11)
     np.testing.assert_allclose(block.mean[:, 0], 700 + 4 * (np.arange(4) + 0.4995 - 0.0) * 0.25, atol=2e-3)
 
 
@@ -49,8 +49,8 @@ def test_phasors_have_the_sign_of_a_positive_damper():
     x = 1e-6 * np.cos(omega * t + 0.7)
     velocity = -1e-6 * omega * np.sin(omega * t + 0.7)
     fitter = LineFitter(500, RATE, np.array([25.0]))
-    d = fitter.fit(np.stack([x, x])[:, None], np.zeros(1)).phasors[0, 0, 0]
-    f = fitter.fit(np.stack([k * x + c * velocity] * 2)[:, None], np.zeros(1)).phasors[0, 0, 0]
+    d = fitter.fit(np.stack([x, x])[:, None], np.zeros(1)).z[0, 0, 0]
+    f = fitter.fit(np.stack([k * x + c * velocity] * 2)[:, None], np.zeros(1)).z[0, 0, 0]
     assert (f / d).imag / omega == pytest.approx(c, rel=1e-9)
 
 
@@ -64,11 +64,11 @@ def test_leaving_out_few_samples_gives_what_the_long_robust_way_gives(seed: int,
     monkeypatch.setattr(LineFitter, "_without_few", lambda *_: None)
     robust = fit(values, 4000)
     assert (quick.lost < 0.1).all()
-    assert np.abs(quick.phasors - robust.phasors).max() < 2e-4  # the noise of a phasor is 4e-4
+    assert np.abs(quick.z - robust.z).max() < 2e-4  # the noise of a phasor is 4e-4
     assert np.abs(quick.lost - robust.lost).max() < 3e-3
     monkeypatch.undo()
     clean = fit(record(8000, 0.02, seed), 4000)
-    assert np.abs(quick.phasors - clean.phasors).max() < 2e-3
+    assert np.abs(quick.z - clean.z).max() < 2e-3
 
 
 def test_uneven_times_are_fitted_where_they_are():
@@ -79,8 +79,8 @@ def test_uneven_times_are_fitted_where_they_are():
     values = np.stack(
         [sum((z[a] * np.exp(2j * np.pi * f * t)).real for f, z in TRUE.items()) for a in range(2)], axis=1
     )
-    block = fit_uneven(values[keep], t[keep], np.array(list(TRUE)), 0.0)
-    np.testing.assert_allclose(block.phasors[0, 0], TRUE[25.0], atol=1e-9)
+    block = fit_uneven(values[keep].T, t[keep], np.array(list(TRUE)), 0.0)
+    np.testing.assert_allclose(block.z[0, 0], TRUE[25.0], atol=1e-9)
 
 
 def test_lines_that_coincide_are_merged_or_reported():

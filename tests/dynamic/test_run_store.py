@@ -18,10 +18,10 @@ from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
 from tests.good_campaigns import directions, written
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
 from tpjb_ident.dynamic.runs import finished_runs, run_jobs
 from tpjb_ident.dynamic.runs.run_jobs import all_runs as shelved_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
+from tpjb_ident.phasors.run_phasors import PhasorSettings
 from tpjb_ident.runtime.executors import local_workers
 
 TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")

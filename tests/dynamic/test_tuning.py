@@ -10,9 +10,10 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tests.dynamic.phasor_cases import complex_normal
-from tpjb_ident.dynamic.records import extra_lines
-from tpjb_ident.dynamic.records.extra_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
-from tpjb_ident.dynamic.records.line_tuning import (
+from tpjb_ident.phasors import extra_lines
+from tpjb_ident.phasors.channel_times import Samples
+from tpjb_ident.phasors.extra_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
+from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,
     MAX_WINDOW_SLIP,
@@ -21,9 +22,10 @@ from tpjb_ident.dynamic.records.line_tuning import (
     speeds_from_runout,
     tuned,
 )
-from tpjb_ident.dynamic.records.lines import known_lines
-from tpjb_ident.dynamic.records.phasors import LineFitter, PhasorBlock
-from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.line_fit import LineFitter
+from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, vector_channels
+from tpjb_ident.phasors.whole_record import fitted_whole
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
 START = LENGTH * np.arange(WINDOWS)
@@ -33,21 +35,24 @@ NAMES = ["excitation", *(line.name for line in LINES.nuisance)]
 POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * 25.0)
 
 
-def block(turns, noise=1e-3, size=1.0):
+def block(turns, size=1.0):
     """Phasors of all lines, each turning as `turns` says of its name [cycles at the windows' starts]."""
     z = size * complex_normal(np.random.default_rng(1), len(NAMES), 2)
     z /= np.linalg.norm(z, axis=1)[:, None] / size
     phase = np.stack([np.broadcast_to(turns.get(name, 0.0), WINDOWS) for name in NAMES], axis=1)
-    shape = (WINDOWS, 2)
-    return PhasorBlock(
-        z * np.exp(2j * math.pi * phase)[:, :, None], np.zeros(shape), np.full(shape, noise), np.zeros(WINDOWS)
-    )
+    return z * np.exp(2j * math.pi * phase)[:, :, None]
 
 
-def run_of(force=None, displacement=None, speeds=22.0, noise=1e-3, acceleration=None):
+def run_of(force=None, displacement=None, speeds=22.0, noise=1e-3):
     speeds = np.broadcast_to(np.asarray(speeds, dtype=float), WINDOWS).copy()
-    return RunPhasors("r", POINT, 0.0, LINES, START, LENGTH, block(displacement or {}, noise),
-                      block(force or {}, noise, 100.0), acceleration, 30.0, speeds)  # fmt: skip
+    z = np.concatenate([block(displacement or {}), block(force or {}, 100.0)], axis=2)
+    return in_channels(z, np.full((WINDOWS, 4), noise), START, LENGTH, speeds)
+
+
+def in_channels(z, scale, start, length, speeds):
+    """A run of probes and cells along X and Y."""
+    none, described = np.zeros(scale.shape), vector_channels(("displacement", "force"))
+    return RunPhasors("r", POINT, 0.0, LINES, start, length, described, z, none, scale, none, 30.0, speeds)
 
 
 def test_a_frequency_error_is_the_advance_of_the_phase():
@@ -86,15 +91,14 @@ def test_phasors_are_turned_to_other_frequencies_as_a_new_fit_would():
     true = known_lines((25.008,), 22.0, RATE)
     wave = np.outer([2.0, -1.0], np.cos(2 * math.pi * 25.008 * t + 0.4))
     rows = wave.reshape(2, WINDOWS, -1)
+    rows = np.concatenate([rows, rows])
     fits = [LineFitter(400, RATE, lines.frequencies).fit(rows, START) for lines in (LINES, true)]
-    run = RunPhasors("r", POINT, 0.0, LINES, START, LENGTH, fits[0], fits[0], fits[0], 30.0, np.full(WINDOWS, 22.0))
+    run = in_channels(fits[0].z, fits[0].scale, START, LENGTH, np.full(WINDOWS, 22.0))
     corrected = retuned(run, true)
-    assert np.abs(fits[0].phasors - fits[1].phasors)[:, 0].max() > 0.1
-    for found in (corrected.displacement, corrected.cell_force, corrected.acceleration):
-        np.testing.assert_allclose(found.phasors[:, 0], fits[1].phasors[:, 0], atol=2e-3)
-        np.testing.assert_array_equal(found.phasors[:, 1], fits[0].phasors[:, 1])
+    assert np.abs(fits[0].z - fits[1].z)[:, 0].max() > 0.1
+    np.testing.assert_allclose(corrected.z[:, 0], fits[1].z[:, 0], atol=2e-3)
+    np.testing.assert_array_equal(corrected.z[:, 1], fits[0].z[:, 1])
     assert corrected.lines is true
-    assert retuned(replace(run, acceleration=None), true).acceleration is None
     for share, done in ((0.99, True), (1.01, False), (-1.01, False)):
         other = known_lines((25.0 + share * MAX_RETUNED / LENGTH,), 22.0, RATE)
         assert (retuned(run, other) is not None) is done
@@ -104,7 +108,8 @@ def test_phasors_are_turned_to_other_frequencies_as_a_new_fit_would():
 def test_a_run_that_fits_needs_no_second_look():
     assert tuned(_Rate(), run_of(), (25.0,), 22.0, PhasorSettings()) is None
     # a slip of a hundredth of a turn over the whole run is borne, and five hundredths of the shaft's
-    calm = run_of({"excitation": 0.99 * MAX_SLIP / SPAN * START}, {"1X": 4.9 * MAX_SLIP / SPAN * START})
+    turning = {"excitation": 0.99 * MAX_SLIP / SPAN * START, "1X": 4.9 * MAX_SLIP / SPAN * START}
+    calm = run_of(turning, turning)
     assert tuned(_Rate(), calm, (25.0,), 22.0, PhasorSettings()) is None
 
 
@@ -117,24 +122,23 @@ class _Rate:
 
 def test_a_second_fit_takes_the_frequencies_that_the_phases_show():
     slip = 1.05 * MAX_SLIP / SPAN
-    found = tuned(_Rate(), run_of({"excitation": slip * START}), (25.0,), 22.0, PhasorSettings())
+    turning = {"excitation": slip * START}
+    found = tuned(_Rate(), run_of(turning, turning), (25.0,), 22.0, PhasorSettings())
     assert found.lines.excitation[0].frequency == pytest.approx(25.0 + slip, abs=1e-9)
     assert found.lines.speed == 22.0
     assert found.follow is None
     assert found.conditions == ("excitation off set point",)
     assert "excitation found at 25.002 Hz, set point 25 Hz" in found.conditions[0].detail
-    shaft = tuned(_Rate(), run_of({}, {"1X": -5.1 * MAX_SLIP / SPAN * START}), (25.0,), 22.0, PhasorSettings())
+    turning_shaft = {"1X": -5.1 * MAX_SLIP / SPAN * START}
+    shaft = tuned(_Rate(), run_of(turning_shaft, turning_shaft), (25.0,), 22.0, PhasorSettings())
     assert shaft.lines.speed == pytest.approx(22.0 - 5.1 * MAX_SLIP / SPAN, abs=1e-9)
     assert shaft.lines.excitation[0].frequency == 25.0
     assert shaft.conditions == ()
     # lines that were found before are fitted along again
     extra = known_lines((25.0,), 22.0, RATE, extra=(71.5,))
-    wide = run_of({"excitation": slip * START})
-    more = {
-        name: replace(getattr(wide, name), phasors=np.pad(getattr(wide, name).phasors, ((0, 0), (0, 1), (0, 0))))
-        for name in ("displacement", "cell_force")
-    }
-    again = tuned(_Rate(), replace(wide, lines=extra, **more), (25.0,), 22.0, PhasorSettings())
+    wide = run_of(turning, turning)
+    more = np.pad(wide.z, ((0, 0), (0, 1), (0, 0)))
+    again = tuned(_Rate(), replace(wide, lines=extra, z=more), (25.0,), 22.0, PhasorSettings())
     assert [line.frequency for line in again.lines.nuisance if line.name == "found"] == [71.5]
 
 
@@ -153,7 +157,7 @@ def test_a_shaft_that_changes_its_speed_is_followed_by_its_runout():
     # error of a phasor component over its size, in radians, over the time between windows
     assert doubt == pytest.approx(1e-3 / math.sqrt(LENGTH * RATE) / (2 * math.pi * LENGTH))
     gap = run_of({}, {"1X": bent(rate)})
-    gap.displacement.phasors[5] = np.nan
+    gap.z[5] = np.nan
     holed, _ = speeds_from_runout(gap, RATE)
     assert np.flatnonzero(np.isnan(holed)).tolist() == [5]
     np.testing.assert_allclose(np.delete(holed, [0, 4, 5, 6, 11]), np.delete(true, [0, 4, 5, 6, 11]), atol=1e-9)
@@ -170,7 +174,7 @@ def test_where_there_is_no_runout_line_the_tachometer_is_asked():
     few = replace(run_of(), lines=coincident)
     assert speeds_from_runout(few, RATE) is None
     short = run_of()
-    short.displacement.phasors[2:] = np.nan
+    short.z[2:] = np.nan
     assert speeds_from_runout(short, RATE) is None
     drifting = np.linspace(21.9, 22.1, WINDOWS)
     found = tuned(_Rate(), replace(few, speeds=drifting), (22.0,), 22.0, PhasorSettings())
@@ -193,27 +197,6 @@ def test_a_drift_counts_once_it_turns_a_window_or_is_clear_of_the_noise(share, f
     assert (found is not None and found.follow is not None) is followed
 
 
-@dataclass
-class Heard:
-    """A run in memory."""
-
-    force: np.ndarray
-    displacement: np.ndarray
-    sample_rate: float = RATE
-
-    @property
-    def length(self):
-        return len(self.force)
-
-    def vector(self, quantity, start, stop):
-        return _Values(getattr(self, quantity)[start:stop])
-
-
-@dataclass
-class _Values:
-    values: np.ndarray
-
-
 N = 4096
 TIME = np.arange(N) / RATE
 
@@ -227,15 +210,18 @@ def heard(force=(), displacement=(), noise=1e-4):
         wave = known + sum(a * np.cos(2 * math.pi * f * TIME + f) for f, a in lines)
         values = np.stack([wave, 0.6 * wave], axis=1)
         rows.append(values + 3.0 * TIME[:, None] + 700.0 + noise * rng.standard_normal((N, 2)))
-    run = Heard(*rows)
-    fitter = LineFitter(N, RATE, LINES.frequencies)
-    fits = [fitter.fit(v.T[:, None], np.zeros(1)) for v in (run.displacement, run.force)]
-    result = RunPhasors("r", POINT, 0.0, LINES, np.zeros(1), N / RATE, *fits, None, 30.0, np.full(1, 22.0))
-    return run, result
+    force, displacement = rows
+    return np.concatenate([displacement.T, force.T])
+
+
+def fitted(rows):
+    """The record in one fit, and as a run of one window."""
+    record = fitted_whole(Samples(rows, None, None), RATE, LINES.frequencies)
+    return record, in_channels(record.fit.z, record.fit.scale, np.zeros(1), N / RATE, np.full(1, 22.0))
 
 
 def lines_in(*args, **keywords):
-    return unexpected_lines(*heard(*args, **keywords))
+    return unexpected_lines(*fitted(heard(*args, **keywords)))
 
 
 def test_lines_that_nobody_mentioned_are_found_in_either_quantity():
@@ -261,18 +247,17 @@ def test_a_line_too_small_to_bend_the_excitation_does_not_matter(share, found):
 
 
 def test_glitches_and_slow_movements_hide_no_line_and_make_none():
-    run, result = heard([(61.3, 0.02)])
-    for values in (run.force, run.displacement):
-        values[1000:1003] += 5.0
-        values += 2.0 * (TIME[:, None] - 1.5) ** 3
-    extra, _ = unexpected_lines(run, result)
+    rows = heard([(61.3, 0.02)])
+    rows[:, 1000:1003] += 5.0
+    rows += 2.0 * (TIME - 1.5) ** 3
+    extra, _ = unexpected_lines(*fitted(rows))
     np.testing.assert_allclose(extra, [61.3], atol=0.02)
-    run.force[17] = np.nan
-    assert unexpected_lines(run, result) == ((), ())
-    run.displacement += 0.1 * np.cos(2 * math.pi * 36.4 * TIME)[:, None]
-    np.testing.assert_allclose(unexpected_lines(run, result)[0], [36.4], atol=0.02)
-    empty = replace(result, displacement=replace(result.displacement, phasors=np.nan * result.displacement.phasors))
-    assert unexpected_lines(run, empty) == ((), ())
+    rows[2, 17] = np.nan
+    rows[:2] += 0.1 * np.cos(2 * math.pi * 36.4 * TIME)
+    np.testing.assert_allclose(unexpected_lines(*fitted(rows))[0], [36.4, 61.3], atol=0.02)
+    record, result = fitted(heard([], [(61.3, 0.02)]))
+    empty = replace(result, z=result.z * np.array([np.nan, np.nan, 1.0, 1.0]))
+    assert unexpected_lines(record, empty) == ((), ())
 
 
 def test_a_second_harmonic_on_the_excitation_is_told():

@@ -15,7 +15,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (112.3, 13_710),
+    "measurement": (113.2, 13_840),
     "model": (90.9, 12_050),
     "rigdata": (63.0, 8_780),
     "diagnosis": (42.6, 5_220),

@@ -16,8 +16,12 @@ from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines, fit_lines, strongest_line, turning_frequency
+from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, steady_level, strongest_line
 from tpjb_ident.check.signals import check_clock, check_signal, needed
+from tpjb_ident.errors import TpjbError
+from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_phasors import run_phasors
+from tpjb_ident.phasors.windows import RecordTooShortError
 
 #: Samples read at a time; signs and lines are judged on the first block [samples].
 _BLOCK = 2**19
@@ -55,8 +59,11 @@ class Observation:
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
 
-def observe(run: Run, driven: Sequence[float] = ()) -> Observation:
-    """Read every channel of `run` once, block by block, and judge each by itself."""
+def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Observation:
+    """Read every channel of `run` once, block by block, and judge each by itself.
+
+    `phasors` are those of identification, of which an excitation line is meant; without them a dynamic run is fitted.
+    """
     report = Reporter(run)
     try:
         length = run.length
@@ -71,7 +78,9 @@ def observe(run: Run, driven: Sequence[float] = ()) -> Observation:
         return _blind(run, report)
     live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
     used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
-    lines = _lines(run, live, time[:_FITTED], used[:_FITTED], driven) if time is not None and live else None
+    if phasors is None and time is not None and run.kind == "dynamic" and run.excitation_kind == "sine":
+        phasors = _phasors(report, run)
+    lines = _lines(run, live, used[:_FITTED], phasors, line) if time is not None and live else None
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:
         report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
@@ -88,7 +97,7 @@ def observe(run: Run, driven: Sequence[float] = ()) -> Observation:
         channels=live,
         lines=lines,
         spread=_spread(used),
-        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED], driven),
+        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED], phasors),
         samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,
@@ -190,14 +199,26 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
     return True
 
 
+def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
+    """Phasors as identification extracts them; None where it refuses the run."""
+    try:
+        return run_phasors(run, 0.0)
+    except RecordTooShortError as error:
+        report.say("too short", "warning", "time", f"is too short: {error}", "Record longer")
+    except (RigDataError, TpjbError):  # the checks of the channels say what is wrong with them
+        pass
+    return None
+
+
 def _lines(
-    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, driven: Sequence[float]
-) -> RecordLines:
-    excitation = run.point.excitation_hz if run.kind == "dynamic" else 0.0
-    probes = values[:, [i for i, c in enumerate(channels) if c.quantity == "displacement"]]
-    candidates = [excitation, *(f for f in driven if f != excitation), 50.0, 2 * excitation]
-    speed = turning_frequency(time, probes, run.point.shaft_speed_hz, [f for f in candidates if f > 0])
-    return fit_lines(time, values, [excitation, speed, 2 * speed, *candidates[1:]], [speed, 2 * speed])
+    run: Run, channels: Sequence[Channel], values: FloatArray, phasors: RunPhasors | None, line: int
+) -> RecordLines | None:
+    if phasors is not None:
+        return excitation_line(phasors, line, channels)
+    if run.kind == "locus" or (run.kind == "dynamic" and run.excitation_kind != "sine"):
+        speed = run.point.shaft_speed_hz
+        return steady_level(values, run.sample_rate, [speed, 2 * speed, 50.0])
+    return None
 
 
 def _spread(values: FloatArray) -> FloatArray:
@@ -211,13 +232,14 @@ def _spread(values: FloatArray) -> FloatArray:
 
 
 def _other_line(
-    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, driven: Sequence[float]
+    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, phasors: RunPhasors | None
 ) -> float:
     cells = [i for i, c in enumerate(channels) if c.quantity == "force"]
     if run.kind != "dynamic" or not cells:
         return math.nan
     column = values[:, max(cells, key=lambda i: _range(values[:, i]))]
     speed = run.point.shaft_speed_hz
+    driven = [] if phasors is None else [excited.frequency for excited in phasors.lines.excitation]
     return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz, *driven])
 
 

@@ -21,7 +21,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
 from tpjb_ident.check.set_points import excited, plane_of, to_plane
 from tpjb_ident.check.wiring import name_fault
-from tpjb_ident.dynamic.records.shaft import shaft_order
+from tpjb_ident.phasors.shaft import shaft_order
 
 #: Where half of the runs differ by more than this share there is no one answer to judge.
 _NO_ANSWER = 0.08

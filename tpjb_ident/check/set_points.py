@@ -15,7 +15,7 @@ from rigdata.problem import Severity
 from rigdata.vector import inverse_directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
-from tpjb_ident.dynamic.records.run_data import oil_force as film_force
+from tpjb_ident.phasors.run_data import oil_force as film_force
 
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 _SPEED_STILL = 2 * math.pi * 0.5

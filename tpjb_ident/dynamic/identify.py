@@ -31,7 +31,6 @@ from tpjb_ident.dynamic.identify_point import Completion, first_estimate, own_me
 from tpjb_ident.dynamic.instruments.amplitude import ZeroAmplitude, zero_amplitude
 from tpjb_ident.dynamic.instruments.findings import InstrumentFindings, film_change_at, inspect_instruments
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions, change_spread
-from tpjb_ident.dynamic.records.mains_frequency import mains_frequency
 from tpjb_ident.dynamic.results.gains import Pairs, channel_pairs, gain_doubts, swept_probes, with_probe_doubts
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult, lost_points, named_at_points
@@ -45,6 +44,7 @@ from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.runs.synchronous import without_synchronous
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, map_ordered
 
 

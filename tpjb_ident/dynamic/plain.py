@@ -19,11 +19,11 @@ from rigdata.campaign import Campaign
 from tpjb_ident.dynamic.broadband.band_point import is_broadband
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, rlm_fit
-from tpjb_ident.dynamic.records.extraction import extract
-from tpjb_ident.dynamic.records.lines import Line, LineSet
-from tpjb_ident.dynamic.records.run_data import PhasorSettings
-from tpjb_ident.dynamic.records.windows import WindowSettings
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
+from tpjb_ident.phasors.extraction import extract
+from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.windows import WindowSettings
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
 
 if TYPE_CHECKING:

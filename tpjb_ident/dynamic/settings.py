@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+from tpjb_ident.phasors.run_phasors import PhasorSettings
 from tpjb_ident.presentation import changed
 
 #: Methods of ``estimators.csv``; ``"rlm:tukey"`` names a norm.

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.plain import PlainSettings
-    from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
     from tpjb_ident.dynamic.runs.run_store import RunStore
+    from tpjb_ident.phasors.run_phasors import PhasorSettings
 
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
@@ -139,8 +139,7 @@ def _worker_count(campaign: Campaign, wanted: int | None, scheduler: str | None)
 
 def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
     """Build `PhasorSettings` from ``--lines`` and ``--delay``."""
-    from tpjb_ident.dynamic.records.extraction import QUANTITIES
-    from tpjb_ident.dynamic.records.run_phasors import PhasorSettings
+    from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings
 
     excited = () if lines is None else parse_values(lines, "speed", "--lines")
     times: dict[str, float] = {}

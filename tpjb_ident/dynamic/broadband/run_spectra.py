@@ -9,6 +9,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from rigdata.vector import directions, inverse_directions
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
 from tpjb_ident.dynamic.broadband.disturbing_lines import (
@@ -22,11 +23,10 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.instruments.findings import START
-from tpjb_ident.dynamic.records.compensation import compensated, inspect_readings
-from tpjb_ident.dynamic.records.lines import Line, LineSet
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.run_data import RunPhasors, oil_force
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
+from tpjb_ident.phasors.compensation import SlowerChannel, channel_gains, inspect_readings
+from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors, oil_force, vector_channels
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")
@@ -97,7 +97,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         length = round(period)
         clean = without_disturbances(cut, lines, length)
     result = _transformed(run, clean, length, housing_mass, settings)
-    phasors = compensated(result, run, slower)
+    phasors = _without_responses(result, run, slower)
     phasors = replace(phasors, conditions=merged(samples.conditions, conditions, _clock_conditions(clocks)))
     frequencies = phasors.lines.frequencies
     phasors = phasors.advanced(settings.delays)
@@ -163,7 +163,8 @@ def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, s
     """Phasors as recorded."""
     places = _places(samples.rate, length, settings)
     frequency = np.fft.rfftfreq(length, 1 / samples.rate)[places]
-    blocks = {q: _block(_bins(rows, length, places)) for q, rows in samples.values.items()}
+    quantities = tuple(q for q in QUANTITIES if q in samples.values)
+    z = np.concatenate([_bins(samples.values[q], length, places) for q in quantities], axis=2)
     windows = samples.length // length
     lines = LineSet(tuple(Line("excitation", float(f)) for f in frequency), (), (), run.point.shaft_speed_hz)
     return RunPhasors(
@@ -173,14 +174,30 @@ def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, s
         lines,
         np.arange(windows) * length / samples.rate,
         length / samples.rate,
-        blocks["displacement"],
-        blocks["force"],
-        blocks.get("acceleration"),
+        vector_channels(quantities),
+        z,
+        np.zeros((windows, z.shape[2])),
+        np.full((windows, z.shape[2]), np.nan),
+        np.zeros((windows, z.shape[2])),
         housing_mass,
         np.full(windows, np.nan),
     )
 
 
-def _block(phasors: ComplexArray) -> PhasorBlock:
-    n = len(phasors)
-    return PhasorBlock(phasors, np.zeros((n, 2)), np.full((n, 2), np.nan), np.zeros(n))
+def _without_responses(result: RunPhasors, run: Run, slower: dict[str, SlowerChannel]) -> RunPhasors:
+    """Phasors of X and Y as channels without filters and delays would have given them.
+
+    With P the matrix from readings to X, Y, U that from X, Y to readings and g the channels' complex gains at a line,
+    P diag(1/g) U undoes them; exact for two channels.
+    """
+
+    def undone(quantity: str, phasors: ComplexArray) -> ComplexArray:
+        chosen = [c for c in run.channels.values() if c.quantity == quantity and c.axis is not None]
+        gains = channel_gains(run, chosen, slower, result.lines)
+        if gains is None:
+            return phasors
+        axes = tuple(float(c.axis or 0.0) for c in chosen)
+        undo = np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, directions(axes))
+        return np.asarray(np.einsum("lab,nlb->nla", undo, phasors))
+
+    return result.changed(undone)

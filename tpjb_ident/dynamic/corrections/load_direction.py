@@ -23,8 +23,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.corrections.static_load import MAX_SIDEWAYS, LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
 
 #: Plausible relative slope [1/rad] and its change per unit of ln W, one standard deviation.
 PLAUSIBLE = (1.5, 0.75)

@@ -20,8 +20,8 @@ from tpjb_ident.dynamic.corrections.mains_angles import MainsEquations
 from tpjb_ident.dynamic.estimators.errors_in_variables import repeats
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
 
 MAINS_ON_LINE = "mains on excitation line"
 MAINS_CORRECTED = "mains corrected"

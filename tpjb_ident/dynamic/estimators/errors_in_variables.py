@@ -25,7 +25,7 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     pooled_effect,
     spread_of,
 )
-from tpjb_ident.dynamic.records.line_means import complex_median
+from tpjb_ident.phasors.line_means import complex_median
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
 _MIN_SPARE_REPEATS = 8.0

@@ -9,8 +9,8 @@ from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
 
 #: Runs of one direction must differ in amplitude by this factor to tell anything.
 MIN_RATIO = 1.3

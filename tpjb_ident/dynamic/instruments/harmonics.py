@@ -20,7 +20,7 @@ from scipy.special import fdtri
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.line_means import LineMean
+from tpjb_ident.phasors.line_means import LineMean
 
 #: Change of h per squared second harmonic.
 _CHANGE = 4.5

@@ -16,8 +16,8 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
 
 #: Phase between cells and accelerometers [rad] beyond which one of them is late; housings on bolted joints have 0.01.
 _MAX_PHASE = 0.04

@@ -16,9 +16,9 @@ from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.one_gain import wrong_gains
 from tpjb_ident.check.run_gains import gain_in_words, swept_centre
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.records.line_means import complex_median
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
 
 #: Readings below which a sweep says nothing of a probe.
 _FEWEST = 100

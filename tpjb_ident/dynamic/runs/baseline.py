@@ -16,8 +16,8 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import estimate_table
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
+from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
 
 
 @dataclass(frozen=True)

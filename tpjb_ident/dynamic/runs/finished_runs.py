@@ -19,11 +19,11 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.line_means import LineMean, mains_force, mains_line, second_harmonics
-from tpjb_ident.dynamic.records.run_data import RunPhasors
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.point_data import finite_mean
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore
+from tpjb_ident.phasors.line_means import LineMean, mains_force, mains_line, second_harmonics
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Bytes of phasors that stay in memory.
 ROOM = 8 * 2**20
@@ -69,11 +69,11 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
 def _slim(phasors: RunPhasors) -> RunPhasors:
     """The run without the phasors of nuisance lines: estimates need those of the excitation alone."""
     n = len(phasors.lines.excitation)
-    return phasors.changed(lambda _, every: every[:, :n].copy())
+    return phasors.with_phasors(phasors.z[:, :n].copy())
 
 
 def _bytes(phasors: RunPhasors) -> int:
-    arrays = [a for b in phasors.blocks.values() for a in (b.phasors, b.mean, b.noise, b.lost)]
+    arrays = (phasors.z, phasors.mean, phasors.scale, phasors.lost, *phasors.residual)
     return sum(a.nbytes for a in (*arrays, phasors.start, phasors.speeds))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.run import Run
-from tpjb_ident.dynamic.records.run_phasors import RunPhasors
+from tpjb_ident.phasors.run_phasors import RunPhasors
 
 #: Samples from which a run's temperatures are taken.
 _TEMPERATURE_SAMPLES = 2**17

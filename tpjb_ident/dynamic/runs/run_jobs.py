@@ -17,16 +17,15 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.reading_cache import beginning_of, with_kept_beginning
-from tpjb_ident.dynamic.records.run_data import RunPhasors
-from tpjb_ident.dynamic.records.run_phasors import PhasorSettings, run_phasors
-from tpjb_ident.dynamic.records.shaft import shaft_phases
-from tpjb_ident.dynamic.records.windows import RecordTooShortError
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
+from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
+from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.phasors.shaft import shaft_phases
+from tpjb_ident.phasors.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import InProcessWorkers, Workers, as_completed
 
 Progress = Callable[[str, int, int], None]
@@ -140,13 +139,12 @@ def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
     """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
     beginning = beginning_of(kept)
     frequencies = [line.frequency for line in phasors.lines.excitation]
-    if beginning is None:
-        return ()
     if len(frequencies) == 1:
         point = replace(run.point, excitation=2 * np.pi * frequencies[0])
-        return (of_run(observe(replace(beginning, point=point)), run),)
+        return (of_run(observe(replace(beginning, point=point), phasors), run),)
     points = [point_of(run.point, frequency) for frequency in frequencies]
-    return tuple(of_run(observe(replace(beginning, point=p), frequencies), replace(run, point=p)) for p in points)
+    looks = enumerate(points)
+    return tuple(of_run(observe(replace(beginning, point=p), phasors, i), replace(run, point=p)) for i, p in looks)
 
 
 def _repaired(run: Run) -> tuple[Condition, ...]:
@@ -159,9 +157,8 @@ def _repaired(run: Run) -> tuple[Condition, ...]:
 def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
     """Refuse a run with a dead probe or cell; tell of a dead accelerometer.
 
-    A dead cell or accelerometer leaves phasors that look like any other: of the vector, not of the channel. Turned back
-    to the channels' axes they vanish. Only then is the run read once more and held against the rules of
-    `rigdata.check_campaign`, which know a computed record without noise from a dead sensor.
+    Only where a channel shows no line is the run read once more and held against the rules of `rigdata.check_campaign`,
+    which know a computed record without noise from a dead sensor.
     """
     dead = _dead(run, phasors)
     grave = [p for name, p in dead.items() if run.channels[name].quantity != "acceleration"]
@@ -171,24 +168,19 @@ def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]
 
 
 def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
-    silent = [
-        name
-        for name, channel in run.channels.items()
-        if channel.axis is not None and (block := phasors.blocks.get(channel.quantity)) is not None
-        if _silent(block, channel.axis)
-    ]
+    silent = [c.name for k, c in enumerate(phasors.channels) if _silent(phasors, k)]
     if not silent:
         return {}
-    errors = {f.key: f.problem for f in observe(run).report.found if f.problem.severity == "error"}
+    errors = {f.key: f.problem for f in observe(run, phasors).report.found if f.problem.severity == "error"}
     return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
 
 
-def _silent(block: PhasorBlock, axis: float) -> bool:
-    """Whether no window shows any line along an axis; False where no window shows anything at all."""
-    finite = np.isfinite(block.phasors).all(axis=(1, 2))
+def _silent(phasors: RunPhasors, channel: int) -> bool:
+    """Whether no window shows any line in a channel; False where no window shows anything at all."""
+    quantity = phasors.pick(phasors.channels[channel].quantity)
+    finite = np.isfinite(phasors.z[:, :, quantity]).all(axis=(1, 2))
     if not finite.any():
         return False
-    vector, mean = block.phasors[finite], block.mean[finite]
-    along = np.array([np.cos(axis), np.sin(axis)])
-    size = float(np.abs(vector @ along).max())
-    return size <= max(_NOTHING * float(np.abs(vector).max()), _ROUNDING * float(np.abs(mean).max()))
+    largest = float(np.abs(phasors.z[finite][:, :, quantity]).max())
+    size, mean = np.abs(phasors.z[finite, :, channel]).max(), np.abs(phasors.mean[finite][:, quantity]).max()
+    return bool(size <= max(_NOTHING * largest, _ROUNDING * float(mean)))

@@ -29,14 +29,12 @@ from tpjb_ident.check.findings import Finding, Reporter
 from tpjb_ident.check.lines import RecordLines
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import Line, LineSet
-from tpjb_ident.dynamic.records.phasors import PhasorBlock
-from tpjb_ident.dynamic.records.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 
-_BLOCKS = ("displacement", "cell_force", "acceleration")
-_PARTS = ("phasors", "mean", "noise", "lost")
+_ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase")
 
 
 @dataclass(frozen=True)
@@ -93,15 +91,14 @@ class RunStore:
     def keep(self, mark: str, result: RunResult) -> None:
         """Keep a finished run under its fingerprint `mark`."""
         phasors = result.phasors
-        arrays: dict[str, Any] = {"start": phasors.start, "speeds": phasors.speeds, "shaft_phase": phasors.shaft_phase}
-        for name in _BLOCKS:
-            block = getattr(phasors, name)
-            if block is not None:
-                arrays.update({f"{name}.{part}": getattr(block, part) for part in _PARTS})
+        arrays: dict[str, Any] = {name: getattr(phasors, name) for name in _ARRAYS}
+        arrays.update({f"residual.{i}": bins for i, bins in enumerate(phasors.residual)})
         meta = {
             "fingerprint": mark,
             "run": phasors.run,
             "length": phasors.length,
+            "channels": [c.name for c in phasors.channels],
+            "device": phasors.device,
             "lines": _packed_lines(phasors.lines),
             "conditions": _packed_conditions(phasors.conditions),
             "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
@@ -118,25 +115,19 @@ class RunStore:
         if not mark or stored is None or stored[0]["fingerprint"] != mark:
             return None
         meta, arrays = stored
-        blocks = {
-            name: PhasorBlock(*(arrays[f"{name}.{part}"] for part in _PARTS))
-            for name in _BLOCKS
-            if f"{name}.phasors" in arrays
-        }
+        residual = [arrays.pop(f"residual.{i}") for i in range(len(arrays) - len(_ARRAYS))]
         phasors = RunPhasors(
-            run.id,
-            run.point,
-            run.excitation_direction,
-            _unpacked_lines(meta["lines"]),
-            arrays["start"],
-            meta["length"],
-            blocks["displacement"],
-            blocks["cell_force"],
-            blocks.get("acceleration"),
-            housing_mass,
-            arrays["speeds"],
-            _unpacked_conditions(meta["conditions"]),
-            arrays["shaft_phase"],
+            run=run.id,
+            point=run.point,
+            direction=run.excitation_direction,
+            lines=_unpacked_lines(meta["lines"]),
+            length=meta["length"],
+            channels=tuple(run.channels[name] for name in meta["channels"]),
+            housing_mass=housing_mass,
+            conditions=_unpacked_conditions(meta["conditions"]),
+            device=tuple(meta["device"]),
+            residual=tuple(residual),
+            **arrays,
         )
         seen = tuple(unpacked(entry, run) for entry in meta["seen"])
         return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)

@@ -14,9 +14,9 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, IntArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.line_means import complex_median
-from tpjb_ident.dynamic.records.shaft import shaft_order
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.line_means import complex_median
+from tpjb_ident.phasors.shaft import shaft_order
 
 _FITTED = "shaft lines fitted"
 #: Runs that tell H and what turns with the shaft: three unknowns for each force.

@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.dynamic.records.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors
+
+#: Sum of the windows' phasors over that of their sizes below which the drive wanders.
+_COHERENT = 0.9
+#: Windows farther than this from the middle one, in median distances, do not count.
+_FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -84,3 +89,25 @@ def _shared(run: RunPhasors, index: int) -> bool:
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))
+
+
+def channel_phasors(run: RunPhasors, line: int) -> ComplexArray:
+    """Typical phasor of every channel at one line over a run, (n_channels,); NaN where a channel has none.
+
+    Where the drive wanders, the windows are turned to one phase first, by the pattern that all of them show.
+    """
+    z = run.z[:, line]
+    good = np.isfinite(z).all(axis=1)
+    if good.sum() > 2:
+        weighted = z[good] / np.maximum(np.median(run.scale[good], axis=0), np.finfo(float).tiny)
+        course = np.linalg.svd(weighted, full_matrices=False)[0][:, 0]
+        if abs(course.sum()) < _COHERENT * np.abs(course).sum():
+            z = z[good] * np.exp(-1j * np.angle(course))[:, None]
+    typical = np.full(z.shape[1], np.nan + 0j)
+    for k, windows in enumerate(z.T):
+        present = windows[np.isfinite(windows)]
+        if len(present):
+            middle = complex_median(present)
+            distance = np.abs(present - middle)
+            typical[k] = present[distance <= _FAR * np.median(distance)].mean()
+    return typical

@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.run import Run
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import LineSet, known_lines
-from tpjb_ident.dynamic.records.run_data import MeasuredRun, PhasorSettings, RunPhasors
-from tpjb_ident.dynamic.records.shaft import ShaftCourse
+from tpjb_ident.phasors.line_fit import usual_scale
+from tpjb_ident.phasors.lines import LineSet, known_lines
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.shaft import ShaftCourse
 
 #: Name of the condition that a shaft's changing speed gives rise to.
 DRIFT = "speed drifts"
@@ -47,8 +49,8 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     shift = lines.frequencies - result.lines.frequencies
     if np.abs(shift).max() * result.length > MAX_RETUNED:
         return None
-    turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))[:, :, None]
-    return replace(result.changed(lambda _, phasors: phasors * turn), lines=lines)
+    turn = np.exp(-2j * np.pi * np.multiply.outer(result.start + 0.5 * result.length, shift))
+    return replace(result, z=result.z * turn[:, :, None], lines=lines)
 
 
 def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
@@ -68,7 +70,7 @@ def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> fl
 
 
 def tuned(
-    run: MeasuredRun, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
+    run: Run, result: RunPhasors, driven: tuple[float, ...], speed: float, settings: PhasorSettings
 ) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough."""
     exact, off_set_point = _excitations(result, driven, run.sample_rate)
@@ -95,11 +97,7 @@ def _excitations(
 ) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
     """Excitation frequencies as the phases show them."""
     span = result.start[-1] - result.start[0] + result.length
-    noise = _typical(result.cell_force.noise) / np.sqrt(result.length * rate)
-    slips = [
-        frequency_slip(result.cell_force.phasors[:, i], result.start, noise)
-        for i in range(len(result.lines.excitation))
-    ]
+    slips = [_line_slip(result, i, rate) for i in range(len(result.lines.excitation))]
     off = [s if abs(s) * span > MAX_SLIP else 0.0 for s in slips]
     exact = tuple(line.frequency + s for line, s in zip(result.lines.excitation, off))
     if not any(off):
@@ -121,9 +119,30 @@ def _shaft_line(result: RunPhasors) -> int | None:
 
 def _shaft_slip(result: RunPhasors, rate: float) -> float:
     index = _shaft_line(result)
-    if index is None:
+    return 0.0 if index is None else _line_slip(result, index, rate)
+
+
+def _line_slip(result: RunPhasors, line: int, rate: float) -> float:
+    """Frequency error of a line by all channels together, each weighted by its power over its noise [Hz]."""
+    z, noise = result.z[:, line], usual_scale(result.scale) / np.sqrt(result.length * rate)
+    present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
+    if not present.any():
         return 0.0
-    return frequency_slip(result.displacement.phasors[:, index], result.start, _phasor_noise(result, rate))
+    # a channel without noise must not stand for all
+    least = 1e-9 * np.nanmedian(np.abs(z[:, present]), axis=0)
+    return frequency_slip(z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny), result.start, 1.0)
+
+
+def exact_frequencies(result: RunPhasors, rate: float) -> FloatArray:
+    """Frequencies of all lines as the phases of the windows show them, however little they are off (n_lines,) [Hz]."""
+    frequencies = result.lines.frequencies
+    turning = _shaft_slip(result, rate)
+    for k, line in enumerate((*result.lines.excitation, *result.lines.nuisance)):
+        if line.name.endswith("X"):
+            frequencies[k] += turning * int(line.name[:-1])
+        elif line.name in ("excitation", "mains"):
+            frequencies[k] += _line_slip(result, k, rate)
+    return frequencies
 
 
 def _phasor_noise(result: RunPhasors, rate: float) -> float:

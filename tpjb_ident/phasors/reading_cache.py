@@ -6,64 +6,20 @@ that a short record is read once as a whole, and no sample of a long one twice b
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
-from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError
-from rigdata.record import Record, RowReader, VectorRecord, VectorRows
 from rigdata.run import Run
-from tpjb_ident.dynamic.records.run_data import MeasuredRun
 
 #: What the checks look at: so many samples, or so many seconds if that is more, of those that are kept.
 _LOOK, SECONDS = 2**14, 2.0
 #: Samples per channel up to which a run is kept, and that are looked at of a longer one.
 SHORT = 2**17
-
-
-class ShortRecord:
-    """Stands for a run, or for its beginning; reads every vector and the speed once."""
-
-    def __init__(self, run: MeasuredRun, length: int | None = None) -> None:
-        self._run = run
-        self.id: str = run.id
-        self.point: OperatingPoint = run.point
-        self.excitation_direction: float | None = run.excitation_direction
-        self.channels: Mapping[str, Channel] = run.channels
-        self.sample_rate: float = run.sample_rate
-        self.length = run.length if length is None else min(length, run.length)
-        self._kept: dict[str, VectorRecord] = {}
-        self._speed: tuple[Record | None] | None = None
-
-    def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
-        """As the run's own."""
-        if quantity not in self._kept:
-            self._kept[quantity] = self._run.vector(quantity, 0, self.length)
-        samples = self._kept[quantity]
-        return replace(samples, values=samples.values[start:stop], time=samples.time[start:stop])
-
-    def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
-        """As the run's own."""
-        if self._speed is None:
-            self._speed = (self._run.speed(0, self.length),)
-        (record,) = self._speed
-        return (
-            None if record is None else replace(record, values=record.values[start:stop], time=record.time[start:stop])
-        )
-
-    def row_reader(self, quantities: Sequence[str]) -> RowReader:
-        """Rows of what is kept."""
-        return VectorRows(self, quantities)
-
-    def opened(self) -> AbstractContextManager[None]:
-        """As the run's own."""
-        return self._run.opened()
 
 
 class _ReadingCache:
@@ -109,8 +65,8 @@ class _ReadingCache:
 class _Beginning:
     """A run's reader that ends after the first samples."""
 
-    def __init__(self, reader: _ReadingCache, samples: int) -> None:
-        self._reader, self._length = reader, min(samples, reader.samples)
+    def __init__(self, reader: Any, samples: int) -> None:
+        self._reader, self._length = reader, min(samples, getattr(reader, "samples", reader.length()))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._reader, name)
@@ -121,16 +77,14 @@ class _Beginning:
 
 
 def with_kept_beginning(run: Run) -> Run:
-    """The run with its beginning kept; runs that are not read from a file stay as they are."""
-    if not isinstance(run, Run):
+    """The run with its beginning kept."""
+    if isinstance(run.reader, _ReadingCache | _Beginning):
         return run
     names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
     return replace(run, reader=_ReadingCache(run.reader, names))
 
 
-def beginning_of(run: Run) -> Run | None:
-    """The first seconds of a run whose readings are kept, as a run of its own; None where they are not."""
-    reader = getattr(run, "reader", None)
-    if not isinstance(reader, _ReadingCache):
-        return None
-    return replace(run, reader=_Beginning(reader, max(_LOOK, round(SECONDS * run.sample_rate))))
+def beginning_of(run: Run, samples: int | None = None) -> Run:
+    """The first samples of a run whose readings are kept, as a run of its own; by default what the checks look at."""
+    looked_at = max(_LOOK, round(SECONDS * run.sample_rate))
+    return replace(run, reader=_Beginning(run.reader, samples or looked_at))

@@ -1,24 +1,20 @@
-"""What the channels' electronics did to the phasors, taken out: filters, delays, slower sampling.
-
-Responses belong to channels, phasors to X and Y. With P the matrix from readings to X, Y, U that from X, Y to readings
-and g the channels' complex gains at a line, P diag(1/g) U undoes them; exact for two channels.
-"""
+"""What the channels' electronics did to the phasors, taken out: filters, delays, slower sampling."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import VECTOR_QUANTITIES
+from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from rigdata.vector import directions, inverse_directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
+from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Samples that are looked at.
 _RHYTHM_LOOK = 2**13
@@ -60,42 +56,36 @@ class SlowerChannel:
         return np.asarray(gain * np.exp(-2j * np.pi * f * late))
 
 
-def compensated(result: RunPhasors, run: MeasuredRun, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
+def compensated(result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
     """The run's phasors as channels without filters and delays would have given them."""
-    frequencies, driven = result.lines.frequencies, len(result.lines.excitation)
-
-    def undone(quantity: str, phasors: ComplexArray) -> ComplexArray:
-        undo = _undoing(run, quantity, slower, frequencies, driven)
-        return phasors if undo is None else np.einsum("lab,nlb->nla", undo, phasors)
-
-    return result.changed(undone)
+    gains = channel_gains(run, result.channels, slower, result.lines)
+    return result if gains is None else result.with_phasors(result.z / gains)
 
 
-def _undoing(
-    run: MeasuredRun, quantity: str, slower: Mapping[str, SlowerChannel], frequencies: FloatArray, driven: int
+def channel_gains(
+    run: Run, channels: Sequence[Channel], slower: Mapping[str, SlowerChannel], lines: LineSet
 ) -> ComplexArray | None:
-    """(n_lines, 2, 2) matrices on X, Y; None where no channel of the quantity has a response."""
-    chosen = [c for c in run.channels.values() if c.quantity == quantity and getattr(c, "axis", None) is not None]
-    if not any(getattr(c, "response", None) or c.name in slower for c in chosen):
+    """What channels made of a sine of size one at every line, (n_lines, n_channels); None where nothing."""
+    if not any(c.response or c.name in slower for c in channels):
         return None
-    gains = np.ones((len(frequencies), len(chosen)), dtype=complex)
-    for k, channel in enumerate(chosen):
-        response = getattr(channel, "response", None)
-        if response:
-            gains[:, k] *= _reached(response.at(frequencies), frequencies, driven, run, channel.name)
+    frequencies = lines.frequencies
+    gains = np.ones((len(frequencies), len(channels)), dtype=complex)
+    for k, channel in enumerate(channels):
+        if channel.response:
+            gain = channel.response.at(frequencies)
+            gains[:, k] *= _reached(gain, frequencies, len(lines.excitation), run, channel.name)
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    axes = tuple(float(c.axis or 0.0) for c in chosen)
-    return np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, directions(axes))
+    return gains
 
 
-def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: MeasuredRun, name: str) -> ComplexArray:
+def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run, name: str) -> ComplexArray:
     """The gain, 1 at disturbing lines that a table does not reach."""
     valid = np.isfinite(gain) & (np.abs(gain) > 1e-6)
     if not valid[:driven].all():
         text = f"its response at the excitation of {frequencies[~valid][0]:g} Hz is not known, or nothing comes through"
         cure = "Extend filter_table, or check filter"
-        raise RigDataError(Problem("error", getattr(run, "file", ""), f"channel {name}", text, cure, run.id))
+        raise RigDataError(Problem("error", run.file, f"channel {name}", text, cure, run.id))
     return np.where(valid, gain, 1.0)
 
 
@@ -154,14 +144,12 @@ def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
     return rate + turn * export_rate / (n / 2)
 
 
-def inspect_readings(run: MeasuredRun) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
+def inspect_readings(run: Run) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
     """Channels that were sampled slower than the export, by name, and what to say of them.
 
     What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
     limits, or sampled slower than the others.
     """
-    if not isinstance(run, Run):
-        return {}, ()
     names = [c.name for c in run.channels.values() if c.quantity in VECTOR_QUANTITIES and c.axis is not None]
     readings = run.reader.read(names, 0, min(run.length, _LOOK))
     slower: dict[str, SlowerChannel] = {}

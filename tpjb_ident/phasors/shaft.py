@@ -9,8 +9,8 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run, pulse_times
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.records.lines import NAMED_HARMONICS, SPEED_DRIFT
-from tpjb_ident.dynamic.records.run_data import MeasuredRun, RunPhasors
+from tpjb_ident.phasors.lines import NAMED_HARMONICS, SPEED_DRIFT
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Samples from which the speed of the run is taken.
 FIRST_LOOK = 2**17
@@ -36,7 +36,7 @@ class ShaftCourse:
         return np.interp(time, self.time, self.speed)
 
 
-def shaft_speed(run: MeasuredRun) -> tuple[float, tuple[Condition, ...]]:
+def shaft_speed(run: Run) -> tuple[float, tuple[Condition, ...]]:
     """Shaft speed of a run [Hz]: the tachometer's, or the set point where it gives nothing usable."""
     nominal = run.point.shaft_speed_hz
     record = run.speed(0, FIRST_LOOK)
@@ -68,7 +68,7 @@ def shaft_order(frequency: float, speed: float) -> int:
     return n if near else 0
 
 
-def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
+def shaft_phases(run: Run, phasors: RunPhasors) -> ComplexArray:
     """Unit phasor of what turns with the shaft at every excitation line, (n_lines,); NaN where that is not known.
 
     What turns with the shaft (runout of the probes, unbalance in the cells) then has the drive's frequency, and its
@@ -91,7 +91,7 @@ def shaft_phases(run: MeasuredRun, phasors: RunPhasors) -> ComplexArray:
     return phases
 
 
-def _by_keyphasor(run: MeasuredRun, turning: float) -> ComplexArray | None:
+def _by_keyphasor(run: Run, turning: float) -> ComplexArray | None:
     """Unit phasors at the frequency `turning` [Hz] of the shaft as every pulse of the keyphasor shows it."""
     names = [c.name for c in run.channels.values() if c.quantity == "keyphasor"]
     if not names or not isinstance(run, Run):

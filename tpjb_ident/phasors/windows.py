@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.dynamic.records.lines import LineSet
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.phasors.lines import LineSet
 
 
 @dataclass(frozen=True)
