@@ -168,6 +168,7 @@ def load_campaign(path: str | Path) -> Campaign:
         message = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
         raise refuse(str(path)[:100], "", message, "Check the path and its rights") from error
     if kind == "folder":
+        inside(source, MANIFEST_NAME, str(source), "")  # a stranger's folder may link it elsewhere
         return _load_folder(source, source / MANIFEST_NAME)
     return _load_folder(source.parent, source) if kind == "manifest" else _load_hdf5(source)
 

@@ -14,6 +14,7 @@ from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series, with_unique_names
 from rigdata.readers.text.catman import time_column
 from rigdata.readers.text.head import find_head
+from rigdata.safe_path import inside
 
 _MOST_FILES = 5000
 
@@ -83,7 +84,8 @@ def _counts_evenly(series: Series) -> bool:
 def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
     """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out."""
     for path in record_files(folder):
+        name = path.relative_to(folder).as_posix()
         try:
-            yield read_export(path, path.relative_to(folder).as_posix())
+            yield read_export(inside(folder, name, name, ""), name)
         except RigDataError as error:
             problems.extend(error.problems)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import os
 import re
 import socket
@@ -42,7 +43,7 @@ def viewing(*arguments):
     )  # fmt: skip
     try:
         line = process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/[\w-]{32}/", line)
         assert found, line + (process.stderr.read() if process.poll() is not None else "")
         yield found[0], int(found[1])
     finally:
@@ -90,18 +91,69 @@ def test_a_campaign_can_be_browsed_and_the_model_moved(chromium):
         assert tab.logged == []
 
 
-def test_it_listens_on_loopback_only_and_refuses_pages_from_elsewhere():
+def status(port: int, path: str, **headers: str) -> int:
+    """Status that a request is answered with."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse().status
+    connection.close()
+    return answer
+
+
+def socket_to(address: str, **options: object):
+    """A WebSocket to the page, as its script opens it."""
+    websocket = pytest.importorskip("websocket")
+    return websocket.create_connection(
+        address.replace("http:", "ws:") + "ws", timeout=20, subprotocols=["bokeh", "token"], **options
+    )
+
+
+def test_it_answers_this_machine_its_own_page_and_nobody_else():
+    websocket = pytest.importorskip("websocket")
+    with viewing(DEMO) as (address, port):
+        path = "/" + address.split("/", 3)[3]
+        assert status(port, path) == 200
+        assert status(port, path, Host=f"localhost:{port}") == 200
+        # another user of this machine, who does not know the path
+        for guess in ("/", "/ws", "/static/js/bokeh.min.js", "/autoload.js", f"{path[:-2]}/", f"/x{path}"):
+            assert status(port, guess) == 404, guess
+        # a page elsewhere whose name has been pointed at this machine
+        for host in (f"rebound.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", f"127.0.0.1.nip.io:{port}", ""):
+            assert status(port, path, Host=host) in (400, 403), host
+        # a script without a page, a page elsewhere, a rebound page that names itself
+        own = f"http://127.0.0.1:{port}"
+        for options in (
+            {"suppress_origin": True},
+            {"origin": "http://example.invalid"},
+            {"origin": "null"},
+            {"origin": f"https://127.0.0.1:{port}"},
+            {"origin": own, "host": f"rebound.example:{port}"},
+        ):
+            with pytest.raises(websocket.WebSocketBadStatusException, match="403"):
+                socket_to(address, **options)
+        with pytest.raises(websocket.WebSocketBadStatusException, match="404"):
+            socket_to(f"{own}/", origin=own)
+
+
+def test_it_listens_on_loopback_only():
     with viewing(DEMO) as (_, port):
         with socket.create_connection(("127.0.0.1", port), timeout=10):
             pass
         # 127.0.0.2 is this machine too: a server that listens on every address would answer there
         with pytest.raises(OSError), socket.create_connection(("127.0.0.2", port), timeout=10):
             pass
-        pytest.importorskip("websocket")
-        import websocket
 
-        with pytest.raises(websocket.WebSocketBadStatusException):
-            websocket.create_connection(f"ws://127.0.0.1:{port}/ws", origin="http://example.invalid", timeout=20)
+
+def test_the_browser_is_led_by_a_file_that_only_this_user_reads():
+    from tpjb_ident.view.server import private_link
+
+    with private_link("http://127.0.0.1:1/secret/") as link:
+        path = Path(link.removeprefix("file://"))
+        assert "secret" not in link
+        assert "http://127.0.0.1:1/secret/" in path.read_text(encoding="utf-8")
+        if os.name == "posix":
+            assert path.stat().st_mode & 0o077 == 0
+    assert not path.exists()
 
 
 def test_a_folder_of_results_shows_its_tables(chromium, tmp_path):
@@ -119,6 +171,6 @@ def test_a_folder_of_results_shows_its_tables(chromium, tmp_path):
 def test_without_its_library_it_names_the_extra(monkeypatch):
     from tpjb_ident.view.server import Session, ViewError, serve
 
-    monkeypatch.setitem(sys.modules, "bokeh.application", None)
+    monkeypatch.setitem(sys.modules, "bokeh.server.server", None)
     with pytest.raises(ViewError, match=r"tpjb-ident\[view\]"):
         serve(Session("x"), 0, print)

@@ -304,3 +304,11 @@ def test_importing_rigdata_alone_is_light():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_manifest_that_is_a_link_out_of_its_folder_is_refused(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "secret.toml").write_text('id = "secret"', encoding="utf-8")
+    (tmp_path / "folder" / "campaign.toml").symlink_to(tmp_path / "secret.toml")
+    with pytest.raises(RigDataError, match="by a symlink"):
+        rigdata.load_campaign(tmp_path / "folder")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rigdata import RigDataError, load_campaign
+from rigdata.problem import Problem
 from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
 from rigdata.survey.draft import MARK, draft_manifest, survey
@@ -211,3 +212,14 @@ def test_the_pad_of_a_thermometer_is_read_from_its_name():
     time = np.arange(100) / 10.0
     text = draft_manifest(survey([Export("a.csv", (Series("T3", "degC", 40.0 + 0 * time, time),))]), "x", None)
     assert "pad = 3   # (guess) by its name" in text
+
+
+def test_a_link_that_leads_out_of_the_folder_is_named_and_not_read(tmp_path):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / "a.csv").write_text("t,x\n" + "\n".join(f"{0.1 * i:.1f},{i}" for i in range(20)), encoding="utf-8")
+    (tmp_path / "outside.csv").write_text((folder / "a.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "b.csv").symlink_to(tmp_path / "outside.csv")
+    problems: list[Problem] = []
+    assert [export.name for export in read_exports(folder, problems)] == ["a.csv"]
+    assert "by a symlink" in problems[0].what

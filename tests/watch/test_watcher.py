@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -226,3 +227,42 @@ def test_killed_again_and_again_while_records_are_being_written_it_ends_with_the
     assert {r["state"] for r in documents[0]["runs"]} == {"good"}
     tables = [(folder / "coefficients.csv").read_bytes() for folder in (out, tmp_path / "fresh")]
     assert tables[0] == tables[1]
+
+
+@pytest.mark.parametrize("name", [f"{DYNAMIC[0]}.csv", f"{DYNAMIC[0]}_2.csv", "unplanned.csv"])
+def test_a_link_that_appears_later_and_leads_out_is_never_opened(live, finished, tmp_path, name, monkeypatch):
+    watch = watcher(live)
+    watch.look()
+    outside = tmp_path / "secret.csv"
+    shutil.copy(finished / "runs" / f"{DYNAMIC[0]}.csv", outside)
+    (live / "runs" / name).symlink_to(outside)
+    opened = []
+    sys_open = io.open
+
+    def noted(file, *arguments, **options):
+        opened.append(str(file))
+        return sys_open(file, *arguments, **options)
+
+    monkeypatch.setattr(io, "open", noted)
+    snapshot = watch.look()
+    monkeypatch.undo()
+    assert states(snapshot) == {}
+    assert snapshot.hashes == {}
+    assert [p for p in opened if "secret" in p or name in p] == []
+    assert any("leaves the campaign folder by a symlink" in p.what for p in snapshot.problems)
+    (live / "runs" / name).unlink()
+    land(finished, live, DYNAMIC[0])
+    assert states(watch.look()) == {DYNAMIC[0]: "good"}
+
+
+def test_a_manifest_that_becomes_a_link_is_not_read(live, tmp_path):
+    watch = watcher(live)
+    watch.look()
+    manifest = live / "campaign.toml"
+    moved = tmp_path / "outside.toml"
+    manifest.rename(moved)
+    moved.write_text(moved.read_text("utf-8").replace('id = "', 'id = "other-'), "utf-8")
+    manifest.symlink_to(moved)
+    snapshot = watch.look()
+    assert not snapshot.campaign.id.startswith("other-")
+    assert any("symlink" in p.what for p in snapshot.problems)

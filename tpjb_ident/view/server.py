@@ -1,10 +1,18 @@
-"""Serves the page on this machine only, from Bokeh's own files: nothing is loaded from anywhere else."""
+"""Serves the page on this machine only, from Bokeh's own files: nothing is loaded from anywhere else.
+
+Who asks must know the random path that the page has (another user of this machine does not), name this machine as the
+host (a page elsewhere whose name was pointed here does not), and a WebSocket must come from the page itself.
+"""
 
 from __future__ import annotations
 
 import functools
 import html
-from collections.abc import Callable, Mapping
+import os
+import secrets
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +27,13 @@ if TYPE_CHECKING:
 
 #: The only address that is ever listened on.
 _LOOPBACK = "127.0.0.1"
-#: Without it a phone shows the page as wide as a desk's and small.
-_VIEWPORT = '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}'
+#: Without the first a phone shows the page as wide as a desk's and small; no link tells the path; no icon is asked for.
+_META = (
+    '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">'
+    '<meta name="referrer" content="no-referrer"><link rel="icon" href="data:,">{% endblock %}'
+)
+#: Bytes of the random path.
+_TOKEN = 24
 _MOST_ROWS = 5000
 
 
@@ -47,27 +60,61 @@ class Session:
 
 
 def serve(session: Session, port: int, ready: Callable[[str], None], seconds: float | None = None) -> None:
-    """Serve until interrupted."""
+    """Serve until interrupted; `ready` is called with the page's address."""
     try:
-        from bokeh.application import Application
-        from bokeh.application.handlers.function import FunctionHandler
-        from bokeh.server.server import Server
+        from bokeh.server.server import BaseServer
+        from bokeh.server.util import bind_sockets
+        from tornado.httpserver import HTTPServer
+        from tornado.ioloop import IOLoop
     except ModuleNotFoundError as error:
         raise ViewError('tpjb view needs Bokeh. Install it: pip install "tpjb-ident[view]"') from error
-    application = Application(FunctionHandler(lambda document: build(document, session)))
     try:
-        # without `allow_websocket_origin` Bokeh takes connections from pages of this very address only
-        server = Server({"/": application}, address=_LOOPBACK, port=port, num_procs=1)
+        sockets, port = bind_sockets(_LOOPBACK, port)
     except OSError as error:
         raise ViewError(f"port {port} cannot be used ({error.strerror}). Give another with --port, or 0.") from error
+    token = secrets.token_urlsafe(_TOKEN)
+    application = _application(session, token, {f"{_LOOPBACK}:{port}", f"localhost:{port}"})
+    http = HTTPServer(application)
+    http.add_sockets(sockets)
+    server = BaseServer(IOLoop.current(), application, http)
     server.start()
     if seconds is not None:
         server.io_loop.call_later(seconds, server.io_loop.stop)
-    ready(f"http://{_LOOPBACK}:{server.port}/")
+    ready(f"http://{_LOOPBACK}:{port}/{token}/")
     try:
         server.io_loop.start()
     finally:
         server.stop()
+
+
+def _application(session: Session, token: str, hosts: set[str]) -> Any:
+    """Bokeh's pages below a random path, for requests that name one of `hosts` and pages that come from there."""
+    from bokeh.server.tornado import BokehTornado
+    from tornado.web import ErrorHandler
+
+    origins = {f"http://{host}" for host in hosts}
+
+    class LocalPages(BokehTornado):
+        def find_handler(self, request: Any, **options: Any) -> Any:
+            is_socket = request.headers.get("Upgrade", "").lower() == "websocket"
+            if request.host.lower() in hosts and (not is_socket or request.headers.get("Origin") in origins):
+                return super().find_handler(request, **options)
+            return self.get_handler_delegate(request, ErrorHandler, {"status_code": 403})
+
+    pages = {"/": lambda document: build(document, session)}
+    return LocalPages(pages, prefix=token, extra_websocket_origins=sorted(hosts), redirect_root=False)
+
+
+@contextmanager
+def private_link(address: str) -> Iterator[str]:
+    """A file that only this user can read and that leads a browser to the page: its command line is for all to see."""
+    handle, name = tempfile.mkstemp(prefix="tpjb-view-", suffix=".html")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">')
+        yield f"file://{name}"
+    finally:
+        os.unlink(name)
 
 
 def build(document: Any, session: Session) -> None:
@@ -75,7 +122,7 @@ def build(document: Any, session: Session) -> None:
     from bokeh.layouts import column
     from bokeh.models import Div, TabPanel, Tabs
 
-    document.template = _VIEWPORT
+    document.template = _META
     document.title = f"tpjb: {printable(session.name)}"
     panels = []
     if session.campaign is not None and session.campaign.runs:

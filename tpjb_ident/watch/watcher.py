@@ -11,6 +11,7 @@ from statistics import median
 from rigdata.campaign import MANIFEST_NAME, Campaign, load_campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from rigdata.safe_path import inside
 from rigdata.survey.exports import records_below
 from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Finding
@@ -76,7 +77,8 @@ class Watcher:
         planned = {run.file: self.folder / run.file for run in campaign.runs}
         listed = {path.resolve() for path in campaign.files.values()}
         unlisted = [path for path in records_below(self.folder) if path.resolve() not in listed]
-        stable, written = self.files.look([*planned.values(), *unlisted])
+        within = [path for path in (*planned.values(), *unlisted) if self._is_within(path, problems)]
+        stable, written = self.files.look(within)
         state = (self._manifest, tuple(problems), tuple(stable.items()), tuple(written))
         if state == self._last:
             return None
@@ -87,6 +89,15 @@ class Watcher:
         # a record that changed while it was read is looked at again: the next look must not take this one for it
         self._last = state if all(file_state(p) == s for p, s in stable.items()) else ()
         return self._snapshot(campaign, runs, placed, problems, {p.resolve() for p in written}, new)
+
+    def _is_within(self, path: Path, problems: list[Problem]) -> bool:
+        """Whether a record is in the folder: a link that leads out of it may appear at any time, and is not opened."""
+        try:
+            inside(self.folder, path.relative_to(self.folder).as_posix(), path.name, "")
+        except RigDataError as error:
+            problems.extend(error.problems)
+            return False
+        return True
 
     @property
     def waits(self) -> bool:
@@ -104,7 +115,7 @@ class Watcher:
         if self._campaign is not None and state == self._manifest:
             return self._campaign, []
         try:
-            self._campaign, self._manifest = load_campaign(path), state
+            self._campaign, self._manifest = load_campaign(self.folder), state
         except RigDataError as error:
             if self._campaign is None:
                 raise
@@ -142,7 +153,7 @@ class Watcher:
                 observed[run.id] = before
                 continue
             record = _Observed(mark, observe(run), _iso(state), _digest(path), seconds(run))
-            if file_state(path) == state:
+            if file_state(path) == state and self._is_within(path, []):
                 observed[run.id] = record
                 new.append(run.id)
         self._observed = observed

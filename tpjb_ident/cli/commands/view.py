@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -38,7 +39,8 @@ def view(
 
     Runs with channels, spectra and orbits, windows with weights, prediction beside measurement.
 
-    The page is served on 127.0.0.1 only and loads nothing from anywhere else. Stop with Ctrl-C.
+    The page is served on 127.0.0.1 only, under a random path that is printed, and loads nothing from anywhere else.
+    Stop with Ctrl-C.
     """
     from tpjb_ident.view.server import Session
 
@@ -47,19 +49,21 @@ def view(
         session = Session(name=place.resolve().name, tables=_tables(c, place))
     else:
         session = _campaign_session(c, source, bearing)
-    from tpjb_ident.view.server import serve
+    from tpjb_ident.view.server import private_link, serve
 
-    def ready(address: str) -> None:
-        c.print(f"{session.name}: {address}   (Ctrl-C ends it)")
-        if browser:
-            import webbrowser
+    with contextlib.ExitStack() as links:
 
-            webbrowser.open(address)
+        def ready(address: str) -> None:
+            c.print(f"{session.name}: {address}   (Ctrl-C ends it)")
+            if browser:
+                import webbrowser
 
-    try:
-        serve(session, port, ready, seconds)
-    except KeyboardInterrupt:
-        c.note("closed.")
+                webbrowser.open(links.enter_context(private_link(address)))
+
+        try:
+            serve(session, port, ready, seconds)
+        except KeyboardInterrupt:
+            c.note("closed.")
 
 
 def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session:
