@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign, load_campaign
+    from rigdata.device import Device
     from rigdata.operating_point import OperatingPoint
     from rigdata.problem import Problem, RigDataError
     from rigdata.record import Record, VectorRecord
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Campaign": "campaign",
     "Channel": "calibration",
+    "Device": "device",
     "OperatingPoint": "operating_point",
     "Problem": "problem",
     "Record": "record",
@@ -36,6 +38,7 @@ _HOMES = {
 __all__ = [
     "Campaign",
     "Channel",
+    "Device",
     "OperatingPoint",
     "Problem",
     "Record",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,6 +81,14 @@ class Channel:
         Of `zero`, one standard deviation, SI.
     clock : str
         Channels of one clock share a letter; "" where the manifest says nothing.
+    sample_rate : float or None
+        Of a device without times of its own [Hz].
+    plane : float
+        Axial position from the film's mid-plane [m].
+    temperature_coefficient, temperature_coefficient_uncertainty : float
+        Relative change of the gain per kelvin away from `temperature_reference`, and one standard deviation of it.
+    temperature_reference : float or None
+        [K]; None: mean over the campaign's runs.
 
     Examples
     --------
@@ -102,6 +111,17 @@ class Channel:
     delay_uncertainty: float = 0.0
     zero_uncertainty: float = 0.0
     clock: str = ""
+    sample_rate: float | None = None
+    plane: float = 0.0
+    temperature_coefficient: float = 0.0
+    temperature_coefficient_uncertainty: float = 0.0
+    temperature_reference: float | None = None
+
+    @property
+    def calibration(self) -> Hashable:
+        """What channels share that share one error of the gain: the sensor, its sensitivity and its uncertainty."""
+        signal = parse_unit(self.unit, DIMENSIONS[self.quantity]).factor if self.quantity in DIMENSIONS else 1.0
+        return self.name, float(f"{self.gain / signal:.9g}"), self.uncertainty
 
     @property
     def slope(self) -> float:

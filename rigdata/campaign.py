@@ -51,6 +51,10 @@ class Campaign:
         Of the housing's mass, one standard deviation [kg].
     mains : float or None
         Mains frequency as the manifest states it [Hz].
+    rotation : str
+        ``"counter-clockwise"`` or ``"clockwise"``.
+    mount : str or None
+        ``"floating"``: the stator hangs on its stingers; ``"cells"``: it stands on the load cells; None: not stated.
 
     Examples
     --------
@@ -71,6 +75,8 @@ class Campaign:
     files: Mapping[str, Path] = field(repr=False, default_factory=dict)
     mass_uncertainty: float = 0.0
     mains: float | None = None
+    rotation: str = "counter-clockwise"
+    mount: str | None = None
 
     def __str__(self) -> str:
         counts = Counter(run.kind for run in self.runs)
@@ -221,13 +227,13 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
     cache = ReadingCache()
 
-    def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
+    def reader_of(entry: RunEntry, rate: float | None, channels: Mapping[str, Channel]) -> RunReader:
         place = f"[[runs]] no. {entry.index + 1} file"
         target = inside(folder, entry.file, manifest_path.name, place, entry.id)
         files[entry.file] = target
         if is_foreign(target):
-            return ForeignReader(target, entry.file, entry.id, manifest.channels, rate, cache)
-        return CsvReader(target, entry.file, entry.id, manifest.channels, rate, cache, manifest.csv)
+            return ForeignReader(target, entry.file, entry.id, channels, rate, cache)
+        return CsvReader(target, entry.file, entry.id, channels, rate, cache, manifest.csv)
 
     return _assembled(manifest, reader_of, problems, path=folder, bearing_text=bearing, files=files)
 
@@ -265,7 +271,8 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
 
 
 def _load_hdf5(path: Path) -> Campaign:
-    from rigdata.readers.hdf5.reader import Hdf5Reader, read_texts, refuse_claims
+    from rigdata.readers.hdf5.reader import Hdf5Reader
+    from rigdata.readers.hdf5.texts import read_texts, refuse_claims
 
     text, bearing = read_texts(path, path.name)
     files = {path.name: path}
@@ -276,10 +283,9 @@ def _load_hdf5(path: Path) -> Campaign:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"
         problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))
         bearing = ""
-    clock = next((c for c in manifest.channels.values() if c.quantity == "time"), None)
 
-    def reader_of(entry: RunEntry, rate: float | None) -> RunReader:
-        return Hdf5Reader(path, entry.id, path.name, rate, manifest.channels, clock)
+    def reader_of(entry: RunEntry, rate: float | None, channels: Mapping[str, Channel]) -> RunReader:
+        return Hdf5Reader(path, entry.id, path.name, rate, channels)
 
     return _assembled(manifest, reader_of, problems, path=path, bearing_text=bearing, files=files)
 
@@ -296,16 +302,17 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
 
 def _assembled(
     manifest: Manifest,
-    reader_of: Callable[[RunEntry, float | None], RunReader],
+    reader_of: Callable[[RunEntry, float | None, Mapping[str, Channel]], RunReader],
     problems: list[Problem],
     **source: Any,
 ) -> Campaign:
     """The campaign of a manifest, with a reader for each run; refused if anything is wrong with either."""
-    channels = {name: channel for name, channel in manifest.channels.items() if channel.quantity != "ignore"}
+    channels = _used(manifest.channels)
     runs = []
     for entry in manifest.runs:
+        described = manifest.described.get(entry.id)
         try:
-            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate)
+            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate, described or manifest.channels)
         except RigDataError as error:
             problems.extend(error.problems)
             continue
@@ -316,11 +323,13 @@ def _assembled(
             excitation_direction=entry.excitation_direction,
             pad=entry.pad,
             branch=entry.branch,
-            channels=channels,
+            channels=channels if described is None else _used(described),
             stated=entry.stated,
             reader=reader,
             excitation_kind=entry.excitation,
             band=entry.band,
+            rotation=entry.rotation or manifest.rotation,
+            temperature=entry.temperature,
         )
         runs.append(run)
     if any(p.severity == "error" for p in problems):
@@ -335,5 +344,11 @@ def _assembled(
         notes=(*manifest.notes, *problems),
         mass_uncertainty=manifest.mass_uncertainty,
         mains=manifest.mains,
+        rotation=manifest.rotation,
+        mount=manifest.mount,
         **source,
     )
+
+
+def _used(channels: Mapping[str, Channel]) -> dict[str, Channel]:
+    return {name: channel for name, channel in channels.items() if channel.quantity != "ignore"}

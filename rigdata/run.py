@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
+from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
@@ -42,6 +44,10 @@ class Run:
         ``"sine"``, ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
     band : (float, float) or None
         Lowest and highest frequency excited [Hz].
+    rotation : str
+        Sense of turning, ``"counter-clockwise"`` or ``"clockwise"``.
+    temperature : float or None
+        At the probes, as stated [K]; `mean_temperature` also asks the thermometers.
 
     Examples
     --------
@@ -63,6 +69,8 @@ class Run:
     reader: RunReader = field(repr=False, compare=False)
     excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
+    rotation: str = "counter-clockwise"
+    temperature: float | None = None
 
     def __repr__(self) -> str:
         towards = "" if self.pad is None else f", pad #{self.pad}"
@@ -77,8 +85,80 @@ class Run:
         return refuse(self.file, place, fault, remedy, self.id)
 
     @property
+    def devices(self) -> tuple[Device, ...]:
+        """Channels that are sampled together; the run's own device, that of the first displacement channel, first."""
+        devices = getattr(self.reader, "devices", None)
+        if devices is not None:
+            return tuple(devices())
+        names = tuple(name for name, channel in self.channels.items() if channel.quantity != "time")
+        return (Device("", names, self.sample_rate, self.length, False),)
+
+    def _apart(self, names: Iterable[str]) -> bool:
+        """Whether channels are sampled apart from the run's own device; refused where only some of them are."""
+        names = tuple(names)
+        apart: frozenset[str] = getattr(self.reader, "apart", frozenset)()
+        if not apart.intersection(names):
+            return False
+        devices = {name: device for device in self.devices for name in device.channels}
+        rates = {(devices[name].rate, devices[name].length) for name in names if name in devices}
+        if len({name in apart for name in names}) > 1 or len(rates) > 1:
+            listed = ", ".join(f"{name} ({devices[name].rate:.6g} Hz)" for name in names if name in devices)
+            fault = f"are not sampled at the same times: {listed}"
+            raise self._refuse("channels", fault, "Read them device by device, see Run.devices")
+        return True
+
+    def read_device(
+        self, device: Device, names: Sequence[str], start: int | None = None, stop: int | None = None
+    ) -> tuple[FloatArray | None, FloatArray]:
+        """Read channels of one device at their own times.
+
+        Parameters
+        ----------
+        device : Device
+            One of `devices`.
+        names : sequence of str
+            Of its channels.
+        start, stop : int, optional
+            Samples of the device, as in a Python slice; default all.
+
+        Returns
+        -------
+        time : (n,) ndarray or None
+            Seconds; None where they are counted from the device's rate.
+        values : (len(names), n) ndarray
+            SI.
+
+        Examples
+        --------
+        >>> run = ti.load_campaign(demo).run("d-05000-25-01")
+        >>> time, values = run.read_device(run.devices[0], ["X1A", "X1B"], 0, 100)
+        >>> values.shape
+        (2, 100)
+        """
+        for name in names:
+            if name not in device.channels:
+                listed = f"It has {', '.join(device.channels)}"[:200]
+                raise self._refuse(f"channel {name}", f"is none of device {device.name!r}", listed)
+        first, last, _ = slice(start, stop).indices(device.length)
+        last = max(first, last)
+        is_apart = self._apart(names)
+        reader: Any = self.reader
+        readings = (reader.read_device if is_apart else reader.read)(names, first, last) if names else []
+        values = np.empty((len(names), last - first))
+        for row, name, reading in zip(values, names, readings, strict=True):
+            row[:] = self.channels[name].to_si(reading)
+        if device.counted:
+            return None, values
+        time = reader.device_time(device.channels[0], first, last) if is_apart else reader.time(first, last)
+        back = np.flatnonzero(np.diff(time) < 0)
+        if len(back):
+            place = f"device {device.name!r}, sample {first + int(back[0]) + 2}"
+            raise self._refuse(place, "time runs backwards", "Sort or split the run")
+        return time, values
+
+    @property
     def length(self) -> int:
-        """Samples per channel."""
+        """Samples per channel of the run's own device."""
         return self.reader.length()
 
     @property
@@ -138,17 +218,30 @@ class Run:
         if channel is None:
             remedy = f"Described: {', '.join(self.channels)}"
             raise self._refuse(f"channel {name}", "is not described in the manifest", remedy)
-        first, last = self._slice(start, stop)
-        (reading,) = self.reader.read([name], first, last)
-        rate = self.sample_rate  # rejected before times are counted from it
+        (reading,), time, rate = self._stretch([name], start, stop)
         return Record(
             name=name,
             quantity=channel.quantity,
             values=channel.to_si(reading),
-            time=self.reader.time(first, last),
+            time=time,
             rate=rate,
             axis=channel.axis,
         )
+
+    def _stretch(
+        self, names: Sequence[str], start: int | None, stop: int | None
+    ) -> tuple[list[FloatArray], FloatArray, float]:
+        """Readings (n,) of channels that are sampled together, their times (n,) and their rate."""
+        if not self._apart(names):
+            first, last = self._slice(start, stop)
+            readings = self.reader.read(names, first, last)
+            rate = self.sample_rate  # rejected before times are counted from it
+            return readings, self.reader.time(first, last), rate
+        reader: Any = self.reader
+        device = next(device for device in self.devices if names[0] in device.channels)
+        first, last, _ = slice(start, stop).indices(device.length)
+        last = max(first, last)
+        return reader.read_device(names, first, last), reader.device_time(names[0], first, last), device.rate
 
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
         """X and Y of `quantity`, from its channels at any two different angles.
@@ -178,13 +271,12 @@ class Run:
         """
         channels = self._vector_channels(quantity)
         names = tuple(c.name for c in channels)
-        first, last = self._slice(start, stop)
-        rows = vector_rows(channels, self.reader.read(names, first, last))
-        rate = self.sample_rate  # rejected before times are counted from it
+        readings, time, rate = self._stretch(names, start, stop)
+        rows = vector_rows(channels, readings)
         return VectorRecord(
             quantity=quantity,
             values=np.ascontiguousarray(rows.T),
-            time=self.reader.time(first, last),
+            time=time,
             rate=rate,
             names=names,
         )
@@ -217,6 +309,17 @@ class Run:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
         opener = getattr(self.reader, "opened", None)
         return nullcontext() if opener is None else opener()
+
+    def mean_temperature(self) -> float | None:
+        """Temperature of the run [K]: as stated, else the mean of its thermometers; None where there is neither."""
+        if self.temperature is not None:
+            return self.temperature
+        means = []
+        for channel in self.temperatures():
+            with suppress(RigDataError):  # `check` tells
+                values = self.record(channel.name).values
+                means += [float(np.nanmean(values))] if np.isfinite(values).any() else []
+        return float(np.mean(means)) if means else None
 
     def temperatures(self) -> tuple[Channel, ...]:
         """Temperature channels of this run, by pad and position."""
@@ -256,7 +359,10 @@ class _FileRows:
         """Samples start..stop-1."""
         reader = self._run.reader
         channels = {q: self._run._vector_channels(q) for q in self._quantities}
-        names = [c.name for c in (*itertools.chain(*channels.values()), *self._tachometers)]
+        names = [c.name for c in itertools.chain(*channels.values())]
+        if self._run._apart(names):
+            return self._rows_apart(channels, names, start, stop)
+        names += [c.name for c in self._tachometers]
         readings = dict(zip(names, reader.read(names, start, stop), strict=True)) if names else {}
         rows = {}
         for quantity, sensors in channels.items():
@@ -265,6 +371,13 @@ class _FileRows:
         for tachometer in self._tachometers:
             speed = tachometer.to_si(readings[tachometer.name])
         return Rows(rows, None if self._counted else reader.time(start, stop), speed)
+
+    def _rows_apart(self, channels: dict[str, list[Channel]], names: list[str], start: int, stop: int) -> Rows:
+        """Rows of another device than the run's own, which does not know the speed."""
+        values, time, _ = self._run._stretch(names, start, stop)
+        readings = dict(zip(names, values, strict=True))
+        rows = {q: vector_rows(sensors, [readings[c.name] for c in sensors]) for q, sensors in channels.items()}
+        return Rows(rows, time, None)
 
 
 def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ from rigdata.units import UnitError, is_signal
 
 _FIELD = {field.key: field for field in CHANNEL}
 #: Entries that say where a sensor sits: a channel that is `like` another has its own.
-_PLACE = ("axis", "pad", "position")
+_PLACE = ("axis", "pad", "position", "plane", "for")
 #: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
 TextFile = Callable[[str, str], str]
 _MAX_CHANNELS = 4096
@@ -45,13 +45,10 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
         if "like" in entry.data and not _complete(entry, name, tables, channels):
             continue
         errors = findings.errors
-        channel = _read_channel(name, entry, files)
+        channel = read_channel(name, entry, files)
         if channel is not None and findings.errors == errors:
             channels[name] = channel
-    channels = {name: channels[name] for name in tables if name in channels}
-    if sum(c.quantity == "time" for c in channels.values()) > 1:
-        findings.error(("channels",), "more than one channel is the time", 'Set the others to quantity = "ignore"')
-    return channels
+    return {name: channels[name] for name in tables if name in channels}
 
 
 def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str, Channel]) -> bool:
@@ -69,7 +66,8 @@ def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str,
     return True
 
 
-def _read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
+def read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
+    """One channel; None where anything is wrong, which is then noted."""
     heading = f"[channels.{name[:40]}]"
     if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
         table.only(CHANNEL, heading)

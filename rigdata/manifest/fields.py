@@ -27,9 +27,10 @@ KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
 #: How a dynamic run is excited.
 _EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 _BRANCHES = ("up", "down", "cycle")
+_ROTATIONS = ("counter-clockwise", "clockwise")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
-_RAW = ("table", "list", "sign", "calibration")
+_RAW = ("table", "tables", "list", "sign", "calibration")
 
 
 @dataclass(frozen=True)
@@ -69,15 +70,24 @@ TOP = (
     Field("id", "text", "name of the campaign", '"rocker-A"', required=True),
     Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', required=True),
     Field("description", "text", "free text", '"after overhaul"', default=""),
+    Field("shaft", "table", "", ""),
     Field("housing", "table", "", ""),
     Field("acquisition", "table", "", ""),
     Field("csv", "table", "", ""),
     Field("channels", "table", "", ""),
     Field("runs", "table", "", ""),
 )
+SHAFT = (Field("rotation", "choice", "sense of turning", '"clockwise"', default=_ROTATIONS[0], choices=_ROTATIONS),)
 HOUSING = (
     Field("mass", "mass", "stator mass between oil film and load cells", '"30 kg"', default=math.nan, low=0.0),
     Field("mass_uncertainty", "mass", "of the mass", '"0.5 kg"', default=0.0, low=0.0),
+    Field(
+        "mount",
+        "choice",
+        "on its load cells, or hung on stingers; else found in the records",
+        '"floating"',
+        choices=("floating", "cells"),
+    ),
 )
 ACQUISITION = (
     Field("sample_rate", "frequency", "where the records hold no times", '"2 kHz"', above=0.0),
@@ -120,7 +130,15 @@ CHANNEL = (
     Field("filter", "text", "bessel or butterworth, order, low or high, corner; taken out", '"bessel 4 low 800 Hz"'),
     Field("filter_table", "text", "file of the measured response: frequency_Hz, gain, phase_deg", '"l1h.csv"'),
     Field("clock", "text", "channels recorded by one device share a letter", '"B"', default=""),
+    Field("sample_rate", "frequency", "of a device without times of its own", '"500 Hz"', above=0.0),
+    Field("plane", "length", "axial distance from the film's middle; two planes at most", '"12 mm"', default=0.0),
+    Field("temperature_coefficient", "per kelvin", "change of the gain; taken out", '"-0.02 %/K"', default=0.0),
+    Field("temperature_coefficient_uncertainty", "per kelvin", "of that", '"0.01 %/K"', default=0.0, low=0.0),
+    Field("temperature_reference", "temperature", "of the gain; else the runs' mean", '"20 degC"', low=0.0),
+    Field("for", "tables", "other entries for some runs: `[[channels.NAME.for]]`", 'runs = ["p-*"]'),
 )  # fmt: skip
+#: Of one entry of `for`, besides all keys of a channel that it changes.
+RUNS_OF = Field("runs", "list", "ids of runs; * stands for any characters", '["p-*", "c-1"]', required=True)
 RUN = (
     Field("id", "text", "name of the run", '"d-05000-25-03"', required=True),
     Field("file", "text", "record in the folder; HDF5: the group /runs/ID", '"runs/d-05000-25-03.csv"', default=""),
@@ -135,9 +153,11 @@ RUN = (
     Field("pad", "whole", "number of the pad that a dry test loads, without quotes", "1", low=1, high=100),
     Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=_BRANCHES),
     Field("sample_rate", "frequency", "of this run", '"500 Hz"', above=0.0),
+    Field("rotation", "choice", "of this run; default the shaft's", '"clockwise"', choices=_ROTATIONS),
+    Field("temperature", "temperature", "at the probes; else the mean of the thermometers", '"46 degC"', low=0.0),
 )
 _TABLES = {
-    "": TOP, "[housing]": HOUSING, "[acquisition]": ACQUISITION, "[csv]": CSV,
+    "": TOP, "[shaft]": SHAFT, "[housing]": HOUSING, "[acquisition]": ACQUISITION, "[csv]": CSV,
     "[channels.NAME]": CHANNEL, "[[runs]]": RUN,
 }  # fmt: skip
 
@@ -163,6 +183,7 @@ def markdown() -> str:
 _HOLDS = {
     "whole": "whole number",
     "list": "list of texts",
+    "tables": "tables",
     "sign": "1 or -1",
     "calibration": "with its unit",
     "ratio": "number or %",
@@ -175,7 +196,7 @@ def _holds(field: Field) -> str:
         text += f" from {field.low:g}"
     if field.required:
         return f"{text}; needed"
-    if field.kind == "choice":
+    if field.kind == "choice" and field.default:
         return f"{text}; default {field.default}"
     return text
 
@@ -220,7 +241,7 @@ class Findings:
     def append(self, problem: Problem) -> None:
         """Note a problem that was found elsewhere."""
         self.errors += problem.severity == "error"
-        if len(self.problems) < _MAX_FINDINGS:
+        if len(self.problems) < _MAX_FINDINGS and problem not in self.problems:
             self.problems.append(problem)
 
     def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
@@ -235,6 +256,7 @@ class Table:
         self.path = path
         self.findings = findings
         self.data: dict[str, Any] = data if isinstance(data, dict) else {}
+        self.origins: dict[str, Path] = {}  # of keys that come from another table
         if not isinstance(data, dict):
             findings.error(path, f"is {shown(data)}, not a table", "Write it as a [table] with keys")
 
@@ -244,7 +266,7 @@ class Table:
 
     def error(self, key: str, what: str, cure: str) -> None:
         """Note an error of `key`."""
-        self.findings.error((*self.path, key), what, cure)
+        self.findings.error(self.origins.get(key, (*self.path, key)), what, cure)
 
     def read(self, fields: tuple[Field, ...], heading: str, needed: Collection[str] = ()) -> dict[str, Any]:
         """The value of every field, SI; keys that are no field are noted."""
@@ -341,8 +363,9 @@ def _spell(path: Path) -> str:
     """``"[channels.X1A] sensitivity"``."""
     if len(path) == 1:
         return str(path[0])
-    if path and path[0] == "runs" and isinstance(path[1], int):
-        keys = "".join(f" {p}" for p in path[2:])
-        return f"[[runs]] no. {path[1] + 1}{keys}"
+    for at, number in enumerate(path):
+        if isinstance(number, int):
+            keys = "".join(f" {p}" for p in path[at + 1 :])
+            return f"[[{'.'.join(str(p) for p in path[:at])}]] no. {number + 1}{keys}"
     table = ".".join(str(p) for p in path[:-1])
     return f"[channels.{path[-1]}]" if table == "channels" else f"[{table}] {path[-1]}"

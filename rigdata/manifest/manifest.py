@@ -10,7 +10,8 @@ from typing import Any
 
 from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
-from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, TOP, Findings, Table, key_lines
+from rigdata.manifest.channels_of_runs import channels_by_run
+from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, SHAFT, TOP, Findings, Table, key_lines
 from rigdata.manifest.runs import RunEntry, read_runs
 from rigdata.problem import Problem, RigDataError, refuse
 
@@ -49,6 +50,9 @@ class Manifest:
     notes: tuple[Problem, ...] = ()
     mass_uncertainty: float = 0.0
     mains: float | None = None
+    rotation: str = "counter-clockwise"
+    mount: str | None = None
+    described: Mapping[str, Mapping[str, Channel]] = field(default_factory=dict, repr=False)  #: by run, if other
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
@@ -60,8 +64,10 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     if header["schema"] not in (None, _SCHEMA):
         message = f"schema is {header['schema']!r}, not {_SCHEMA!r}"
         findings.error(("schema",), message, "Export in the format tpjb-rig/1")
-    channels = read_channels(top.subtable("channels"), findings, files)
+    tables = top.subtable("channels")
+    channels = read_channels(tables, findings, files)
     runs = read_runs(data.get("runs"), findings)
+    described = channels_by_run(tables, channels, [run.id for run in runs], files)
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
     housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
     acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")
@@ -80,6 +86,9 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         notes=tuple(p for p in findings.problems if p.severity != "error"),
         mass_uncertainty=housing["mass_uncertainty"],
         mains=mains,
+        rotation=top.subtable("shaft").read(SHAFT, "[shaft]")["rotation"],
+        mount=housing["mount"],
+        described=described,
     )
     if findings.errors:
         raise RigDataError(findings.problems)

@@ -36,6 +36,8 @@ class RunEntry:
     index: int
     excitation: str = "sine"
     band: tuple[float, float] | None = None
+    rotation: str | None = None
+    temperature: float | None = None
 
 
 def read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
+from rigdata.device import Device, Grid, by_clock
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, refuse
 
@@ -94,6 +97,43 @@ def refuse_claim(claimed: int, size: int, file: str, run: str | None = None) -> 
     if claimed > CLAIM_FREE + CLAIM_MULTIPLES * size:
         fault = f"claims {claimed / 1e6:.0f} MB of samples in a file of {size / 1e6:.3g} MB"
         raise refuse(file, "", fault, "Copy it again from the logger, or split the run", run)
+
+
+class GridReader:
+    """What readers of files with several devices have in common."""
+
+    channels: Mapping[str, Channel]
+
+    def _grids(self) -> Sequence[Grid]:
+        """Channels at the same times, those of the run's own device first."""
+        raise NotImplementedError
+
+    def _grid(self, name: str) -> Grid:
+        """Channels at the times of `name`."""
+        grids = self._grids()
+        return next((grid for grid in grids if name in grid.channels), grids[0])
+
+    def devices(self) -> tuple[Device, ...]:
+        """Channels that are sampled together."""
+        return by_clock(self._grids(), self.channels)
+
+    def apart(self) -> frozenset[str]:
+        """Channels that are not sampled with the run's own device."""
+        return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._grids()[1:]))
+
+    def _along(self, name: str, start: int, stop: int) -> FloatArray:
+        """Readings of another device along the run's own times, for those who look at all channels together.
+
+        Straight lines, missing before the first sample and after the last; no phasor may come from it.
+        """
+        reader: Any = self
+        length = self._grid(name).length
+        (values,) = reader.read_device([name], 0, length)
+        at = reader.device_time(name, 0, length)
+        finite = np.isfinite(values)
+        if not finite.any():
+            return np.full(stop - start, np.nan)
+        return np.interp(reader.time(start, stop), at[finite], values[finite], left=np.nan, right=np.nan)
 
 
 def undescribed(names: Sequence[str], members: str, file: str, run: str) -> tuple[Problem, ...]:

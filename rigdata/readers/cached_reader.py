@@ -13,9 +13,11 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
+from rigdata.device import Grid
 from rigdata.near_names import hint
 from rigdata.problem import RigDataError, refuse
-from rigdata.readers.base import rate_of_time
+from rigdata.readers.base import GridReader, rate_of_time
+from rigdata.readers.grids import Layout
 from rigdata.readers.series import Columns
 
 #: Parsed columns cached by a campaign before the oldest run is let go [bytes].
@@ -55,7 +57,7 @@ class ReadingCache:
 
 
 @dataclass(frozen=True)
-class CachedReader:
+class CachedReader(GridReader):
     """One run's file; what files of every kind that is parsed as a whole have in common."""
 
     path: Path
@@ -80,7 +82,7 @@ class CachedReader:
         """Names of all columns, "" where one has none."""
         return tuple(self._columns(()).values)
 
-    def _signature(self) -> tuple[Path, int, int]:
+    def _signature(self) -> tuple[Path, int, int, str]:
         """A key that changes when the file does, so that the cache never serves an old one."""
         try:
             state = self.path.stat()
@@ -88,35 +90,74 @@ class CachedReader:
             raise self._refuse("", "the file is not there", "Restore it, or delete the run") from error
         if not self.path.is_file():
             raise self._refuse("", "is not an ordinary file", "Name a record in the manifest")
-        return self.path, state.st_size, state.st_mtime_ns
+        return self.path, state.st_size, state.st_mtime_ns, self.run
+
+    def _layout(self) -> Layout | None:
+        """All channels at their own times; None where all share the rows of the file."""
+        return None
+
+    def _grids(self) -> Sequence[Grid]:
+        layout = self._layout()
+        if layout is not None:
+            return layout.grids
+        times = self._times()
+        rate = float("nan") if times is None else rate_of_time(times)
+        rate = rate if rate > 0 else self.stated_rate or rate
+        return [Grid(self.length(), "" if times is None else "times", rate, channels=list(self.names()))]
+
+    def apart(self) -> frozenset[str]:
+        """Channels that are not sampled with the run's own device."""
+        return frozenset() if self._layout() is None else super().apart()
+
+    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device, (stop - start,) each."""
+        layout = self._layout()
+        values = self._columns(names).values if layout is None else layout.values
+        return [np.asarray(values[name][start:stop], dtype=float) for name in names]
+
+    def device_time(self, name: str, start: int, stop: int) -> FloatArray:
+        """Seconds (stop - start,) of a channel's samples."""
+        layout = self._layout()
+        return self.time(start, stop) if layout is None else layout.time(self._grid(name), start, stop)
 
     def length(self) -> int:
-        """Count the samples per channel."""
-        return self._columns(()).length
+        """Count the samples per channel of the run's own device."""
+        layout = self._layout()
+        return self._columns(()).length if layout is None else layout.grids[0].length
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings of `names`, (stop - start,) each."""
-        columns = self._columns(names)
+        """Raw readings of `names` along the run's own times, (stop - start,) each."""
+        layout = self._layout()
+        values = self._columns(names).values if layout is None else layout.values
+        faults = {} if layout is None else layout.faults
+        apart = self.apart()
+        readings = []
         for name in names:
-            if name not in columns.values:
-                held = [column for column in self.names() if column]
+            if name in faults:
+                raise faults[name]
+            if name not in values:
+                held = [column.partition(" [")[0] for column in self.names() if column]
                 remedy = hint(name, held, "It holds:")[:220]
                 raise self._refuse(f"channel {name}", "is missing in the file", remedy)
-        return [np.asarray(columns.values[name][start:stop], dtype=float) for name in names]
+            if name in apart:
+                readings.append(self._along(name, start, stop))
+            else:
+                readings.append(np.asarray(values[name][start:stop], dtype=float))
+        return readings
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else the manifest's."""
-        times = self._times()
-        rate = float("nan") if times is None else rate_of_time(times)
-        if rate > 0:
-            return rate
-        if self.stated_rate is None:
+        rate = self._grids()[0].rate
+        if not rate > 0:
             fault = "there are neither usable times nor a sample rate"
             remedy = 'Add sample_rate to the run or to [acquisition], or a channel with quantity = "time"'
             raise self._refuse("", fault, remedy)
-        return self.stated_rate
+        return rate
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,): the file's, else counted from the rate."""
-        times = self._times()
+        layout = self._layout()
+        if layout is not None and layout.grids[0].clock:
+            return layout.time(layout.grids[0], start, stop)
+        times = self._times() if layout is None else None
         return np.arange(start, stop) / self.rate() if times is None else times[start:stop].copy()

@@ -1,4 +1,4 @@
-"""One column of a foreign file on its own clock: which columns are times, and how several clocks come onto one."""
+"""One column of a file at its own times, and which columns are times."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, refuse
-from rigdata.readers.base import SAMPLE, rate_of_time, refuse_claim
+from rigdata.problem import Problem
+from rigdata.readers.base import rate_of_time
 
 #: Longer channels are in a file without a name, and are read from there in pieces [bytes].
 IN_MEMORY = 2**23
-#: Two clocks whose samples differ by this share of a step count as one.
-_SAME = 0.01
 _WORDS = (
     r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
     r"|timestamps?|elapsed ?time|relative ?time"
@@ -62,17 +60,15 @@ class Series:
 
 @dataclass(frozen=True)
 class Columns:
-    """Channels on one clock."""
+    """Channels of one length."""
 
     values: dict[str, FloatArray] = field(repr=False)  #: (n,) each
-    time: FloatArray | None = field(repr=False, default=None)  #: (n,), s
     problems: tuple[Problem, ...] = ()
-    units: dict[str, str] = field(default_factory=dict)  #: as the file states them
 
     @property
     def nbytes(self) -> int:
         """Size of all channels [bytes], in memory or in temporary files."""
-        return sum(a.nbytes for a in self.values.values()) + (0 if self.time is None else self.time.nbytes)
+        return sum(a.nbytes for a in self.values.values())
 
     @property
     def length(self) -> int:
@@ -113,71 +109,6 @@ def with_unique_names(series: Sequence[Series]) -> list[Series]:
         used[name] += 1
         unique.append(replace(channel, name=name if used[name] == 1 else f"{name}_{used[name]}"))
     return unique
-
-
-def on_one_clock(series: Sequence[Series], file: str, run: str | None = None) -> Columns:
-    """Bring channels of several clocks onto that of the fastest one.
-
-    Slower channels (temperatures compared with displacements) are interpolated linearly between their samples and
-    missing (NaN) before their first and after their last one.
-    """
-    channels = with_unique_names(series)
-    if not channels:
-        raise refuse(file, "", "holds no channel of numbers", "Export the run again, with its channels", run)
-    units = {channel.name: channel.unit for channel in channels}
-    timed = [channel for channel in channels if channel.time is not None and len(channel) > 1]
-    if not timed:
-        lengths = {len(channel) for channel in channels}
-        if len(lengths) > 1:
-            fault = f"has channels of {len(lengths)} different lengths and no times"
-            raise refuse(file, "", fault, "Export with a time channel, or channels of one length", run)
-        return Columns({channel.name: channel.values for channel in channels}, units=units)
-    master = max(timed, key=lambda channel: (channel.rate, len(channel)))
-    clock = _rising_times(master, file, run)
-    stored = sum(len(channel) for channel in channels)
-    refuse_claim(SAMPLE * len(clock) * len(channels), SAMPLE * stored, file, run)
-    values, interpolated = {}, []
-    for channel in channels:
-        values[channel.name] = channel.values
-        if channel.time is None:
-            if len(channel) != len(clock):
-                fault = f"channel {channel.name} has {len(channel)} samples and no times"
-                fault += f", {master.name} has {len(clock)}"
-                raise refuse(file, "", fault, "Export it with its time channel", run)
-        elif not _alike(channel.time, clock):
-            times = _rising_times(channel, file, run)
-            values[channel.name] = _interpolated(times, channel.values, clock)
-            interpolated.append(f"{channel.name} ({channel.rate:.4g} Hz)")
-    problems: tuple[Problem, ...] = ()
-    if interpolated:
-        names = ", ".join(interpolated[:8])
-        fault = f"interpolated onto the clock of {master.name} ({master.rate:.6g} Hz): {names}"
-        problems = (Problem("note", file, "", fault, "Nothing, if that is meant", run),)
-    return Columns(values, clock, problems, units)
-
-
-def _rising_times(channel: Series, file: str, run: str | None) -> FloatArray:
-    time = np.asarray(channel.time, dtype=float)
-    if not np.isfinite(time).all() or np.any(np.diff(time) < 0):
-        fault = f"the times of {channel.name} have gaps or run backwards"
-        raise refuse(file, "", fault, "Sort or split the run, or export without times and state sample_rate", run)
-    return time
-
-
-def _alike(time: FloatArray, clock: FloatArray) -> bool:
-    if time is clock:
-        return True
-    if len(time) != len(clock):
-        return False
-    step = (clock[-1] - clock[0]) / max(len(clock) - 1, 1)
-    return bool(np.all(np.abs(time - clock) <= _SAME * step))
-
-
-def _interpolated(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
-    finite = np.isfinite(values)
-    if not finite.any():
-        return np.full(len(clock), np.nan)
-    return to_temporary_file(np.interp(clock, time[finite], values[finite], left=np.nan, right=np.nan))
 
 
 def is_time(name: str) -> bool:

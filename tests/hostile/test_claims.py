@@ -14,7 +14,8 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.readers import base
 from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.series import Series, on_one_clock
+from rigdata.readers.grids import arranged
+from rigdata.readers.series import Series
 from tests.hostile import claims
 from tests.hostile.fuzz_targets import CSV_MANIFEST
 
@@ -77,8 +78,13 @@ def test_each_format_is_refused_by_what_it_claims(make, tmp_path):
         read_foreign(path, path.name)
 
 
-def test_short_channels_are_not_spread_over_a_long_clock_without_limit():
+def test_short_channels_are_not_spread_over_a_long_clock():
     clock = Series("fast", "", np.zeros(1000), np.arange(1000.0))
-    slow = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 999.0])) for i in range(300_000)]
-    with pytest.raises(RigDataError, match="claims 2400 MB"):
-        on_one_clock([clock, *slow], "x.tdms")
+    slow = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 999.0])) for i in range(10_000)]
+    assert arranged([clock, *slow], {}, None, "x.tdms", None).nbytes == 8 * (2 * 1000 + 2 * 10_000 + 2)
+
+
+def test_different_times_without_end_are_refused():
+    series = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 1.05**i])) for i in range(2000)]
+    with pytest.raises(RigDataError, match="more than 1000 different times"):
+        arranged(series, {}, None, "x.tdms", None)

@@ -17,7 +17,8 @@ from rigdata.readers import series
 from rigdata.readers.base import FORMATS
 from rigdata.readers.cached_reader import ReadingCache
 from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
-from rigdata.readers.series import Series, equidistant, is_time, on_one_clock, seconds
+from rigdata.readers.grids import arranged
+from rigdata.readers.series import Series, equidistant, is_time, seconds, with_unique_names
 from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
 
@@ -113,6 +114,8 @@ WRITERS = {
 }
 
 
+#: Formats that hold one table, with a thermometer at every sample.
+ONE_RATE = ("one.mat", "new.mat", "one.parquet")
 #: MDF takes a second for each file, since its library is loaded in a process of its own.
 SLOWLY_READ = {"one.mf4": pytest.mark.slow}
 
@@ -135,10 +138,9 @@ def test_every_format_comes_through_the_same_record(campaign):
     np.testing.assert_allclose(record.values, -X / 7780.0, atol=1e-9)  # 7.78 mV/um, polarity -1
     np.testing.assert_allclose(record.time, TIME, atol=1e-9)
     np.testing.assert_allclose(run.record("L1H").values, 1e3 * F, atol=1e-3)
-    warm = run.record("T1").values
-    inside = np.isfinite(warm) & (SLOW[-1] >= TIME)
-    assert inside.sum() > 0.9 * COUNT
-    np.testing.assert_allclose(warm[inside], 313.15 + TIME[inside], atol=1e-3)
+    warm = run.record("T1")
+    assert len(warm) == (COUNT if run.file in ONE_RATE else len(SLOW))
+    np.testing.assert_allclose(warm.values, 313.15 + np.minimum(warm.time, SLOW[-1]), atol=1e-3)
     np.testing.assert_array_equal(run.record("X1A", 10, 20).values, record.values[10:20])
     assert not [p for p in check_campaign(campaign) if "cannot be read" in p.what]
 
@@ -164,7 +166,7 @@ def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
 def test_a_broken_file_is_refused_by_name(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(RigDataError) as caught:
-        on_one_clock(read_foreign(tmp_path / name, name), name)
+        read_foreign(tmp_path / name, name)
     assert name in str(caught.value)
 
 
@@ -208,7 +210,7 @@ def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeyp
     monkeypatch.setattr(series, "IN_MEMORY", 1000)
     equidistant.cache_clear()
     long = ForeignReader(path, path.name, "r", {})
-    assert any(isinstance(v, np.memmap) for v in long._columns().values.values())
+    assert any(isinstance(v, np.memmap) for v in long._layout().values.values())
     for start, stop in ((0, COUNT), (17, 400), (COUNT - 3, COUNT)):
         np.testing.assert_array_equal(long.read(["X1A"], start, stop), short.read(["X1A"], start, stop))
         np.testing.assert_array_equal(long.time(start, stop), short.time(start, stop))
@@ -223,26 +225,27 @@ def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
     assert cache.nbytes <= 3 * 8 * COUNT
 
 
-def test_channels_without_times_must_be_of_one_length():
-    with pytest.raises(RigDataError, match="different lengths"):
-        on_one_clock([Series("a", "", np.zeros(4)), Series("b", "", np.zeros(5))], "f")
+def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
+    same = [Series("b", "", np.zeros(5)), Series("c", "", np.zeros(5))]
+    layout = arranged([Series("a", "", np.zeros(4)), *same], {}, None, "f", "r")
+    assert layout.grids[0].channels == ["b", "c"]
+    assert "has 4 samples and no times, the others have 5" in str(layout.faults["a"])
 
 
-def test_the_fastest_clock_wins_and_what_is_outside_is_missing():
+def test_slow_channels_stay_at_their_own_times():
     fast = Series("a", "V", np.arange(11.0), 0.1 * np.arange(11))
     slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
-    columns = on_one_clock([slow, fast], "f")
-    assert columns.length == 11
-    expected = np.interp(fast.time, slow.time, slow.values, left=np.nan, right=np.nan)
-    np.testing.assert_allclose(columns.values["b"], expected, atol=1e-12)
-    assert np.isfinite(expected).tolist() == [False] * 2 + [True] * 7 + [False] * 2
-    assert "b (" in columns.problems[0].what
+    layout = arranged([slow, fast], {}, None, "f", "r")
+    first, second = layout.grids
+    assert (first.length, first.rate, second.length) == (11, 10.0, 2)
+    np.testing.assert_array_equal(layout.time(second, 0, 2), slow.time)
+    np.testing.assert_array_equal(layout.values["b"], slow.values)
 
 
 @pytest.mark.parametrize(("groups", "names"), [(("g1", "g2"), ["g1.a", "g2.a"]), (("", ""), ["a", "a_2"])])
 def test_channels_of_one_name_get_their_groups_name_or_a_number(groups, names):
-    columns = on_one_clock([Series("a", "", np.zeros(3), group=group) for group in groups], "f")
-    assert list(columns.values) == names
+    series = with_unique_names([Series("a", "", np.zeros(3), group=group) for group in groups])
+    assert [channel.name for channel in series] == names
 
 
 def test_only_these_suffixes_are_foreign(tmp_path):

@@ -212,7 +212,7 @@ def test_short_missing_channels_and_what_takes_the_place_of_the_group(tmp_path):
     path = tmp_path / "c.h5"
     with changed(path, "X1B") as group:
         group["X1B"] = np.zeros(N - 5)
-    with pytest.raises(RigDataError, match="X1B: has 995 samples, the others 1000"):
+    with pytest.raises(RigDataError, match="X1B: has 995 samples and no times, the others have 1000"):
         reopened(path).record("X1B")
     with changed(path, "X1B"):
         pass

@@ -7,35 +7,35 @@ that names the file.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, suffix_hint, undescribed
 from rigdata.readers.cached_reader import CachedReader
-from rigdata.readers.series import Columns, Series, on_one_clock
+from rigdata.readers.grids import Layout, arranged, table
+from rigdata.readers.series import Series, with_unique_names
 from rigdata.stated_units import unit_problems
 
 #: Larger files are rejected: these formats are read whole [bytes].
 LARGEST = 2**31
-_TEXT = (".asc", ".txt")
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a record is for this reader: by its suffix, or a text file with several time bases."""
-    if path.suffix.lower() in FORMATS:
-        return True
-    if path.suffix.lower() not in _TEXT or not path.is_file():
-        return False
-    from rigdata.readers.text.catman import has_several_clocks
-
-    return has_several_clocks(path)
+    """Whether a record is for this reader, by its suffix."""
+    return path.suffix.lower() in FORMATS
 
 
-def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
-    """Read every channel of a file, each on its own clock."""
+def read_foreign(
+    path: Path,
+    file: str,
+    run: str | None = None,
+    channels: Mapping[str, Channel] | None = None,
+    stated_rate: float | None = None,
+) -> list[Series]:
+    """Read every channel of a file, each at its own times."""
     again = "Export or copy it again from the logger"
     if not path.is_file():
         raise refuse(file, "", "the file is not there", "Restore it, or delete the run", run)
@@ -61,24 +61,25 @@ def read_foreign(path: Path, file: str, run: str | None = None) -> list[Series]:
         raise refuse(file, "", fault, again, run) from error
     if not series:
         raise refuse(file, "", "holds no channel of numbers", "Export the run again, with its channels", run)
-    return series
+    return table(series, channels or {}, stated_rate)
 
 
 class ForeignReader(CachedReader):
     """One run's file in a foreign format."""
 
-    def _columns(self, names: Sequence[str] = ()) -> Columns:
-        return self.cache.get(
-            self._signature(),
-            lambda: on_one_clock(read_foreign(self.path, self.file, self.run), self.file, self.run),
-        )
+    def _layout(self) -> Layout:
+        return self.cache.get(self._signature(), self._arranged)
 
-    def _times(self) -> FloatArray | None:
-        return self._columns().time
+    def _arranged(self) -> Layout:
+        series = read_foreign(self.path, self.file, self.run, self.channels, self.stated_rate)
+        return arranged(with_unique_names(series), self.channels, self.stated_rate, self.file, self.run)
+
+    def names(self) -> tuple[str, ...]:
+        """Names of all channels."""
+        return tuple(self._layout().values)
 
     def problems(self) -> tuple[Problem, ...]:
-        """Which channels nobody describes, and what was interpolated."""
-        columns = self._columns()
-        extra = [name for name in columns.values if name not in self.channels]
-        units = unit_problems(self.channels, columns.units, self.file, self.run)
-        return (*columns.problems, *units, *undescribed(extra, "channels", self.file, self.run))
+        """Which channels nobody describes, and which state another unit than the manifest."""
+        extra = [name for name in self.names() if name not in self.channels]
+        units = unit_problems(self.channels, self._layout().units, self.file, self.run)
+        return (*units, *undescribed(extra, "channels", self.file, self.run))

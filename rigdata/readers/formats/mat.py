@@ -16,7 +16,7 @@ import numpy as np
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import SAMPLE, refuse_claim
 from rigdata.readers.hdf5.guards import claimed_bytes, foreign_filters
-from rigdata.readers.series import Series, equidistant, is_time, seconds
+from rigdata.readers.series import Series, equidistant, is_time
 
 _RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "abtastrate")
 #: Variables that name the columns of a matrix, and state their units.
@@ -63,16 +63,12 @@ def read_series(path: Path) -> list[Series]:
         names = ", ".join(name for name, _ in variables[:6]) or "no numbers at all"
         fault = f"holds no vector of at least {_SHORTEST} numbers, only {names}"
         raise refuse(path.name, "", fault, "Save the channels as vectors, or as a matrix")
-    clock = next((name for name in vectors if is_time(_last_part(name))), None)
-    time = None if clock is None else seconds(vectors.pop(clock), units.get(clock, ""))
+    timed = {len(values) for name, values in vectors.items() if is_time(_last_part(name))}
     rates = [value for name, value in scalars.items() if value > 0 and _last_part(name).lower() in _RATES]
     series = []
     for name, values in vectors.items():
-        times = None
-        if time is not None and len(time) == len(values):
-            times = time
-        elif rates:
-            times = equidistant(len(values), 1.0 / rates[0])
+        is_counted = rates and len(values) not in timed
+        times = equidistant(len(values), 1.0 / rates[0]) if is_counted else None
         series.append(Series(name, units.get(name, ""), values, times))
     return series
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigdata.readers.base import SAMPLE, refuse_claim
-from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
+from rigdata.readers.series import Series, equidistant, is_time, to_temporary_file
 
 
 def read_series(path: Path) -> list[Series]:
@@ -30,9 +30,7 @@ def read_series(path: Path) -> list[Series]:
             values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
             columns[column.name] = to_temporary_file(values)
             units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-    clock = next(filter(is_time, columns), None)
-    time = None if clock is None else seconds(columns.pop(clock), units[clock])
     rate = (schema.metadata or {}).get(b"sample_rate_hz")
-    if time is None and rate is not None and columns:
-        time = equidistant(rows, 1.0 / float(rate))
+    is_timed = any(map(is_time, columns))
+    time = equidistant(rows, 1.0 / float(rate)) if rate is not None and not is_timed else None
     return [Series(name, units[name], values, time) for name, values in columns.items()]

@@ -14,25 +14,28 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
+from rigdata.device import Grid, Timing, planned
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, rate_of_time, refuse_claim, undescribed
+from rigdata.readers.base import (
+    MAX_REQUEST,
+    MAX_SAMPLES,
+    MOST_RATE,
+    GridReader,
+    rate_of_time,
+    undescribed,
+)
+from rigdata.readers.grids import serving
 from rigdata.readers.hdf5.guards import (
-    TEXT,
     UNIT,
-    broken_heap,
     chunk_bytes,
-    claimed_by_runs,
     foreign_filters,
-    has_link,
     is_plain,
     is_text,
     resolve,
-    too_long_text,
 )
 from rigdata.stated_units import unit_problems
 
 _MAX_CHUNK = 256 * 2**20
-_MAX_TEXT = 8 * 2**20
 _PIECE = 2**20
 #: Bytes of an attribute that is one number.
 _MOST_NUMBER = 64
@@ -42,6 +45,8 @@ _MAX_MEMBERS, _LISTED = 4096, 20
 _RATE = "sample_rate_hz"
 #: Key of an open group among the opened members; no dataset can have this name.
 _GROUP = "/"
+#: Samples of a time dataset that tell its rate.
+_LOOK = 100_000
 #: Bytes of unpacked chunks that the library keeps per dataset.
 _LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
 
@@ -79,71 +84,24 @@ def _first_line(error: BaseException) -> str:
     return "it is cut off before its end" if "truncated file" in text else text[:160]
 
 
-def read_texts(path: Path, file: str) -> tuple[str, str]:
-    """Read the manifest and the bearing text from the root attributes."""
-    try:
-        heap = broken_heap(path)
-    except OSError as error:
-        raise refuse(file, "", f"cannot be read ({error.strerror or error})", "Check the path") from error
-    if heap is not None:
-        fault = "the file is damaged: its store of texts cannot be walked"
-        raise refuse(file, f"byte {heap}", fault, "Copy the file again from the rig")
-    with open_readonly(path, file) as handle:
-        if "manifest" not in handle.attrs:
-            raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
-        damaged = too_long_text(path, ("manifest", "bearing", *UNIT), handle.userblock_size)
-        if damaged is not None:
-            fault = "claims a text longer than the file"
-            raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
-        manifest = _text_attribute(handle, "manifest", file)
-        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
-    return manifest, bearing
-
-
-def refuse_claims(path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
-    """Refuse a file whose runs claim more samples than it can hold."""
-    with open_readonly(path, path.name) as handle:
-        refuse_claim(claimed_by_runs(handle, runs, names), path.stat().st_size, path.name)
-
-
-def _text_attribute(handle: Any, name: str, file: str) -> str:
-    place, remedy = f"root attribute {name}", "Store it as one UTF-8 string"
-    no_text = refuse(file, place, "is not a text, or far too long", remedy)
-    stored = handle.attrs.get_id(name)
-    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != TEXT:
-        raise no_text
-    value = handle.attrs[name]
-    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
-    if isinstance(value, bytes):
-        try:
-            value = value.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise refuse(file, place, "is not UTF-8 text", remedy) from error
-    if not isinstance(value, str) or len(value) > _MAX_TEXT:
-        raise no_text
-    return value
-
-
 @dataclass(frozen=True)
 class _Facts:
     """What every request needs, cached until the file changes."""
 
-    length: int
-    rate: float | None
-    has_time: bool
     members: tuple[str, ...]
+    grids: tuple[Grid, ...]  #: the run's own device first
+    faults: dict[str, RigDataError]  #: of channels without usable times
 
 
 @dataclass(frozen=True)
-class Hdf5Reader:
+class Hdf5Reader(GridReader):
     """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
     path: Path
     run: str
     base: str
     stated_rate: float | None = None
-    described: Mapping[str, Channel] = field(default_factory=dict, repr=False)
-    clock: Channel | None = field(default=None, repr=False)
+    channels: Mapping[str, Channel] = field(default_factory=dict, repr=False)
     cached_facts: dict[tuple[int, int], _Facts] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -199,14 +157,14 @@ class Hdf5Reader:
         """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
         with self._group() as group:
             facts = self._facts(group)
-            if facts.length * 8 <= _LEAST_CACHE:
+            if facts.grids[0].length * 8 <= _LEAST_CACHE:
                 return _LEAST_CACHE
             largest = max(chunk_bytes(group, name) for name in facts.members[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def counted(self) -> bool:
         """Whether times are counted from the rate, not read from the file."""
-        return self.clock is None or not self._facts().has_time
+        return not self._facts().grids[0].clock
 
     def _dataset(self, group: Any, name: str) -> Any:
         if name in self.opened_members:
@@ -260,30 +218,60 @@ class Hdf5Reader:
         if signature not in self.cached_facts:
             with nullcontext(opened) if opened is not None else self._group() as group:
                 rate = self._checked_rate(group.attrs)
-                clock = self.clock is not None and has_link(group, self.clock.name)
                 members = tuple(itertools.islice(group, _MAX_MEMBERS))
-                facts = _Facts(self._length(group), rate, clock, members)
+                facts = _Facts(members, *self._planned(group, rate))
             self.cached_facts.clear()
             self.cached_facts[signature] = facts
         return self.cached_facts[signature]
 
-    def _length(self, group: Any) -> int:
-        """Length that most channels have; one that differs is rejected when it is asked for."""
-        lengths: dict[int, int] = {}
+    def _lengths(self, group: Any) -> dict[str, int]:
+        """Samples of every dataset that can be used."""
+        lengths: dict[str, int] = {}
         problems: list[Problem] = []
         for name in itertools.islice(group, _MAX_MEMBERS):
             try:
-                length = int(self._dataset(group, name).shape[0])
+                lengths[name] = int(self._dataset(group, name).shape[0])
             except RigDataError as error:  # raised again when that channel is asked for
                 problems.extend(error.problems)
-            else:
-                lengths[length] = lengths.get(length, 0) + 1
         if not lengths and problems:
             raise RigDataError(problems[:_LISTED])
         if not lengths:
             fault = "the group holds no dataset of numbers"
             raise self._refuse("", fault, "Store one dataset per channel")
-        return max(lengths, key=lambda n: (lengths[n], n))
+        return lengths
+
+    def _planned(self, group: Any, attribute: float | None) -> tuple[tuple[Grid, ...], dict[str, RigDataError]]:
+        """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
+        lengths = self._lengths(group)
+        names = [name for name in self.channels if name in lengths]
+        clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
+        rates: dict[str, float] = {}
+        run_rate = attribute or self.stated_rate
+        for clock in [names[i] for i in clocks]:
+            rate = rate_of_time(self._seconds(group, clock, 0, min(lengths[clock], _LOOK)))
+            rates[clock] = rate if rate > 0 else run_rate or rate
+            if attribute is not None and not self.channels[clock].clock:
+                rates[clock] = attribute
+        timings = {name: Timing(length) for name, length in lengths.items() if name not in rates}
+        for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
+            same = [names[c] for c in clocks if lengths[names[c]] == lengths[name]]
+            if i is None or name in rates:
+                continue
+            if same:
+                clock = names[i] if names[i] in same else same[0]
+                timings[name] = Timing(lengths[name], clock, rates[clock], clock)
+            else:
+                timings[name] = Timing(lengths[name], times=lengths[names[i]])
+        grids, texts = planned(
+            timings, self.channels, run_rate, lambda clock: float(self._seconds(group, clock, 0, 1)[0])
+        )
+        remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
+        faults = {name: self._refuse(f"dataset {name}", text, remedy) for name, text in texts.items()}
+        return grids or (Grid(max(lengths.values()), "", run_rate or float("nan")),), faults
+
+    def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
+        """Some times of a time dataset [s]."""
+        return self.channels[clock].to_si(self._samples(self._dataset(group, clock), clock, start, stop))
 
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
@@ -300,37 +288,52 @@ class Hdf5Reader:
         return rate
 
     def length(self) -> int:
-        """Count the samples per channel, as most of them have."""
-        return self._facts().length
+        """Count the samples per channel of the run's own device."""
+        return self._facts().grids[0].length
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: the attribute, else of the time dataset, else the manifest's."""
-        facts = self._facts()
-        if facts.rate is not None:
-            return facts.rate
-        if facts.has_time:
-            rate = rate_of_time(self.time(0, min(facts.length, 100_000)))
-            if rate > 0:
-                return rate
-        if self.stated_rate is None:
+        rate = self._facts().grids[0].rate
+        if not rate > 0:
             remedy = "Add the group attribute sample_rate_hz, or [acquisition] sample_rate"
             raise self._refuse("attribute sample_rate_hz", "there is no sample rate", remedy)
-        return self.stated_rate
+        return rate
 
-    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings; only the chunks of the slice are read."""
+    def _grids(self) -> Sequence[Grid]:
+        return self._facts().grids
+
+    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device; only the chunks of the slice are read."""
+        with self._group() as group:
+            return [self._slice(group, name, start, stop) for name in names]
+
+    def _slice(self, group: Any, name: str, start: int, stop: int) -> FloatArray:
         if stop - start > MAX_REQUEST:
             raise self._refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
+        return self._samples(self._dataset(group, name), name, start, stop)
+
+    def device_time(self, name: str, start: int, stop: int) -> FloatArray:
+        """Seconds of a channel's samples: its time dataset, else counted from its rate."""
+        grid = self._grid(name)
+        if not grid.clock:
+            return grid.begin + np.arange(start, stop) / grid.rate
         with self._group() as group:
-            length = self._facts(group).length
-            columns = []
+            return self._seconds(group, grid.clock, start, stop)
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings along the run's own times; only the chunks of the slice are read."""
+        with self._group() as group:
+            facts = self._facts(group)
+            apart = self.apart()
+            readings = []
             for name in names:
-                dataset = self._dataset(group, name)
-                if dataset.shape[0] != length:
-                    fault = f"has {dataset.shape[0]} samples, the others {length}"
-                    raise self._refuse(f"dataset {name}", fault, "Store all channels of a run with one length")
-                columns.append(self._samples(dataset, name, start, stop))
-            return columns
+                if name in facts.faults:
+                    raise facts.faults[name]
+                if name in apart:
+                    readings.append(self._along(name, start, stop))
+                else:
+                    readings.append(self._slice(group, name, start, stop))
+            return readings
 
     def _samples(self, dataset: Any, name: str, start: int, stop: int) -> FloatArray:
         try:
@@ -358,21 +361,23 @@ class Hdf5Reader:
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds: the time dataset where there is one, else counted from the rate."""
-        if self.clock is not None and self._facts().has_time:
-            return self.clock.to_si(self.read([self.clock.name], start, stop)[0])
-        return np.arange(start, stop) / self.rate()
+        grid = self._facts().grids[0]
+        if not grid.clock:
+            return np.arange(start, stop) / self.rate()
+        with self._group() as group:
+            return self._seconds(group, grid.clock, start, stop)
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        extra = [n for n in self._facts().members if n not in self.described]
-        units = unit_problems(self.described, self._units(), self.file, self.run)
+        extra = [n for n in self._facts().members if n not in self.channels]
+        units = unit_problems(self.channels, self._units(), self.file, self.run)
         return (*units, *undescribed(extra, "datasets", self.file, self.run))
 
     def _units(self) -> dict[str, str]:
         """Units that datasets state in an attribute."""
         units = {}
         with self._group() as group:
-            for name in filter(self._facts(group).members.__contains__, self.described):
+            for name in filter(self._facts(group).members.__contains__, self.channels):
                 with suppress(RigDataError):  # raised when that channel is asked for
                     attributes = self._dataset(group, name).attrs
                     stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]

@@ -15,7 +15,8 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.readers.base import MAX_SAMPLES, suffix_hint, undescribed
 from rigdata.readers.cached_reader import CachedReader
-from rigdata.readers.series import Columns
+from rigdata.readers.grids import Layout, arranged, table, time_columns
+from rigdata.readers.series import Columns, Series, seconds, to_temporary_file
 from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
 from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
 from rigdata.readers.text.head import Head, find_head, split_line
@@ -60,26 +61,76 @@ class CsvReader(CachedReader):
         key = (*signature, *names) if is_large else signature
         return self.cache.get(key, lambda: self._parsed(names if is_large else None))
 
+    def _used(self, names: Sequence[str]) -> list[str]:
+        """Those of the columns that are used."""
+        used = {name for name, channel in self.channels.items() if channel.quantity != "ignore"}
+        wanted = [name for name in names if name in used]
+        if not wanted:
+            fault = "holds none of the channels that are used"
+            raise self._refuse("", fault, "Check the channels' names")
+        return wanted
+
     def _parsed(self, names: Sequence[str] | None) -> Columns:
         """All channels that are used; of a large file one, for the number of samples, and `names`."""
         head, clock = self._head(), self._clock()
         clock_name = "" if clock is None else clock.name
-        used = {name for name, channel in self.channels.items() if channel.quantity != "ignore"}
-        wanted = [name for name in head.names if name in used]
-        if not wanted:
-            fault = "holds none of the channels that are used"
-            raise self._refuse("", fault, "Check the channels' names")
+        wanted = self._used(head.names)
+        if clock_name in head.names and clock_name not in wanted:
+            wanted.append(clock_name)
         if names is not None:
             first = clock_name if clock_name in wanted else wanted[0]
             wanted = [name for name in wanted if name == first or name in names]
+        return self._read_table(head, clock_name, wanted)
+
+    def _read_table(self, head: Head, clock_name: str, wanted: Sequence[str]) -> Columns:
         try:
             return read_table(Source(self.path, self.file, self.run, head, clock_name), wanted)
         except OSError as error:
             fault = f"cannot be read ({error})"
             raise self._refuse("", fault, "Check the file and its rights") from error
 
+    def _time_columns(self) -> list[int]:
+        """Places of the columns of times; one that nobody describes counts where nothing else tells the times."""
+        head = self._head()
+        places = [i for i in time_columns(head.names, self.channels) if i not in head.dates]
+        is_needed = len(places) > 1 or self.stated_rate is None
+        return [i for i in places if is_needed or head.names[i] in self.channels]
+
     def _clock(self) -> Channel | None:
-        return next((c for c in self.channels.values() if c.quantity == "time"), None)
+        """The one time column."""
+        described = next((c for c in self.channels.values() if c.quantity == "time"), None)
+        if described is not None:
+            return described
+        head = self._head()
+        for i in self._time_columns():
+            return Channel(head.names[i], "time", head.units[i], float(seconds(np.ones(1), head.units[i])[0]))
+        return None
+
+    def _layout(self) -> Layout | None:
+        """Columns at several times: several time columns, or channels with a clock's times or a rate of their own."""
+        return self.cache.get((*self._signature(), "layout"), self._arranged)
+
+    def _arranged(self) -> Layout | None:
+        head, clocks = self._head(), self._time_columns()
+        known = [channel for name, channel in self.channels.items() if name in head.names]
+        has_rates = any(c.sample_rate for c in known if c.quantity not in ("time", "ignore"))
+        has_letter = any(c.quantity == "time" and c.clock for c in known)
+        if len(clocks) < 2 and not has_rates and not has_letter:
+            return None
+        used = self._used(head.names)
+        places = [i for i, name in enumerate(head.names) if name in used or i in clocks]
+        labels = tuple(name if head.names.count(name) < 2 else f"{name} ({i + 1})" for i, name in enumerate(head.names))
+        wanted = [labels[i] for i in places]
+        is_large = self._signature()[1] > _LARGE_FILE
+        columns: dict[str, FloatArray] = {}
+        problems: tuple[Problem, ...] = ()
+        for names in [[label] for label in wanted] if is_large else [wanted]:
+            parsed = self._read_table(replace(head, names=labels), "", names)
+            columns.update({name: to_temporary_file(values) for name, values in parsed.values.items()})
+            problems = problems or parsed.problems
+        series = [Series(head.names[i], head.units[i], columns[labels[i]]) for i in places]
+        series = table(series, self.channels, self.stated_rate)
+        return replace(arranged(series, self.channels, self.stated_rate, self.file, self.run), problems=problems)
 
     def _times(self) -> FloatArray | None:
         clock = self._clock()
@@ -110,9 +161,10 @@ class CsvReader(CachedReader):
     def problems(self) -> tuple[Problem, ...]:
         """What was repaired while parsing, and which columns nobody describes."""
         extra = [name for name in self.names() if name and name not in self.channels]
-        head = self._head()
+        head, layout = self._head(), self._layout()
+        repaired = self._columns(()).problems if layout is None else layout.problems
         units = unit_problems(self.channels, dict(zip(head.names, head.units, strict=True)), self.file, self.run)
-        return (*self._columns(()).problems, *units, *undescribed(extra, "columns", self.file, self.run))
+        return (*repaired, *units, *undescribed(extra, "columns", self.file, self.run))
 
 
 @dataclass(frozen=True)

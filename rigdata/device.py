@@ -1,0 +1,174 @@
+"""Devices of a run: channels that are sampled together, each device at its own times."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from rigdata.calibration import Channel
+
+#: Share by which a stated rate may miss that of the samples.
+RATE_MISS = 0.01
+_NO_DATA = ("time", "ignore")
+
+
+@dataclass(frozen=True)
+class Device:
+    """Channels of one clock and one rate.
+
+    Attributes
+    ----------
+    name : str
+        Letter of the clock; without one "" of the run's own device, else its time column or its rate.
+    channels : tuple of str
+    rate : float
+        Nominal [Hz]; NaN where neither file nor manifest tells it.
+    length : int
+        Samples of each channel.
+    counted : bool
+        Times are counted from the rate, from 0 on; there is no time column.
+
+    Examples
+    --------
+    >>> [(device.name, device.rate, device.length) for device in load_campaign(demo).run("d-05000-25-01").devices]
+    [('', 1000.0, 2000)]
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    rate: float
+    length: int
+    counted: bool
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a file says of the samples of one channel."""
+
+    length: int
+    clock: str = ""  #: names its times; "" where there are none
+    rate: float = float("nan")  #: of these [Hz]
+    label: str = ""
+    times: int | None = None  #: of a time column that should serve it but has not its length
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Channels of one file at the same times."""
+
+    length: int
+    clock: str  #: names the times; "" where they are counted
+    rate: float  #: Hz
+    label: str = ""
+    begin: float = 0.0  #: of counted times [s]
+    channels: list[str] = field(default_factory=list)
+
+
+def planned(
+    timings: Mapping[str, Timing],
+    channels: Mapping[str, Channel],
+    run_rate: float | None,
+    first_time: Callable[[str], float],
+) -> tuple[tuple[Grid, ...], dict[str, str]]:
+    """What is sampled together, the run's own device first; and why a channel has no usable times.
+
+    A time column wins over the channel's stated rate, that over the run's.
+    """
+    grids: dict[tuple[int, str | float], Grid] = {}
+    lettered = {name for name, channel in channels.items() if channel.clock}
+    untimed = {name: timing for name, timing in timings.items() if not timing.clock}
+    rates = {name: channels[name].sample_rate or 0.0 for name in untimed if name in channels}
+    shared: list[Grid] = []  # whose times are those of channels without a clock
+    for name, timing in timings.items():
+        if timing.clock:
+            grid = Grid(timing.length, timing.clock, timing.rate, timing.label)
+            grid = grids.setdefault((timing.length, timing.clock), grid)
+            grid.channels.append(name)
+            if grid not in shared and (name not in lettered or run_rate is None):
+                shared.append(grid)
+    counts = Counter(timing.length for name, timing in untimed.items() if not rates.get(name))
+    usual = max(counts, key=lambda length: (counts[length], length), default=0)
+    faults: dict[str, str] = {}
+    for name, timing in untimed.items():
+        if rates.get(name):
+            continue
+        same = [grid for grid in shared if grid.length == timing.length]
+        if timing.times is not None:
+            faults[name] = f"has {timing.length} samples, its time column {timing.times}"
+        elif same:
+            max(same, key=lambda grid: grid.rate).channels.append(name)
+        elif shared or timing.length != usual:
+            others = max((grid.length for grid in shared), default=usual)
+            faults[name] = f"has {timing.length} samples and no times, the others have {others}"
+        else:
+            grids.setdefault((usual, ""), Grid(usual, "", run_rate or float("nan"))).channels.append(name)
+    for name, rate in rates.items():
+        if rate:
+            faults[name] = _add_stated(grids, channels, name, untimed[name].length, rate, first_time)
+    return tuple(_own_first(grids.values(), channels)), {name: text for name, text in faults.items() if text}
+
+
+def _add_stated(
+    grids: dict[tuple[int, str | float], Grid],
+    channels: Mapping[str, Channel],
+    name: str,
+    length: int,
+    rate: float,
+    first_time: Callable[[str], float],
+) -> str:
+    """Put a channel of a stated rate where it belongs; or say what is wrong with that rate."""
+    for grid in grids.values():
+        if grid.length == length and not grid.clock and abs(rate / grid.rate - 1.0) <= RATE_MISS:
+            grid.channels.append(name)
+            return ""
+    begin = 0.0
+    if grids:
+        first = _own_first(grids.values(), channels)[0]
+        expected = rate * first.length / first.rate
+        if abs(length - expected) > 1.0 + RATE_MISS * expected:
+            return f"has {length} samples; at its sample_rate of {rate:.6g} Hz the run holds {expected:.0f}"
+        begin = first.begin if not first.clock else first_time(first.clock)
+    grids[length, rate] = Grid(length, "", rate, f"{rate:.6g} Hz", begin, [name])
+    return ""
+
+
+def first_probe_first(channels: Mapping[str, Channel]) -> list[str]:
+    """Names of channels, displacements first: the first of those there is belongs to the run's own device."""
+    used = {name: c.quantity for name, c in channels.items() if c.quantity not in _NO_DATA}
+    return sorted(used, key=lambda name: used[name] != "displacement")
+
+
+def _own_first(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> list[Grid]:
+    """The grid of the first displacement channel first; without any described channel the fastest."""
+    places = {name: i for i, name in enumerate(first_probe_first(channels))}
+
+    def rank(grid: Grid) -> tuple[int, float, int]:
+        first = min((places.get(name, len(places)) for name in grid.channels), default=len(places))
+        return first, -grid.rate if grid.rate > 0 else 0.0, -grid.length
+
+    return sorted(grids, key=rank)
+
+
+def by_clock(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> tuple[Device, ...]:
+    """Devices of a run: grids split by clock, that of the first probe first."""
+    order = first_probe_first(channels)
+    parts: list[tuple[str, Device]] = []
+    for grid in grids:
+        letters: dict[str, list[str]] = {}
+        for name in order:
+            if name in grid.channels:
+                letters.setdefault(channels[name].clock, []).append(name)
+        counted = not grid.clock and grid.begin == 0.0
+        for letter, names in letters.items():
+            parts.append((letter, Device(grid.label, tuple(names), grid.rate, grid.length, counted)))
+    parts.sort(key=lambda part: order.index(part[1].channels[0]))
+    devices: dict[str, Device] = {}
+    for letter, device in parts:
+        name = letter or (device.name if devices else "")
+        if name in devices:
+            name = f"{name}, {device.rate:.6g} Hz" if name else f"{device.rate:.6g} Hz"
+        while name in devices:
+            name += "'"
+        devices[name] = replace(device, name=name)
+    return tuple(devices.values())
