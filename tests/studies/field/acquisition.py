@@ -63,7 +63,7 @@ class Channel:
     plane: float = 0.0  #: [m]
     noise: float = 1.0
     fault: Fault | None = None
-    stated: tuple[str, ...] = ()  #: further lines of its table
+    extra: tuple[str, ...] = ()  #: further lines of its table
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,9 @@ class Acquisition:
     noise: dict[str, float] = field(default_factory=dict)  #: standard deviation a sample, SI
     mains: float = 50.0
     hum: dict[str, float] = field(default_factory=dict)  #: amplitude by quantity, SI
-    gains_drawn: bool = True
     form: str = "hdf5"  #: or csv
-    stated_rate: float | None = None
-    stated: tuple[str, ...] = ()  #: further lines of [acquisition]
+    nominal_rate: float | None = None
+    extra: tuple[str, ...] = ()  #: further lines of [acquisition]
     time_digits: int | None = None  #: decimals of a time column [s], none without such a column
 
 
@@ -125,10 +124,10 @@ def channel_lines(channel: Channel) -> list[str]:
     lines += [f'unit = "{UNITS[q]}"'] if q in UNITS else []
     lines += ['sensitivity = "7.78 mV/um"', "polarity = -1"] if q == "displacement" else []
     lines += [f'uncertainty = "{100 * UNCERTAINTY[q]:g} %"'] if q in UNCERTAINTY else []
-    return lines + list(channel.stated)
+    return lines + list(channel.extra)
 
 
-def sampled(channel: Channel, run: Run, setup: Acquisition, rng: np.random.Generator, number: int) -> Array:
+def channel_values(channel: Channel, run: Run, setup: Acquisition, rng: np.random.Generator, number: int) -> Array:
     """Values of one channel in run `number`, SI."""
     rate = channel.rate or setup.rate
     nominal = np.arange(round(run.seconds * rate)) / rate
@@ -157,26 +156,25 @@ def readings(campaign: Campaign, setup: Acquisition, seed: list[int]) -> dict[st
     rng = np.random.default_rng(seed)
     gains = {}
     for channel in campaign.channels:
-        doubt = UNCERTAINTY.get(channel.quantity, 0.0) if setup.gains_drawn else 0.0
-        gains[channel.name] = 1 + doubt * rng.standard_normal()
+        gains[channel.name] = 1 + UNCERTAINTY.get(channel.quantity, 0.0) * rng.standard_normal()
     records: dict[str, dict[str, Array]] = {}
     for number, run in enumerate(campaign.runs):
         columns = {}
         if setup.time_digits is not None:
             columns["Time"] = np.round(np.arange(round(run.seconds * setup.rate)) / setup.rate, setup.time_digits)
         for channel in campaign.channels:
-            values = gains[channel.name] * sampled(channel, run, setup, rng, number)
+            values = gains[channel.name] * channel_values(channel, run, setup, rng, number)
             volts = channel.quantity == "displacement"
             columns[channel.name] = GAP_VOLTS - VOLTS_PER_METRE * values if volts else values
         records[run.name] = columns
     return records
 
 
-def written(folder: Path, campaign: Campaign, setup: Acquisition, seed: list[int]) -> Path:
+def write_campaign(folder: Path, campaign: Campaign, setup: Acquisition, seed: list[int]) -> Path:
     """Write the campaign; its path."""
-    rate = setup.stated_rate or setup.rate
+    rate = setup.nominal_rate or setup.rate
     text = ['schema = "tpjb-rig/1"', 'id = "field"', 'bearing = "bearing.toml"', *campaign.head]
-    text += ["[acquisition]", f'sample_rate = "{rate:g} Hz"', *setup.stated]
+    text += ["[acquisition]", f'sample_rate = "{rate:g} Hz"', *setup.extra]
     if setup.time_digits is not None:
         text += ["[channels.Time]", 'quantity = "time"', 'unit = "s"']
     for channel in campaign.channels:
@@ -185,7 +183,7 @@ def written(folder: Path, campaign: Campaign, setup: Acquisition, seed: list[int
         text += ["[[runs]]", f'id = "{run.name}"', f'file = "runs/{run.name}.csv"', *run.lines]
     manifest, records = "\n".join(text) + "\n", readings(campaign, setup, seed)
     if setup.form == "csv":
-        return _german_folder(folder / "field", {"campaign.toml": manifest, "bearing.toml": campaign.bearing}, records)
+        return _write_csv(folder / "field", {"campaign.toml": manifest, "bearing.toml": campaign.bearing}, records)
     with h5py.File(folder / "field.h5", "w") as file:
         file.attrs["manifest"], file.attrs["bearing"] = manifest, campaign.bearing
         for name, columns in records.items():
@@ -196,7 +194,7 @@ def written(folder: Path, campaign: Campaign, setup: Acquisition, seed: list[int
     return folder / "field.h5"
 
 
-def _german_folder(folder: Path, texts: dict[str, str], records: dict[str, dict[str, Array]]) -> Path:
+def _write_csv(folder: Path, texts: dict[str, str], records: dict[str, dict[str, Array]]) -> Path:
     """The same as csv files with decimal commas; shorter columns end in blanks."""
     (folder / "runs").mkdir(parents=True)
     for name, text in texts.items():

@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from tests.studies.field.acquisition import Array, Campaign, written
+from tests.studies.field.acquisition import Array, Campaign, write_campaign
 from tests.studies.field.conditions import Condition, conditions
 from tests.studies.results import Rows, table, write_section
 
@@ -160,7 +160,7 @@ def outcome(condition: Condition, seed: int, checkout: Checkout) -> dict[str, An
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         campaign, setup = condition.make(seed)
-        path = str(written(folder, campaign, setup, [seed, crc32(condition.name.encode()), 1]))
+        path = str(write_campaign(folder, campaign, setup, [seed, crc32(condition.name.encode()), 1]))
         logs = [folder / "identify.log", folder / "check.log"]
         identified, seconds = checkout.run(["identify", path, "--out", str(folder / "i"), "--workers", "1"], logs[0])
         checked, _ = checkout.run(["check", path, "--out", str(folder / "c")], logs[1])

@@ -79,8 +79,7 @@ class Rig:
     runout: float = 0.003
     load_scatter: float = 0.003
     stiffness_scatter: float = 0.0  #: of the film from run to run
-    temperatures: tuple[float, float] = (40.0, 40.0)  #: of the first and the last run, stated
-    warming: float = 0.0  #: from the first to the last run, not stated [K]
+    temperatures: tuple[float, float] = (40.0, 40.0)  #: of the first and the last run
     tilt: float = 0.0
     switch: float = 1.0  #: the drive's level after half of the record, at another phase
     seconds: float = 4.0
@@ -141,7 +140,7 @@ def band_course(rig: Rig, t: Array, rng: np.random.Generator) -> Array:
     return total
 
 
-def through(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> dict[str, CubicSpline]:
+def course_signals(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> dict[str, CubicSpline]:
     """Signals of a course, by quantity functions of time to (n, 2); `film` is the run's load and scale of H."""
     t = np.arange(round((BEFORE + rig.seconds + AFTER) * FINE)) / FINE - BEFORE
     drive = sine_course(rig, test, t, rng) if rig.excitation == "sine" else band_course(rig, t, rng)
@@ -188,7 +187,7 @@ def signal(rig: Rig, test: Test, rng: np.random.Generator) -> Signal:
     steady = lines_of(rig, test, rng, film)
     courses: dict[str, CubicSpline] = {}
     if (rig.excitation, rig.share, rig.wander, rig.switch) != ("sine", (0.0, 1.0), 0.0, 1.0):
-        steady, courses = steady[1:], through(rig, test, rng, film)
+        steady, courses = steady[1:], course_signals(rig, test, rng, film)
     means = {"displacement": 0.5 * rig.clearance * pull * (test.load > 0), "force": load * pull * rig.static}
 
     def values(quantity: str, times: Array) -> Array:
@@ -264,10 +263,10 @@ def campaign_of(rig: Rig, signals: list[Signal], channels: tuple[Channel, ...]) 
         else:
             lines += [f'excitation = "{rig.excitation}"\nexcitation_band = "{rig.band[0]:g}..{rig.band[1]:g} Hz"']
         part, (cold, warm) = i / max(len(signals) - 1, 1), rig.temperatures
-        stated = cold + (warm - cold) * part
-        lines += [f'temperature = "{stated:g} degC"'] if warm != cold else []
+        warmth = cold + (warm - cold) * part
+        lines += [f'temperature = "{warmth:g} degC"'] if warm != cold else []
         name = f"d-{i:02d}-{test.load:g}-{test.frequency:g}-{test.direction:g}"
-        runs.append(Run(name, tuple(lines), values, rig.seconds, stated + rig.warming * part, rig.tilt))
+        runs.append(Run(name, tuple(lines), values, rig.seconds, warmth, rig.tilt))
     if rig.with_clearance:
         runs.append(Run("c-1", ('kind = "clearance"',), clearance_sweep(rig), 8.0))
     head = ("[housing]", f'mass = "{rig.mass:g} kg"', *rig.head)
@@ -276,7 +275,7 @@ def campaign_of(rig: Rig, signals: list[Signal], channels: tuple[Channel, ...]) 
     return Campaign(head, bearing, channels, tuple(runs), lambda w, f: rig.film.h(f + off, w), lambda f: f + off)
 
 
-def changed(channels: tuple[Channel, ...], names: str, **entries: Any) -> tuple[Channel, ...]:
+def with_entries(channels: tuple[Channel, ...], names: str, **entries: Any) -> tuple[Channel, ...]:
     """The same channels, those whose name begins with one of the words of `names` with other entries."""
     starts = tuple(names.split())
     return tuple(replace(c, **entries) if c.name.startswith(starts) else c for c in channels)

@@ -73,7 +73,7 @@ class CubicFilm:
         return np.asarray(k @ d + np.array(self.film.c) @ v + mean * curved)
 
 
-def place(law: Law, load: Array) -> Array:
+def equilibrium(law: Law, load: Array) -> Array:
     """Where the film carries a load (2,) [m]."""
     scale = 1 + np.abs(load).max()
     start = 0.3 * law.clearance * load / scale
@@ -86,9 +86,9 @@ def place(law: Law, load: Array) -> Array:
     return np.asarray(law.clearance * balance.x)
 
 
-def linearised(law: Law, load: Array, speed: float) -> cf.Film:
+def linear_film(law: Law, load: Array, speed: float) -> cf.Film:
     """K and C where the film carries the load, by central differences of its force."""
-    d0, step = np.tile(place(law, load)[:, None], 2), 1e-9 * np.eye(2)
+    d0, step = np.tile(equilibrium(law, load)[:, None], 2), 1e-9 * np.eye(2)
     fast, still = 2 * np.pi * speed * step, np.zeros((2, 2))
     k = (law.force(d0 + step, still) - law.force(d0 - step, still)) / 2e-9
     c = (law.force(d0, fast) - law.force(d0, -fast)) / (2e-9 * 2 * np.pi * speed)
@@ -115,8 +115,8 @@ def march(law: Law, rig: cf.Rig, push: Array, steps: float = STEPS) -> dict[str,
         return np.array([s[1], shaft / rig.shaft_mass, s[3], housing / rig.mass])
 
     state = np.zeros((4, 2, push.shape[2]))
-    state[2] = pull / springs if standing else -pull / SHAFT_SPRING - place(law, pull[:, 0])[:, None]
-    state[0] = state[2] + place(law, pull[:, 0])[:, None]
+    state[2] = pull / springs if standing else -pull / SHAFT_SPRING - equilibrium(law, pull[:, 0])[:, None]
+    state[0] = state[2] + equilibrium(law, pull[:, 0])[:, None]
     states = []
     for i in range((len(push) - 1) // 2):
         time, middle = i * h, push[2 * i + 1]
@@ -136,12 +136,12 @@ def plan(law: Law, rig: cf.Rig) -> tuple[cf.Rig, Array]:
     """The rig with its linearised film and its unbalance in newtons, and the push of every run at half steps."""
     load = rig.loads[0] * unit_vector(rig.load_direction)
     compliance = 1 / SHAFT_SPRING if rig.mount == "floating" else 0.0
-    rig = replace(rig, film=linearised(law, load, rig.speed), shaft_compliance=compliance)
+    rig = replace(rig, film=linear_film(law, load, rig.speed), shaft_compliance=compliance)
     grid = np.arange(round((rig.seconds + SETTLING + 0.05) * 2 * STEPS) + 1) / (2 * STEPS) - SETTLING
     pushes = []
     for i, test in enumerate(cf.tests_of(rig)):
         set_of_phases = 0 if rig.excitation in ("multisine", "impact") else i
-        courses = cf.through(rig, test, np.random.default_rng(set_of_phases), (test.load, 1.0))
+        courses = cf.course_signals(rig, test, np.random.default_rng(set_of_phases), (test.load, 1.0))
         pushes.append(courses["command"](grid))
     # the linear orbit of 1X has the stated share of the clearance
     orbit = cf.response(rig, np.array(rig.speed), 0.0)["displacement"] @ np.array([1.0, -1.0j])
