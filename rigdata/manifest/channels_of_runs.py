@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
+import itertools
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.manifest.channels import TextFile, read_channel
@@ -25,8 +26,9 @@ def channels_by_run(
     findings = table.findings
     _check_together(channels, findings)
     entries: dict[str, list[tuple[str, Table]]] = {}  # of a run: channel and entry, in the manifest's order
+    budget = itertools.count(1)
     for name in channels:
-        for run, entry in _entries(table.subtable(name), runs):
+        for run, entry in _entries(table.subtable(name), runs, budget):
             entries.setdefault(run, []).append((name, entry))
     described: dict[str, Mapping[str, Channel]] = {}
     known: dict[tuple[int, ...], Mapping[str, Channel]] = {}
@@ -39,7 +41,7 @@ def channels_by_run(
     return described
 
 
-def _entries(channel: Table, runs: Sequence[str]) -> list[tuple[str, Table]]:
+def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list[tuple[str, Table]]:
     """Run and entry, for every run that an entry names."""
     entries = channel.data.get("for", [])
     if not isinstance(entries, list):
@@ -49,25 +51,28 @@ def _entries(channel: Table, runs: Sequence[str]) -> list[tuple[str, Table]]:
     for index, data in enumerate(entries):
         entry = Table(data, (*channel.path, "for", index), channel.findings)
         entry.only(_ENTRY, f"[[channels.{channel.path[-1]}.for]]")
-        named = _matching(entry, runs)
+        named = _matching(entry, runs, budget)
         pairs += [(run, entry) for run in runs if run in named]
     return pairs
 
 
-def _matching(entry: Table, runs: Sequence[str]) -> set[str]:
-    """Runs that the patterns of an entry name."""
+def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[str]:
+    """Runs that the patterns of an entry name; `budget` counts the patterns with a star."""
     patterns = entry.value(RUNS_OF)
     if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) for p in patterns):
         if patterns is not None:
             entry.error("runs", f"runs is {shown(patterns)}, no list of texts", 'Write runs = ["p-*", "c-1"]')
         return set()
-    if sum("*" in pattern for pattern in patterns) > _MOST_PATTERNS:
-        entry.error("runs", f"runs holds more than {_MOST_PATTERNS} patterns", "Join them")
-        return set()
     named: set[str] = set()
+    known = set(runs)
     for pattern in patterns:
-        literal = pattern.replace("[", "[[]").replace("?", "[?]")
-        matches = {run for run in runs if run == pattern} if "*" not in pattern else fnmatch.filter(runs, literal)
+        matches = {pattern} & known
+        if "*" in pattern:
+            if next(budget) > _MOST_PATTERNS:
+                entry.error("runs", f"more than {_MOST_PATTERNS} patterns with a star in all", "Join them")
+                return set()
+            literal = pattern.replace("[", "[[]").replace("?", "[?]")
+            matches = {run for run in runs if fnmatch.fnmatchcase(run, literal)}
         if not matches:
             entry.error("runs", f"no run is named by {shown(pattern)}", nearest(pattern, runs)[:200])
         named.update(matches)

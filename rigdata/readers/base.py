@@ -121,6 +121,15 @@ class GridReader:
         """Channels that are not sampled with the run's own device."""
         return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._grids()[1:]))
 
+    def _other_devices(self) -> tuple[Problem, ...]:
+        """Note the channels that are sampled apart from the run's own device."""
+        if not self.apart():
+            return ()
+        reader: Any = self
+        parts = [f"{', '.join(device.channels[:6])} ({device.rate:.6g} Hz)" for device in self.devices()]
+        text = f"sampled apart: {'; '.join(parts[:6])}"
+        return (Problem("note", reader.file, "channels", text, "Nothing, if that is meant", reader.run),)
+
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.
 

@@ -100,10 +100,14 @@ class CachedReader(GridReader):
         layout = self._layout()
         if layout is not None:
             return layout.grids
+        clock = "" if self._times() is None else "times"
+        return [Grid(self.length(), clock, self._row_rate(), channels=list(self.names()))]
+
+    def _row_rate(self) -> float:
+        """Rate of the rows of the file [Hz]: of its times, else as stated; NaN where there is neither."""
         times = self._times()
         rate = float("nan") if times is None else rate_of_time(times)
-        rate = rate if rate > 0 else self.stated_rate or rate
-        return [Grid(self.length(), "" if times is None else "times", rate, channels=list(self.names()))]
+        return rate if rate > 0 else self.stated_rate or float("nan")
 
     def apart(self) -> frozenset[str]:
         """Channels that are not sampled with the run's own device."""
@@ -147,7 +151,8 @@ class CachedReader(GridReader):
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else the manifest's."""
-        rate = self._grids()[0].rate
+        layout = self._layout()
+        rate = self._row_rate() if layout is None else layout.grids[0].rate
         if not rate > 0:
             fault = "there are neither usable times nor a sample rate"
             remedy = 'Add sample_rate to the run or to [acquisition], or a channel with quantity = "time"'

@@ -159,8 +159,8 @@ def arranged(
         if channel.time is None:
             timings[channel.name] = Timing(len(channel))
         elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
-            back = np.flatnonzero(~(np.diff(channel.time) >= 0))
-            fault = f"its times have gaps or run backwards (sample {int(back.min(initial=0)) + 2})"
+            back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
+            fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
             faults[channel.name] = refuse(file, place, fault, "Sort or split the run, or export without times", run)
         else:
             clock = next((key for key, time in times.items() if _alike(time, channel.time)), str(len(times) + 1))

@@ -82,4 +82,4 @@ class ForeignReader(CachedReader):
         """Which channels nobody describes, and which state another unit than the manifest."""
         extra = [name for name in self.names() if name not in self.channels]
         units = unit_problems(self.channels, self._layout().units, self.file, self.run)
-        return (*units, *undescribed(extra, "channels", self.file, self.run))
+        return (*units, *self._other_devices(), *undescribed(extra, "channels", self.file, self.run))

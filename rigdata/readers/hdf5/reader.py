@@ -371,7 +371,7 @@ class Hdf5Reader(GridReader):
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
         extra = [n for n in self._facts().members if n not in self.channels]
         units = unit_problems(self.channels, self._units(), self.file, self.run)
-        return (*units, *undescribed(extra, "datasets", self.file, self.run))
+        return (*units, *self._other_devices(), *undescribed(extra, "datasets", self.file, self.run))
 
     def _units(self) -> dict[str, str]:
         """Units that datasets state in an attribute."""

@@ -98,13 +98,11 @@ class CsvReader(CachedReader):
 
     def _clock(self) -> Channel | None:
         """The one time column."""
-        described = next((c for c in self.channels.values() if c.quantity == "time"), None)
-        if described is not None:
-            return described
         head = self._head()
         for i in self._time_columns():
-            return Channel(head.names[i], "time", head.units[i], float(seconds(np.ones(1), head.units[i])[0]))
-        return None
+            name, unit = head.names[i], head.units[i]
+            return self.channels.get(name) or Channel(name, "time", unit, float(seconds(np.ones(1), unit)[0]))
+        return next((c for c in self.channels.values() if c.quantity == "time"), None)
 
     def _layout(self) -> Layout | None:
         """Columns at several times: several time columns, or channels with a clock's times or a rate of their own."""
@@ -160,11 +158,12 @@ class CsvReader(CachedReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """What was repaired while parsing, and which columns nobody describes."""
-        extra = [name for name in self.names() if name and name not in self.channels]
         head, layout = self._head(), self._layout()
+        known = {*self.channels, *(head.names[i] for i in self._time_columns())}
+        extra = [name for name in head.names if name and name not in known]
         repaired = self._columns(()).problems if layout is None else layout.problems
         units = unit_problems(self.channels, dict(zip(head.names, head.units, strict=True)), self.file, self.run)
-        return (*repaired, *units, *undescribed(extra, "columns", self.file, self.run))
+        return (*repaired, *units, *self._other_devices(), *undescribed(extra, "columns", self.file, self.run))
 
 
 @dataclass(frozen=True)
