@@ -175,6 +175,28 @@ def test_lines_closer_than_either_wanders_are_one():
     assert [n for n, _ in lines_of(known_lines((30.0,), 49.8, 1000.0, settings))] == ["1X", "2X", "mains"]
 
 
+def test_what_a_record_cannot_tell_apart_is_one_line_the_shafts_before_the_films():
+    """25 Hz at 50.2 Hz: the film's second harmonic is the shaft's line in 2 s, another one in 4 s."""
+    settings = LineSettings(mains=60.0)
+    short, long = (known_lines((25.0,), 50.2, 1000.0, settings, (), duration) for duration in (2.0, 4.0))
+    assert ("1X", 50.2) in lines_of(short)
+    assert "harmonic 2" not in [n for n, _ in lines_of(short)]
+    assert {("1X", 50.2), ("harmonic 2", 50.0)} < set(lines_of(long))
+
+
+def test_faint_lines_are_those_of_the_whole_record_unless_they_stand_out():
+    found = known_lines((25.0,), 22.0, 1000.0, None, (66.0, 71.0), 4.0)
+    assert [(line.name, line.frequency) for line in found.faint] == [
+        ("4X", 88.0), ("harmonic 3", 75.0), ("2X-f", 19.0), ("2f-X", 28.0)
+    ]  # fmt: skip
+    assert lines_of(found)[3:] == [("3X", 66.0), ("found", 71.0)]
+    assert [line.frequency for line in found.at_speed(22.5).faint] == [90.0, 75.0, 20.0, 27.5]
+    # |2X - f| falls where 2X is below f
+    assert known_lines((50.0,), 22.0, 1000.0).at_speed(22.5).faint[-2].frequency == 5.0
+    assert known_lines((65.0,), 22.0, 1000.0).conditions == ()
+    assert known_lines((66.0,), 22.0, 1000.0).conditions == ("3X on excitation line",)
+
+
 @pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (600.0,), (25.0, 460.0)])
 def test_excitations_outside_the_band_are_refused(frequencies):
     with pytest.raises(ValueError, match="between 0 and 450 Hz"):

@@ -118,6 +118,7 @@ class _Rate:
     """What is asked of a run."""
 
     sample_rate: float = RATE
+    length: int = round(SPAN * RATE)
 
 
 def test_a_second_fit_takes_the_frequencies_that_the_phases_show():
@@ -216,7 +217,7 @@ def heard(force=(), displacement=(), noise=1e-4):
 
 def fitted(rows):
     """The record in one fit, and as a run of one window."""
-    record = fitted_whole(Samples(rows, None, None), RATE, LINES.frequencies)
+    record = fitted_whole(Samples(rows, None, None), RATE, LINES, LINES.frequencies)
     return record, in_channels(record.fit.z, record.fit.scale, np.zeros(1), N / RATE, np.full(1, 22.0))
 
 

@@ -15,7 +15,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (113.2, 13_840),
+    "measurement": (114.0, 13_900),
     "model": (90.9, 12_050),
     "rigdata": (70.1, 9_560),
     "diagnosis": (42.6, 5_220),

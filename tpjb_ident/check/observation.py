@@ -19,6 +19,7 @@ from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, steady_level, strongest_line
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.phasors.reading_cache import with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import RecordTooShortError
@@ -66,20 +67,20 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     """
     report = Reporter(run)
     try:
-        length = run.length
+        length, cached = run.length, with_kept_beginning(run)
         report.take(run.reader.problems())
     except RigDataError as error:
         report.take(error.problems)
         return _blind(run, report)
     time = _usable_time(report, run, length)
-    statistics, first, digest = _scan(report, run, length)
+    statistics, first, digest = _scan(report, cached, length)
     readable = {n: run.channels[n] for n in first}
     if not readable:
         return _blind(run, report)
     live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
     used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
     if phasors is None and time is not None and run.kind == "dynamic" and run.excitation_kind == "sine":
-        phasors = _phasors(report, run)
+        phasors = _phasors(report, cached)
     lines = _lines(run, live, used[:_FITTED], phasors, line) if time is not None and live else None
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:

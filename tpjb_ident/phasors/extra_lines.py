@@ -27,22 +27,24 @@ _LOBE = 4.0
 
 
 def unexpected_lines(record: WholeRecord, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
-    """Frequencies of lines beside the known ones [Hz], and what to say about them."""
+    """Frequencies of lines beside those of the windows [Hz], and what to say about the ones that nobody expects."""
+    whole = np.array([line.frequency for line in result.lines.whole])
     frequencies: list[float] = []
     for quantity in ("force", "displacement"):
         places = result.pick(quantity)
         sizes = np.linalg.norm(result.z[:, : len(result.lines.excitation)][:, :, places], axis=2)
         if np.isfinite(sizes).any():
             smallest = MIN_SHARE * float(np.nanmedian(sizes))
-            known = np.append(result.lines.frequencies, frequencies)
-            frequencies += _peaks(record, places, known, smallest)
+            frequencies += _peaks(record, places, np.append(whole, frequencies), smallest)
     top = REACH * max(line.frequency for line in result.lines.excitation)
     extra = tuple(sorted(f for f in frequencies if f < top))[:MAX_LINES]
-    if not extra:
-        return (), ()
-    conditions = [Condition("unexpected lines", f"lines at {', '.join(f'{f:.4g}' for f in extra)} Hz; fitted along")]
+    strange = [f for f in extra if f not in whole]
+    if not strange:
+        return extra, ()
+    listed = ", ".join(f"{f:.4g}" for f in strange)
+    conditions = [Condition("unexpected lines", f"lines at {listed} Hz; fitted along")]
     for line in result.lines.excitation:
-        coincident = [f for f in extra if abs(2 * f - line.frequency) < 0.05]
+        coincident = [f for f in strange if abs(2 * f - line.frequency) < 0.05]
         if coincident:
             conditions.append(
                 Condition(
@@ -54,7 +56,7 @@ def unexpected_lines(record: WholeRecord, result: RunPhasors) -> tuple[tuple[flo
 
 
 def _peaks(record: WholeRecord, places: list[int], known: FloatArray, smallest: float) -> list[float]:
-    """Frequencies [Hz] of the peaks above `smallest` in the amplitude spectrum of some channels' residual."""
+    """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
     bins = np.nan_to_num(record.spectrum[:, places])
     # Hann's window, as a sum of neighbours
     windowed = np.zeros(bins.shape)
@@ -63,13 +65,18 @@ def _peaks(record: WholeRecord, places: list[int], known: FloatArray, smallest: 
     floor = median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest")
     step = 1 / record.duration
     frequency = np.arange(len(amplitude)) * step
-    candidate = amplitude > np.maximum(_PROMINENCE * floor, smallest)
+    least = np.maximum(_PROMINENCE * floor, smallest)
+    candidate = amplitude > least
     candidate[frequency < _LOBE * step] = False
     for f in known:
         candidate[np.abs(frequency - f) < _LOBE * step] = False
     candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
     candidate[[0, -1]] = False
-    return [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
+    peaks = [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
+    faint = record.lines.faint
+    sizes = np.linalg.norm(record.fit.z[0, len(record.lines.whole) - len(faint) :, places], axis=0)
+    at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)
+    return peaks + [line.frequency for line, size, limit in zip(faint, sizes, least[at]) if size > limit]
 
 
 def _vertex(three: FloatArray) -> float:

@@ -80,7 +80,7 @@ def tuned(
     if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
         return None
     extra = tuple(line.frequency for line in result.lines.nuisance if line.name == "found")
-    lines = known_lines(exact, speed + slip, run.sample_rate, settings.lines, extra)
+    lines = known_lines(exact, speed + slip, run.sample_rate, settings.lines, extra, run.length / run.sample_rate)
     drift: tuple[Condition, ...] = ()
     if follow is not None:
         drift = (
@@ -134,13 +134,11 @@ def _line_slip(result: RunPhasors, line: int, rate: float) -> float:
 
 
 def exact_frequencies(result: RunPhasors, rate: float) -> FloatArray:
-    """Frequencies of all lines as the phases of the windows show them, however little they are off (n_lines,) [Hz]."""
-    frequencies = result.lines.frequencies
+    """Frequencies of the whole record's lines as the windows' phases show them, (n_whole_lines,) [Hz]."""
     turning = _shaft_slip(result, rate)
-    for k, line in enumerate((*result.lines.excitation, *result.lines.nuisance)):
-        if line.name.endswith("X"):
-            frequencies[k] += turning * int(line.name[:-1])
-        elif line.name in ("excitation", "mains"):
+    frequencies = np.array([line.frequency + turning * line.order for line in result.lines.whole])
+    for k, line in enumerate(result.lines.whole):
+        if line.name in ("excitation", "mains"):
             frequencies[k] += _line_slip(result, k, rate)
     return frequencies
 

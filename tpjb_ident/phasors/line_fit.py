@@ -19,6 +19,8 @@ _FEW = 0.1
 _FEW_ROUNDS = 8
 #: Samples of a block.
 BLOCK = 256
+#: Samples of a long window that are multiplied at once.
+_AT_ONCE = 256
 
 
 class WaveBlocks:
@@ -98,7 +100,7 @@ class LineFitter:
         self.frequencies = np.asarray(frequencies, dtype=float)
         self.design = even_design(length, rate, self.frequencies, drift_order)
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
-        self._gram_inverse = np.linalg.pinv(self.design.T @ self.design, rcond=1e-12, hermitian=True)
+        self._gram_inverse = np.linalg.pinv(_products(self.design, self.design), rcond=1e-12, hermitian=True)
         in_blocks = length >= 2 * BLOCK and drift_order == 1
         self._blocks = WaveBlocks(length, rate, self.frequencies) if in_blocks else None
         # The scale of the residual needs no more than a few hundred samples.
@@ -152,8 +154,10 @@ class LineFitter:
     def _solve_and_subtract(self, rows: FloatArray) -> FloatArray:
         """Coefficients of every row, (k, n_columns); the rows become residuals."""
         if self._blocks is None:
-            coefficients = (rows @ self.design) @ self._gram_inverse
-            rows -= coefficients @ self.design.T
+            coefficients = _products(rows.T, self.design) @ self._gram_inverse
+            for first in range(0, self.length, _AT_ONCE):
+                part = slice(first, first + _AT_ONCE)
+                rows[:, part] -= coefficients @ self.design[part].T
         else:
             coefficients = self._blocks.project(rows) @ self._gram_inverse
             self._blocks.subtract(rows, coefficients)
@@ -185,6 +189,12 @@ class LineFitter:
             size = np.abs(residual + self.design @ change)
             scale = 1.4826 * float(np.median(size))
         return None
+
+
+def _products(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Inner products of all columns, part by part: a tall product at once is shared out among threads, at a loss."""
+    stretches = [slice(k, k + _AT_ONCE) for k in range(0, len(first), _AT_ONCE)]
+    return np.asarray(np.sum([first[part].T @ second[part] for part in stretches], axis=0))
 
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:

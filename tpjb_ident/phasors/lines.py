@@ -1,13 +1,13 @@
 """The spectral lines that a dynamic record is known to contain.
 
-A record at running speed holds the excitation and its second harmonic (the actuators are not
-linear), 1X and 2X of the shaft (runout, unbalance) and the mains. They are fitted together, so
-that none leaks into the excitation line, however short the window.
+A record at running speed holds the excitation and what an actuator or a film that is not linear makes of it (2f, 3f),
+what turns with the shaft (1X to 4X: runout, unbalance), what the film makes of both (2X - f, 2f - X), and the mains.
+What is strong is fitted together in every window, so that none leaks into the excitation line, however short the
+window; what is faint in the whole record alone, unless it stands out there.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,10 @@ from tpjb_ident.errors import BadInputError
 _MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
 NAMED_HARMONICS = 3
+#: Lines closer than this are one [1 / record length].
+ONE_LINE = 0.6
+#: Harmonics of the shaft and of the drive that are looked at in the whole record.
+_FAINT_SHAFT, _FAINT_DRIVE = 4, 3
 
 
 @dataclass(frozen=True)
@@ -29,29 +33,36 @@ class Line:
     name: str
     frequency: float
     wander: float = 0.0
+    order: float = 0.0  #: by which its frequency follows the shaft's speed
 
 
 @dataclass(frozen=True)
 class LineSet:
-    """Excitation lines first, then what disturbs them."""
+    """Excitation lines first, then what disturbs them, then what only the whole record shows."""
 
     excitation: tuple[Line, ...]
     nuisance: tuple[Line, ...]
     conditions: tuple[Condition, ...] = ()
     speed: float = 0.0
+    faint: tuple[Line, ...] = ()
 
     @property
     def frequencies(self) -> FloatArray:
-        """All frequencies [Hz], excitation first, shape (n_lines,)."""
+        """Frequencies of the windows' lines [Hz], excitation first, shape (n_lines,)."""
         return np.array([line.frequency for line in self.excitation + self.nuisance])
+
+    @property
+    def whole(self) -> tuple[Line, ...]:
+        """Lines of the whole record: those of the windows, then the faint ones."""
+        return self.excitation + self.nuisance + self.faint
 
     def at_speed(self, speed: float) -> LineSet:
         """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
-        moved = tuple(
-            replace(line, frequency=speed * int(line.name[:-1])) if re.fullmatch(r"\d+X", line.name) else line
-            for line in self.nuisance
-        )
-        return replace(self, nuisance=moved, speed=speed)
+        moved = [
+            tuple(replace(line, frequency=line.frequency + line.order * (speed - self.speed)) for line in lines)
+            for lines in (self.nuisance, self.faint)
+        ]
+        return replace(self, nuisance=moved[0], faint=moved[1], speed=speed)
 
 
 @dataclass(frozen=True)
@@ -70,10 +81,11 @@ def known_lines(
     rate: float,
     settings: LineSettings | None = None,
     extra: tuple[float, ...] = (),
+    duration: float = np.inf,
 ) -> LineSet:
-    """Collect the lines of one run; those that coincide are merged and reported."""
+    """Collect the lines of one run; coinciding ones are one, named in the order excitation, shaft, mains, others."""
     settings = settings or LineSettings()
-    top = 0.45 * rate
+    top, apart = 0.45 * rate, ONE_LINE / duration
     if not excitation or not all(0.0 < f < top for f in excitation):
         raise BadInputError(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"
@@ -81,24 +93,33 @@ def known_lines(
     driven = tuple(Line("excitation", float(f)) for f in sorted(set(excitation)))
     conditions: list[Condition] = []
     nuisance: list[Line] = []
-    others = [Line("found", f, 1e-6) for f in extra]
+    faint = [line for line in _faint_lines(driven, speed, settings) if 0.0 < line.frequency < top]
     for n in range(settings.shaft_harmonics + 1, NAMED_HARMONICS + 1):
         line = Line(f"{n}X", n * speed)
         coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * SPEED_DRIFT]
         conditions += [_on_excitation(line, e) for e in coincident[:1]]
-    for line in _candidates(driven, speed, settings) + others:
+    found = [next((line for line in faint if abs(line.frequency - f) < apart), Line("found", f, 1e-6)) for f in extra]
+    for line in _strong_lines(driven, speed, settings) + found:
         if not 0.0 < line.frequency < top:
             continue
         coincident = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
         if coincident:
             conditions.append(_on_excitation(line, coincident[0]))
-        elif all(abs(o.frequency - line.frequency) > max(o.wander, line.wander) for o in nuisance):
+        elif _is_apart(line, nuisance, 0.0 if line.name == "found" else apart):
             nuisance.append(line)
-    return LineSet(driven, tuple(nuisance), tuple(conditions), speed)
+    resolved: list[Line] = []
+    for line in faint:
+        if _is_apart(line, [*driven, *nuisance, *resolved], 2 * apart):
+            resolved.append(line)
+    return LineSet(driven, tuple(nuisance), tuple(conditions), speed, tuple(resolved))
 
 
-def _candidates(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
-    shaft = [Line(f"{n}X", n * speed, n * SPEED_DRIFT) for n in range(1, settings.shaft_harmonics + 1) if speed > 0]
+def _is_apart(line: Line, others: list[Line], least: float) -> bool:
+    return all(abs(o.frequency - line.frequency) > max(o.wander, line.wander, least) for o in others)
+
+
+def _strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
+    shaft = [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in range(1, settings.shaft_harmonics + 1) if speed > 0]
     drive = [
         Line(f"harmonic {n}", n * e.frequency, 1e-6) for e in driven for n in range(2, settings.drive_harmonics + 1)
     ]
@@ -108,6 +129,19 @@ def _candidates(driven: tuple[Line, ...], speed: float, settings: LineSettings) 
         if settings.mains > 0
     ]
     return shaft + mains + drive
+
+
+def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
+    """Further harmonics, and what a film that is not linear makes of the shaft's and the drive's motion."""
+    turning = range(settings.shaft_harmonics + 1, _FAINT_SHAFT + 1) if speed > 0 else ()
+    faint = [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in turning]
+    for e in driven:
+        further = range(settings.drive_harmonics + 1, _FAINT_DRIVE + 1)
+        faint += [Line(f"harmonic {n}", n * e.frequency, 1e-6) for n in further]
+        twice, half = 2 * speed - e.frequency, 2 * e.frequency - speed
+        if speed > 0:
+            faint += [Line("2X-f", abs(twice), 1e-6, 2 * np.sign(twice)), Line("2f-X", abs(half), 1e-6, -np.sign(half))]
+    return faint
 
 
 def _on_excitation(line: Line, excitation: Line) -> Condition:

@@ -61,6 +61,8 @@ class RunPhasors:
     conditions: tuple[Condition, ...] = ()
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (n_lines,) complex
     device: tuple[str, ...] = ()  #: (n_channels,): clock terms exist between devices only
+    #: (n_whole_lines, n_channels) complex, SI: phasors of the whole record's lines, those of the windows first
+    record: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))
     #: by excitation line (n_bins, n_channels) complex: residual of the whole record in the bins around it
     residual: tuple[ComplexArray, ...] = ()
 

@@ -60,29 +60,32 @@ def _fitted(run: Run, housing_mass: float, settings: PhasorSettings) -> RunPhaso
     # the noise of a phasor of the whole record is less than that of its beginning
     share = np.sqrt(SHORT / run.length)
     residual = tuple(share * bins for bins in first.residual)
-    return replace(result, conditions=merged(conditions, result.lines.conditions), residual=residual)
+    return replace(
+        result, conditions=merged(conditions, result.lines.conditions), record=first.record, residual=residual
+    )
 
 
 def _inspected(run: Run, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
-    """Fit, put wrong frequencies right, look for lines that nobody mentioned, and fit again where there are any."""
+    """Fit, look for lines that nobody mentioned and for wrong frequencies, fit again where there are any."""
     speed, conditions = shaft_speed(run)
     driven = settings.excitation_lines or (run.point.excitation_hz,)
-    lines, follow = known_lines(driven, speed, run.sample_rate, settings.lines), None
+    duration = run.length / run.sample_rate
+    lines = known_lines(driven, speed, run.sample_rate, settings.lines, (), duration)
     result = extract(run, housing_mass, settings, lines)
-    better = tuned(run, result, driven, speed, settings)
-    if better is not None:
-        conditions, follow = conditions + better.conditions, better.follow
-        result = extract(run, housing_mass, settings, better.lines, follow)
     record = whole_record(run, result)
     extra, unexpected = unexpected_lines(record, result) if settings.find_lines else ((), ())
     if extra:
         conditions += unexpected
-        exact = tuple(line.frequency for line in result.lines.excitation)
-        lines = known_lines(exact, result.lines.speed, run.sample_rate, settings.lines, extra)
-        result = extract(run, housing_mass, settings, lines, follow)
+        lines = known_lines(driven, speed, run.sample_rate, settings.lines, extra, duration)
+        result = extract(run, housing_mass, settings, lines)
+    better = tuned(run, result, driven, speed, settings)
+    if better is not None:
+        conditions += better.conditions
+        result = extract(run, housing_mass, settings, better.lines, better.follow)
+    if result.lines is not record.lines:
         record = whole_record(run, result)
-    residual = tuple(record.beside(result.lines, i) for i in range(len(result.lines.excitation)))
-    return replace(result, conditions=conditions + result.lines.conditions, residual=residual)
+    residual = tuple(record.beside(i) for i in range(len(result.lines.excitation)))
+    return replace(result, conditions=conditions + result.lines.conditions, record=record.fit.z[0], residual=residual)
 
 
 __all__ = ["PhasorSettings", "RunPhasors", "run_phasors"]

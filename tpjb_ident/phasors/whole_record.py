@@ -31,6 +31,7 @@ _DRIFT_ORDER = 3
 class WholeRecord:
     """One device's record, fitted as one window."""
 
+    lines: LineSet
     fit: WindowFit  #: of one window
     residual: FloatArray  #: (n_channels, n), SI: bad samples are zero
     rate: float
@@ -49,13 +50,14 @@ class WholeRecord:
         turn = np.exp(-2j * np.pi * np.arange(len(bins)) * self.start / self.duration) if self.start else 1.0
         return np.asarray(bins * np.reshape(turn, (-1, 1)))
 
-    def beside(self, lines: LineSet, driven: int) -> ComplexArray:
+    def beside(self, driven: int) -> ComplexArray:
         """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
-        center = round(lines.frequencies[driven] * self.duration)
+        frequencies = np.array([line.frequency for line in self.lines.whole])
+        center = round(frequencies[driven] * self.duration)
         offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
         bins = np.concatenate([center - offsets[::-1], center + offsets])
         bins = bins[(bins > 0) & (bins < len(self.spectrum))]
-        others = np.delete(lines.frequencies, driven) * self.duration
+        others = np.delete(frequencies, driven) * self.duration
         free = np.abs(bins[:, None] - others).min(axis=1, initial=np.inf) > _CLEAR_OF
         return self.spectrum[bins[free]]
 
@@ -65,13 +67,13 @@ def whole_record(run: Run, result: RunPhasors) -> WholeRecord:
     reader = ChannelReader(run)
     (device,) = reader.devices
     samples = reader.read(device, 0, device.length)
-    return fitted_whole(samples, device.rate, exact_frequencies(result, device.rate))
+    return fitted_whole(samples, device.rate, result.lines, exact_frequencies(result, device.rate))
 
 
-def fitted_whole(samples: Samples, rate: float, frequencies: FloatArray) -> WholeRecord:
+def fitted_whole(samples: Samples, rate: float, lines: LineSet, frequencies: FloatArray) -> WholeRecord:
     """Fit all samples of a device in one; times that stray from an even grid are taken for even."""
     fitter = LineFitter(samples.rows.shape[1], rate, frequencies, _DRIFT_ORDER)
     time = samples.time
     start = 0.0 if time is None or not np.isfinite(time[0]) else float(time[0])
     fit, residual = fitter.fit_with_residual(samples.rows[:, None], np.array([start]))
-    return WholeRecord(fit, residual[:, 0], rate, start)
+    return WholeRecord(lines, fit, residual[:, 0], rate, start)

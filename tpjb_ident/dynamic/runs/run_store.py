@@ -34,7 +34,8 @@ from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 
-_ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase")
+_ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase", "record")
+_LINES = ("excitation", "nuisance", "faint")
 
 
 @dataclass(frozen=True)
@@ -149,20 +150,15 @@ def _unpacked_conditions(stored: list[list[str]]) -> tuple[Condition, ...]:
 
 def _packed_lines(lines: LineSet) -> dict[str, Any]:
     return {
-        "excitation": [[line.name, line.frequency, line.wander] for line in lines.excitation],
-        "nuisance": [[line.name, line.frequency, line.wander] for line in lines.nuisance],
+        **{kind: [list(vars(line).values()) for line in getattr(lines, kind)] for kind in _LINES},
         "conditions": _packed_conditions(lines.conditions),
         "speed": lines.speed,
     }
 
 
 def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
-    return LineSet(
-        tuple(Line(*line) for line in stored["excitation"]),
-        tuple(Line(*line) for line in stored["nuisance"]),
-        _unpacked_conditions(stored["conditions"]),
-        stored["speed"],
-    )
+    lines = {kind: tuple(Line(*line) for line in stored[kind]) for kind in _LINES}
+    return LineSet(conditions=_unpacked_conditions(stored["conditions"]), speed=stored["speed"], **lines)
 
 
 def of_run(observation: Observation, run: Run) -> Observation:
