@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -128,7 +129,9 @@ def _add_stated(
         expected = rate * first.length / first.rate
         if abs(length - expected) > 1.0 + RATE_MISS * expected:
             return f"has {length} samples; at its sample_rate of {rate:.6g} Hz the run holds {expected:.0f}"
-        begin = first.begin if not first.clock else first_time(first.clock)
+        if first.length and first.clock:
+            begin = first_time(first.clock)
+        begin = begin if math.isfinite(begin) else first.begin
     grids[length, rate] = Grid(length, "", rate, f"{rate:.6g} Hz", begin, [name])
     return ""
 
@@ -156,8 +159,9 @@ def by_clock(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> tuple[De
     parts: list[tuple[str, Device]] = []
     for grid in grids:
         letters: dict[str, list[str]] = {}
+        held = set(grid.channels)
         for name in order:
-            if name in grid.channels:
+            if name in held:
                 letters.setdefault(channels[name].clock, []).append(name)
         counted = not grid.clock and grid.begin == 0.0
         for letter, names in letters.items():

@@ -16,7 +16,7 @@ from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
-from rigdata.record import Record, RowReader, Rows, VectorRecord
+from rigdata.record import Record, Rows, VectorRecord
 from rigdata.vector import COLLINEAR_SINE, vector_rows
 
 
@@ -139,8 +139,7 @@ class Run:
             if name not in device.channels:
                 listed = f"It has {', '.join(device.channels)}"[:200]
                 raise self._refuse(f"channel {name}", f"is none of device {device.name!r}", listed)
-        first, last, _ = slice(start, stop).indices(device.length)
-        last = max(first, last)
+        first, last = _limits(start, stop, device.length)
         is_apart = self._apart(names)
         reader: Any = self.reader
         readings = (reader.read_device if is_apart else reader.read)(names, first, last) if names else []
@@ -180,14 +179,9 @@ class Run:
         stop : int or None, optional
             Sample after the last; default the end.
         """
-        first, last = self._slice(start, stop)
+        first, last = _limits(start, stop, self.length)
         self.sample_rate  # noqa: B018 (rejects a rate that times cannot be counted from)
         return self.reader.time(first, last)
-
-    def _slice(self, start: int | None, stop: int | None) -> tuple[int, int]:
-        length = self.length
-        first, last, _ = slice(start, stop).indices(length)
-        return first, max(first, last)
 
     def record(self, name: str, start: int | None = None, stop: int | None = None) -> Record:
         """One channel, calibrated.
@@ -219,6 +213,9 @@ class Run:
             remedy = f"Described: {', '.join(self.channels)}"
             raise self._refuse(f"channel {name}", "is not described in the manifest", remedy)
         (reading,), time, rate = self._stretch([name], start, stop)
+        if len(reading) != len(time):  # a time column of another device
+            fault = f"has {len(reading)} samples in place of {len(time)}"
+            raise self._refuse(f"channel {name}", fault, "Its times come with the records of its device's channels")
         return Record(
             name=name,
             quantity=channel.quantity,
@@ -233,14 +230,13 @@ class Run:
     ) -> tuple[list[FloatArray], FloatArray, float]:
         """Readings (n,) of channels that are sampled together, their times (n,) and their rate."""
         if not self._apart(names):
-            first, last = self._slice(start, stop)
+            first, last = _limits(start, stop, self.length)
             readings = self.reader.read(names, first, last)
             rate = self.sample_rate  # rejected before times are counted from it
             return readings, self.reader.time(first, last), rate
         reader: Any = self.reader
         device = next(device for device in self.devices if names[0] in device.channels)
-        first, last, _ = slice(start, stop).indices(device.length)
-        last = max(first, last)
+        first, last = _limits(start, stop, device.length)
         return reader.read_device(names, first, last), reader.device_time(names[0], first, last), device.rate
 
     def vector(self, quantity: str, start: int | None = None, stop: int | None = None) -> VectorRecord:
@@ -303,7 +299,7 @@ class Run:
         quantities : sequence of str
             As of `vector`.
         """
-        return _FileRows(self, quantities)
+        return RowReader(self, quantities)
 
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
@@ -346,7 +342,13 @@ class Run:
         return replace(pulses, quantity="speed", values=speed_from_pulses(pulses.values, pulses.time))
 
 
-class _FileRows:
+def _limits(start: int | None, stop: int | None, length: int) -> tuple[int, int]:
+    """First sample of a Python slice, and the one after its last."""
+    first, last, _ = slice(start, stop).indices(length)
+    return first, max(first, last)
+
+
+class RowReader:
     """Rows of a run's file, all channels in one request."""
 
     def __init__(self, run: Run, quantities: Sequence[str]) -> None:

@@ -352,3 +352,21 @@ def test_all_channels_together_are_laid_along_the_runs_own_times(tmp_path):
     x, force = run.reader.read(["X1A", "L1H"], 4, 40)
     np.testing.assert_array_equal(x, X[4:40])
     np.testing.assert_allclose(force, np.interp(T[4:40], np.arange(500) / SLOW, F))
+
+
+def test_an_empty_time_dataset_and_the_record_of_another_devices_times(tmp_path):
+    columns = {"Time": T[:0], "X1A": X[:0], "X1B": Y[:0], "L1H": F[:1], "L1V": F[:1]}
+    run = stored(tmp_path / "a.h5", columns, {"Time": TIME, **with_rate()})
+    assert [device.length for device in run.devices] == [0, 1]
+    columns = {"Time": T, "X1A": X, "X1B": Y, "Time 2": T2, "L1H": F, "L1V": -F}
+    run = stored(tmp_path / "b.h5", columns, {"Time": TIME, **PROBES, "Time 2": TIME, **CELLS})
+    assert len(run.record("Time")) == 2000
+    with pytest.raises(RigDataError, match="channel Time 2: has 500 samples in place of 2000"):
+        run.record("Time 2")
+
+
+def test_what_is_sampled_apart_is_noted(tmp_path):
+    run = stored(tmp_path / "a.h5", {"X1A": X, "X1B": Y, "L1H": F, "L1V": -F}, with_rate(), 1000.0)
+    (note,) = run.reader.problems()
+    assert note.severity == "note"
+    assert note.what == "sampled apart: X1A, X1B (1000 Hz); L1H, L1V (250 Hz)"

@@ -17,7 +17,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (114.0, 13_900),
     "model": (90.9, 12_050),
-    "rigdata": (70.1, 9_560),
+    "rigdata": (69.9, 9_540),
     "diagnosis": (42.6, 5_220),
     "cli": (25.4, 3_590),
     "report": (24.6, 3_270),
