@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
@@ -88,7 +89,7 @@ class CachedReader(GridReader):
             state = self.path.stat()
         except OSError as error:
             raise self._refuse("", "the file is not there", "Restore it, or delete the run") from error
-        if not self.path.is_file():
+        if not stat.S_ISREG(state.st_mode):
             raise self._refuse("", "is not an ordinary file", "Name a record in the manifest")
         return self.path, state.st_size, state.st_mtime_ns, self.run
 
@@ -134,7 +135,7 @@ class CachedReader(GridReader):
         layout = self._layout()
         values = self._columns(names).values if layout is None else layout.values
         faults = {} if layout is None else layout.faults
-        apart = self.apart()
+        apart = frozenset() if layout is None else self.apart()
         readings = []
         for name in names:
             if name in faults:
