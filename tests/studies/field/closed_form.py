@@ -113,7 +113,7 @@ def response(rig: Rig, frequency: Array, load: float, scale: float = 1.0) -> dic
 
 def sine_course(rig: Rig, test: Test, t: Array, rng: np.random.Generator) -> Array:
     """A sine that may wander by half a period over the record, and go on at another level and phase (n,)."""
-    swing = rig.wander * rig.seconds / np.pi * np.sin(np.pi * t / rig.seconds)
+    swing = 2 * rig.wander * rig.seconds * np.sin(np.pi * t / rig.seconds)
     later = (rig.switch != 1.0) * (t > rig.seconds / 2)
     phase = 2 * np.pi * (test.frequency + rig.detune) * t + swing + rng.uniform(0, 6.28) + 1.7 * later
     return np.asarray(np.sin(phase) * np.where(later, rig.switch, 1.0) * np.clip((t + BEFORE) / 0.3, 0, 1))
