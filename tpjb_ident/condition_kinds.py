@@ -79,6 +79,8 @@ WARNINGS = {
     "clocks-differ": "Probes and cells were recorded by clocks of different rate; the drift of their phase showed "
     "it and was corrected. How exactly they were started together the records do not tell: state delay and "
     "delay_uncertainty in the manifest.",
+    "probes-drift": "Probes read more or less with temperature than the manifest states: the runs of a point differ "
+    "with their temperatures. Measure the coefficients and state temperature_coefficient.",
     "slower-channels": "Channels were sampled slower than the export says and filled up by interpolation; what that "
     "does to a sine was taken out. Export them at their own rate.",
     "accelerometer-dead": "An accelerometer reads one value throughout: the housing's inertia along it stays in "

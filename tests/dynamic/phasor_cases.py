@@ -38,14 +38,18 @@ def run(name: str, direction: float, force: float = 500.0, h=FILM_H, load: float
     return run_phasors(name, direction, load, D, F, (0.0, -load))
 
 
-def run_phasors(name: str, direction: float, load: float, D, F, mean_force) -> RunPhasors:
-    """A run of six windows at 25 Hz, from its phasors (6, 2) and its mean force [N]."""
-    z, mean = np.concatenate([D, F], axis=1)[:, None], np.tile(mean_force, (WINDOWS, 2))
-    noise = np.full((WINDOWS, 4), 1e-9)
+def run_phasors(name: str, direction: float, load: float, D, F, mean_force, channels=None) -> RunPhasors:
+    """A run of six windows at 25 Hz, from phasors (6, 2) and mean force [N]; channels along X and Y, or others."""
+    channels = channels or vector_channels(("displacement", "force"))
+    axes = np.array([c.axis for c in channels])
+    along = np.stack([np.cos(axes), np.sin(axes)], axis=1)
+    probes = np.array([c.quantity == "displacement" for c in channels])
+    z = np.where(probes, D @ along.T, F @ along.T)[:, None]
+    mean = np.tile(along @ mean_force, (WINDOWS, 1))
+    noise = np.full((WINDOWS, len(channels)), 1e-9)
     start, speeds = 0.25 * np.arange(WINDOWS), np.full(WINDOWS, 22.0)
-    lines, channels = known_lines((25.0,), 22.0, 1000.0), vector_channels(("displacement", "force"))
-    parts = (channels, z, mean, noise, np.zeros((WINDOWS, 4)), 30.0, speeds)
-    return RunPhasors(name, place(load), direction, lines, start, 0.25, *parts)
+    parts = (tuple(channels), z, mean, noise, np.zeros_like(noise), 30.0, speeds)
+    return RunPhasors(name, place(load), direction, known_lines((25.0,), 22.0, 1000.0), start, 0.25, *parts)
 
 
 def place(load: float = 5000.0, direction: float = -90.0, speed: float = 22.0, excitation: float = 25.0):

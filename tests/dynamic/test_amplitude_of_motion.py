@@ -5,15 +5,13 @@ import pytest
 
 from rigdata import load_campaign
 from tests.dynamic.phasor_cases import FILM_H as H
-from tests.dynamic.phasor_cases import point_of, run
 from tests.dynamic.test_figures import stiff
 from tests.rigs.campaign_file import plans_of, write_campaign
 from tests.rigs.closed_form_bearing import Bearing
 from tests.rigs.field_rig import Rig
-from tpjb_ident.dynamic.identify import identify
-from tpjb_ident.dynamic.instruments.amplitude import zero_amplitude
 from tpjb_ident.dynamic.instruments.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import identify
 
 
 @pytest.mark.parametrize(
@@ -31,39 +29,6 @@ def test_a_large_motion_is_flagged_only_where_the_harmonics_do_not_show_a_linear
     est = stiff(H, 0.003 * np.abs(H[0, 0]))
     assert change_conditions(change, change.share, est, size * 80e-6, 80e-6) == named
     assert change_conditions(FilmChange(), 0.0, est, 1.0, None) == ()
-
-
-LARGEST = float(np.linalg.norm(np.linalg.solve(H, [1000.0, 0.0])))
-
-
-def runs_of(hardening, forces=(250.0, 500.0, 1000.0)):
-    """Runs whose stiffness grows with the square of their motion, by `hardening` at the largest."""
-    runs = []
-    for i in range(6):
-        for force in forces:
-            angle = i * np.pi / 6
-            motion = np.linalg.norm(np.linalg.solve(H, force * np.array([np.cos(angle), np.sin(angle)]))) / LARGEST
-            h = H * (1 + hardening * motion**2)
-            runs.append(run(f"r{i}-{force:g}", angle, force=force, h=h, seed=round(force) + i))
-    return point_of(runs)
-
-
-def test_several_amplitudes_give_the_stiffness_at_none():
-    data = runs_of(0.04)
-    found = zero_amplitude(data, H, 0.01)
-    assert found.uncertain(H) < 0.01
-    small = found.apply(data)
-    before, after = (np.linalg.lstsq(d.D, d.F, rcond=None)[0].T - H for d in (data, small))
-    assert np.abs(before).max() > 0.008 * np.abs(H).max()
-    assert np.abs(after).max() < 2e-3 * np.abs(H).max()
-    assert found.conditions() == ("zero amplitude",)
-
-
-def test_one_amplitude_or_a_linear_film_is_left_alone():
-    assert zero_amplitude(runs_of(0.0), H, 0.0) is None
-    assert zero_amplitude(runs_of(0.0, (500.0,)), H, 0.05) is None
-    linear = zero_amplitude(runs_of(0.0), H, 0.01)
-    assert np.abs(linear.change).max() < 3 * np.sqrt(np.diag(linear.left).max())
 
 
 @pytest.mark.slow

@@ -11,14 +11,13 @@ import pytest
 
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tests.dynamic.test_load_direction import OMEGA, WINDOWS, law
-from tests.dynamic.test_load_direction import run as run_at
+from tests.dynamic.phasor_cases import OMEGA, WINDOWS, run_phasors
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
-from tpjb_ident.dynamic.identify import assemble
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import digest
 from tpjb_ident.dynamic.runs.run_store import RunResult
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import assemble
 
 LOADS = (3000.0, 8000.0)
 CHANNELS = [
@@ -27,6 +26,25 @@ CHANNELS = [
     Channel("LH", "force", axis=0.0, uncertainty=0.005),
     Channel("LV", "force", axis=math.pi / 2, uncertainty=0.005),
 ]
+
+#: Change of the cross-coupled coefficients per radian, relative to the direct ones.
+SK, SC = -0.9, -0.3
+
+
+def law(load: float, turn: float):
+    k, c = 2.0e8 * (load / 5e3) ** 0.7, 8.0e7
+    return np.array(
+        [[0.85 * k + 1j * c, turn * (SK * k + 1j * SC * c)], [turn * (SK * k + 1j * SC * c), 1.15 * k + 1j * c]]
+    )
+
+
+def run_at(name, direction, load, turn, rng, noise):
+    """A run whose load points `turn` [rad] aside."""
+    spread = rng.standard_normal((WINDOWS, 4)) + 1j * rng.standard_normal((WINDOWS, 4))
+    phase = np.exp(2j * np.pi * rng.random())
+    F = 500.0 * phase * np.array([np.cos(direction), np.sin(direction)]) + noise * spread[:, :2]
+    D = np.linalg.solve(law(load, turn), F.T).T + 1e-9 * noise * spread[:, 2:]
+    return run_phasors(name, direction, load, D, F, load * np.array([np.sin(turn), -np.cos(turn)]), CHANNELS)
 
 
 class Kept:
@@ -55,7 +73,10 @@ def runs():
 
 
 def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
-    campaign = SimpleNamespace(id="c", channels={c.name: c for c in channels}, of_kind=lambda kind: [])
+    named = {c.name: c for c in channels}
+    campaign = SimpleNamespace(
+        id="c", channels=named, of_kind=lambda kind: [], housing_mass=30.0, mass_uncertainty=0.0, mount=None
+    )
     chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
     return assemble(campaign, Kept(runs, left_out), chosen, progress or (lambda text, done, total: None))
 
@@ -71,6 +92,7 @@ def test_every_point_has_its_coefficients_and_all_their_errors(result):
         true = law(p.point.static_load, 0.0)
         np.testing.assert_allclose(p.stiffness.h, true, atol=2e-3 * np.abs(true).max())
         assert list(p.by_method) == ["ols", "mm-eiv"]
+        assert p.quality == ("inertia-not-corrected",)
         assert p.stiffness is p.by_method["mm-eiv"]
         assert p.load_miss.size.shape == (5,)
         assert p.temperatures[2] == 310.0
@@ -156,3 +178,28 @@ def test_a_single_run_has_no_coefficients_and_no_error_of_its_place(runs):
     assert np.isnan(p.position_se).all()
     assert "fewer-than-two-directions" in p.quality
     assert p.n_records == 1
+
+
+def test_a_point_gathers_what_its_runs_say(runs):
+    moved = []
+    for k, run in enumerate(runs[:5]):
+        mean = run.mean.copy()
+        mean[:, :2] = k * 1e-6 * np.array([-1.0, -3.0]) / math.sqrt(2)
+        moved.append(replace(run, mean=mean))
+    (p,) = found(moved, methods=("ols", "mm", "iv"), clearance=1e-3).points
+    assert list(p.by_method) == ["ols", "mm", "iv", "mm-eiv"]
+    assert all(est.method == name for name, est in p.by_method.items())
+    np.testing.assert_allclose(p.position, [2e-6, -4e-6])
+    spread = np.std([0, 1, 2, 3, 4], ddof=1) / math.sqrt(5)
+    np.testing.assert_allclose(p.position_se, 1e-6 * spread * np.array([1, 2]))
+    assert (p.n_records, p.n_windows) == (5, 5 * WINDOWS)
+    assert p.runs == tuple(run.run for run in moved)
+    assert p.static_load_measured == pytest.approx(LOADS[0], rel=0.01)
+    assert p.coherence > 0.999
+    largest = max(
+        np.linalg.svd(np.stack([z.real, z.imag]))[1][0] for z in (m.displacement.phasors[0, 0] for m in moved)
+    )
+    assert p.amplitude == pytest.approx(largest, rel=1e-2)
+    assert p.outlier_fraction == len(p.rejected) / (5 * WINDOWS)
+    assert not p.inertia_corrected
+    assert p.clearance == 1e-3

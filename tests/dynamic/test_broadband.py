@@ -24,7 +24,7 @@ from tpjb_ident.dynamic.broadband.local_regression import local_fit
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.dynamic.broadband.shared_sources import run_scatter
-from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.identification.identify import identify
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])
 SILENT = BandRig(noise=(0.0, 0.0, 0.0), runout=0.0, shaft=0.0, seconds=6.0)

@@ -12,9 +12,9 @@ from tests.rigs.campaign_file import BEARING, manifest_text, plans_of, write_cam
 from tests.rigs.field_rig import Device, Rig, record
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
-from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.runs.run_store import packed, unpacked
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings
 

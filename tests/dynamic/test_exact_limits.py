@@ -12,18 +12,18 @@ from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, 
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-from tpjb_ident.dynamic.estimators.robust_constants import (
-    bisquare_weight,
-    efficiency_constant,
-    half_shrinkage,
-    trimming_limits,
-    trimming_weight,
-)
 from tpjb_ident.dynamic.estimators.uncertainty import (
     DirectionMeans,
     direction_effect,
     information,
     mixed_dof,
+)
+from tpjb_ident.estimate.robust_constants import (
+    bisquare_weight,
+    efficiency_constant,
+    half_shrinkage,
+    trimming_limits,
+    trimming_weight,
 )
 
 

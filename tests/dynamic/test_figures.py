@@ -7,13 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 
 from tests.dynamic import phasor_cases
-from tests.dynamic.phasor_cases import H, complex_normal
+from tests.dynamic.phasor_cases import H
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
-from tpjb_ident.dynamic.identify import directions_differ
-from tpjb_ident.dynamic.identify_point import Completion, disagreement, point_figures, point_result
 from tpjb_ident.dynamic.results.quality import (
     amplitude,
     coherence,
@@ -22,7 +20,7 @@ from tpjb_ident.dynamic.results.quality import (
     rejected_windows,
 )
 from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.methods import disagreement
 
 
 def run(name, direction=0.5, n=4, lost=None, acceleration="yes", mass=30.0):
@@ -152,8 +150,8 @@ def fed(h, error=1e-3):
     return "negative-damping" in flagged(est=stiff(h, error))
 
 
-def test_a_film_feeds_the_motion_where_the_dissipated_power_can_be_negative():
-    """The power of a motion d is omega / 2 of d^H (h - h^H) / 2i d, for real d that of the damping's symmetric part."""
+def test_a_film_feeds_the_motion_where_its_damping_takes_no_power():
+    """The power of a motion along a line is omega / 2 of d^T C d: that of the damping's symmetric part."""
     damping = np.diag([1.0, 1.0])
     assert not fed(1j * damping)
     assert not fed(5.0 * np.eye(2) + 1j * damping)
@@ -162,10 +160,9 @@ def test_a_film_feeds_the_motion_where_the_dissipated_power_can_be_negative():
     assert fed(1j * np.array([[1.0, 1.2], [1.2, 1.0]]))
     assert not fed(1j * np.array([[1.0, 0.8], [0.8, 1.0]]))
     assert not fed(1j * np.array([[1.0, 1.2], [-1.2, 1.0]]))
-    # a symmetric stiffness does none either; an antisymmetric one feeds a circular orbit
+    # a symmetric stiffness does none either; that an antisymmetric one feeds a circular orbit is a matter of stability
     assert not fed(np.array([[0.0, 3.0], [3.0, 0.0]]) + 1j * damping)
-    assert fed(np.array([[0.0, 1.1], [-1.1, 0.0]]) + 1j * damping)
-    assert not fed(np.array([[0.0, 0.9], [-0.9, 0.0]]) + 1j * damping)
+    assert not fed(np.array([[0.0, 3.0], [-3.0, 0.0]]) + 1j * damping)
     for factor, named in ((2.9, False), (3.1, True)):
         assert fed(1j * np.diag([1.0, -factor * 0.1]), 0.1) is named
 
@@ -208,21 +205,6 @@ def test_a_pattern_is_what_chance_gives_less_than_once_in_a_thousand(others):
         assert (pattern([hits, *[others] * 5]) is not None) is (chance < 1e-3)
 
 
-def test_runs_differ_where_the_summed_chi_square_says_so():
-    """Sum of reduced chi-squares times their degrees of freedom, at one in ten thousand."""
-    limit = float(chi2.isf(1e-4, 16 + 8))
-
-    def first(total):
-        a, b = 0.7 * total / 16, 0.3 * total / 8
-        nothing = stiff(chi_square=math.nan, spare_equations=16), stiff(chi_square=99.0, spare_equations=0)
-        return [stiff(chi_square=a, spare_equations=16), stiff(chi_square=b, spare_equations=8), *nothing]
-
-    assert directions_differ(first(1.01 * limit))
-    assert not directions_differ(first(0.99 * limit))
-    assert not directions_differ([])
-    assert not directions_differ(first(1.0)[2:])
-
-
 def test_methods_disagree_beyond_both_intervals():
     """Their half widths added as squares; the worst entry is told."""
     best = stiff(error=3e-3)
@@ -235,31 +217,3 @@ def test_methods_disagree_beyond_both_intervals():
     lost = stiff(np.full((2, 2), np.nan))
     assert disagreement({"mm": lost, "best": best}, "best") == ()
     assert disagreement({"mm": best, "best": lost}, "best") == ()
-
-
-def test_a_point_gathers_what_its_runs_say():
-    rng = np.random.default_rng(4)
-    D = np.repeat(complex_normal(rng, 5, 2), 6, axis=0) + 1e-3 * complex_normal(rng, 30, 2)
-    runs = tuple(run(f"r{k}", 0.3 * k, n=6) for k in range(5))
-    for k, one in enumerate(runs):
-        one.cell_force.mean[:] = [0.0, -5.0 - 0.1 * k]
-        one.displacement.mean[:] = [1.0 * k, -2.0 * k]
-    data = data_of(D, runs, per_run=6)
-    temperatures = {"r0": {1: 300.0, 2: 310.0}, "r1": {1: 302.0}, "r9": {1: 900.0}}
-    settings = IdentifySettings(methods=("ols", "mm", "iv"), clearance=1e3)
-    figures = point_figures(data, settings, differ=False)
-    found = point_result(data, figures, Completion(figures.by_method), temperatures, settings)
-    assert list(found.by_method) == ["ols", "mm", "iv", "mm-eiv"]
-    assert found.stiffness is found.by_method["mm-eiv"]
-    assert all(est.method == name for name, est in found.by_method.items())
-    np.testing.assert_allclose(found.stiffness.h, H, atol=1e-2)
-    assert found.static_load_measured == pytest.approx(5.2)
-    np.testing.assert_allclose(found.position, [2.0, -4.0])
-    np.testing.assert_allclose(found.position_se, np.std([0, 1, 2, 3, 4], ddof=1) / math.sqrt(5) * np.array([1, 2]))
-    assert found.temperatures == {1: 301.0, 2: 310.0}
-    assert (found.n_records, found.n_windows) == (5, 30)
-    assert found.runs == ("r0", "r1", "r2", "r3", "r4")
-    assert found.coherence > 0.999
-    assert found.amplitude == pytest.approx(max(amplitude(data, np.ones(30)), 0.0), rel=1e-2)
-    assert found.outlier_fraction == len(found.rejected) / 30
-    assert found.inertia_corrected

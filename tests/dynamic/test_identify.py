@@ -10,8 +10,8 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import Fault, Noise, RigPlan, RigTruth, VirtualRig, operating_points
 from tests.rigs.held_run import HeldReader, channels, columns, lines_in_noise, run_of
-from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.frequency import speeds_from_runout
 from tpjb_ident.phasors.lines import known_lines

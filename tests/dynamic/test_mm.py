@@ -15,7 +15,7 @@ from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, 
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, robust_start
 from tpjb_ident.dynamic.estimators.mm import MANY_WINDOWS, mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
-from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant
+from tpjb_ident.estimate.robust_constants import bisquare_weight, efficiency_constant
 
 
 def windows(seed, n=60, g=6, noise=0.1, bad=10):

@@ -10,8 +10,6 @@ from scipy.stats import chi2
 
 from tests.dynamic.phasor_cases import NOISE, H, complex_normal, hermitian, noisy_means, rejected, windows
 from tpjb_ident.dynamic.estimators.errors_in_variables import (
-    LOCKED,
-    aligned,
     eiv_fit,
     repeats,
     windows_used_again,
@@ -36,6 +34,7 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     spread_of,
     with_repeats,
 )
+from tpjb_ident.estimate.window_means import LOCKED, aligned
 
 
 def balanced_scores(g):

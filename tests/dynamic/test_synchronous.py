@@ -12,8 +12,8 @@ from rigdata.run import pulse_times
 from tests.rigs.campaign_file import plans_of, write_campaign
 from tests.rigs.field_rig import Rig
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.shaft import shaft_order
 
 TURNING = replace(Rig(), locked=True, runout=(6e-6, 2e-6, 1e-6), miss=(0.0, 0.0), seconds=2.0)

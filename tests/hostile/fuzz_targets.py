@@ -314,7 +314,7 @@ _COMMAND_MODULES = (
     "jinja2",
     "model.predict",
     "tpjb_ident.clearance.sweep",
-    "tpjb_ident.dynamic.identify",
+    "tpjb_ident.identification.identify",
     "tpjb_ident.pivot",
     "tpjb_ident.compare",
     "tpjb_ident.diagnosis",

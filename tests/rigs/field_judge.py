@@ -41,7 +41,7 @@ def judge(path: Path, rig: Rig) -> Outcome:
     """Identify one campaign and hold it against the truth."""
     from tpjb_ident.cli.common.command import Command
     from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted
-    from tpjb_ident.dynamic.identify import identify
+    from tpjb_ident.identification.identify import identify
 
     outcome = Outcome()
     try:

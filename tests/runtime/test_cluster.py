@@ -75,8 +75,8 @@ def wait_for(address: str, count: int) -> None:
 @pytest.mark.slow
 def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_path):
     from rigdata.campaign import load_campaign
-    from tpjb_ident.dynamic.identify import identify
     from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.identification.identify import identify
 
     wait_for(str(cluster.file), 2)
     campaign = load_campaign(campaign_file)

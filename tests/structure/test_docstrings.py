@@ -27,6 +27,7 @@ EXTENSION_POINTS = {
         "rigdata/readers/*.py:RunReader",
     ),
     "an estimator": ("tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",),
+    "a term": ("tpjb_ident/estimate/term.py:Term",),
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
     "a motion of the virtual rig": ("rigdata/virtual_rig/motion.py:Motion",),

@@ -15,7 +15,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (114.0, 13_900),
+    "measurement": (130.9, 15_920),
     "model": (90.9, 12_050),
     "rigdata": (69.9, 9_540),
     "diagnosis": (42.6, 5_220),
@@ -25,12 +25,12 @@ LIMITS = {
     "clearance": (8.8, 1_160),
     "compare": (8.5, 1_290),
     "watch": (6.5, 840),
-    "top level": (5.8, 1_060),
+    "top level": (5.8, 1_070),
     "runtime": (6.8, 1_140),
     "exports": (4.3, 720),
     "view": (4.4, 510),
 }
-MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "results")
+MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "identification")
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -17,7 +17,7 @@ from model.bearing_file import parse_bearing
 from tests.studies.results import table, write_section
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
-from tpjb_ident.dynamic.identify import identify
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.pivot import fit_pivots
 
 NAMES = ("rocker-baseline", "rocker-measured-pivots.h5", "spherical-baseline.h5")

@@ -208,8 +208,8 @@ def compare_campaign(
     >>> len(comparison.identification.points), [variant.name for variant in comparison.variants]
     (7, ['rigid'])
     """
-    from tpjb_ident.dynamic.identify import identify
     from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.identification.identify import identify
 
     settings = settings or CompareSettings()
     _check(campaign, settings)

@@ -23,9 +23,9 @@ from tpjb_ident.diagnosis.observations.from_table import observe_table
 from tpjb_ident.diagnosis.observations.observe import observe
 from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
-from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import RecordTooShortError

@@ -10,12 +10,12 @@ import numpy as np
 from rigdata.campaign import Campaign
 from rigdata.problem import RigError
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
-from tpjb_ident.dynamic.identify import identify
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.pivot import PivotSettings, fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
 

@@ -84,7 +84,7 @@ def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tu
     path = result_table(source)
     if path is not None:
         return read_table(c.file(path, refuses_changed=True)), path.parent.resolve().name
-    from tpjb_ident.dynamic.identify import identify as run_identification
+    from tpjb_ident.identification.identify import identify as run_identification
 
     campaign = c.open(source)
     settings = identify_settings(c, campaign, method, norm)

@@ -78,7 +78,7 @@ def identify(
     source = c.open(campaign)
     phasors = _phasor_settings(lines, delay or ())
     settings = replace(identify_settings(c, source, method, norm), phasors=phasors, keep_weights=False)
-    from tpjb_ident.dynamic.identify import identify as run_identification
+    from tpjb_ident.identification.identify import identify as run_identification
     from tpjb_ident.runtime.workers import open_workers
 
     count, start = _worker_count(source, workers, scheduler)

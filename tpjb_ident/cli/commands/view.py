@@ -72,8 +72,8 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.dynamic.identify import identify
         from tpjb_ident.dynamic.settings import IdentifySettings
+        from tpjb_ident.identification.identify import identify
 
         session.identify = lambda: identify(campaign, IdentifySettings())
         if bearing is not None or campaign.bearing_text:

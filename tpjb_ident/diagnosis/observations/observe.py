@@ -17,11 +17,11 @@ from scipy.linalg import block_diag
 from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.dynamic.corrections.mains import MAINS_CORRECTED, MAINS_ON_LINE
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.terms.mains import MAINS_CORRECTED, MAINS_ON_LINE
 
 
 @dataclass(frozen=True)

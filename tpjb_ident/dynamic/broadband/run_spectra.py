@@ -22,11 +22,11 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
 )
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
-from tpjb_ident.dynamic.instruments.findings import START
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
 from tpjb_ident.phasors.compensation import SlowerChannel, channel_gains, inspect_readings
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors, oil_force, vector_channels
+from tpjb_ident.terms.clock import START
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")

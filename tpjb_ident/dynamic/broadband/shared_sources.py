@@ -18,8 +18,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.line_fit import LineFit
 from tpjb_ident.dynamic.broadband.line_rows import LineRows
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
-from tpjb_ident.dynamic.corrections.load_direction import PLAUSIBLE
-from tpjb_ident.dynamic.corrections.static_load import UNKNOWN_EXPONENT, LoadMiss
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.corrections.systematic_sources import (
     GainDraws,
     SystematicSources,
@@ -30,6 +29,8 @@ from tpjb_ident.dynamic.corrections.systematic_sources import (
 )
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
+from tpjb_ident.terms.load_turn import PLAUSIBLE
 
 #: Probability of chance below which runs differ,
 _DIFFERENT = 1e-3

@@ -1,19 +1,19 @@
 """The static load of every run against its set point, and what the miss does to the coefficients.
 
 The load misses its set point a little differently in every run, and coefficients depend on load. The
-cells measure the miss of each run; the campaign's other loads tell the slope dH/d(ln W). So every
-run's forces are brought to the set point before the estimate: F - (dH/dlnW) * miss * D.
+cells measure the miss of each run; the campaign's other loads tell the slope dH/d(ln W), so that the
+solve takes every run at its own load.
 
 What the cells say is taken relative to the campaign's own mean: a gain error of the cells would
 look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
-Misses in direction have a slope of their own, which only the runs' own misses tell: `load_direction`.
+Misses in direction have a slope of their own, which only the runs' own misses tell: `terms.load_turn`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.runs.point_data import PointData
 
 #: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
 UNKNOWN_EXPONENT = 0.6
@@ -107,84 +105,6 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[L
         relative = np.nan_to_num(ratio / common - 1.0)
         misses.append(LoadMiss(relative.real, relative.imag, *known_to))
     return misses, common
-
-
-def load_slopes(points: Sequence[LoadCase], first: list[DynamicStiffness]) -> list[ComplexArray | None]:
-    """Slope dH/d(ln W) at every point from the campaign's other loads; None where there are none.
-
-    Stiffness and damping slopes are found at the excitation that was run at several loads and
-    carried over to the others at the same load, direction and speed.
-    """
-    families: dict[tuple[float, ...], list[int]] = {}
-    for i, data in enumerate(points):
-        p = data.point
-        if np.isfinite(first[i].h).all() and p.static_load > 0:
-            key = (p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz)
-            families.setdefault(key, []).append(i)
-    slopes: list[ComplexArray | None] = [None] * len(points)
-    for members in families.values():
-        if len(members) >= 2:
-            for i, slope in zip(members, _slopes_over_load(members, points, first)):
-                slopes[i] = slope
-    return [slope if slope is not None else _borrowed(i, points, slopes) for i, slope in enumerate(slopes)]
-
-
-def _slopes_over_load(
-    members: list[int], points: Sequence[LoadCase], first: list[DynamicStiffness]
-) -> list[ComplexArray]:
-    members.sort(key=lambda i: points[i].point.static_load)
-    log_load = np.log([points[i].point.static_load for i in members])
-    h = np.array([first[i].h for i in members])
-    return list(_log_gradient(h.real, log_load) + 1j * _log_gradient(h.imag, log_load))
-
-
-def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
-    """Slope over ln W; entries that keep their sign are taken as power laws between loads."""
-    order: Literal[1, 2] = 2 if len(log_load) > 2 else 1
-    plain = np.asarray(np.gradient(values, log_load, axis=0, edge_order=order))
-    one_sign = np.abs(np.sign(values).sum(axis=0)) == len(values)
-    logarithm = np.log(np.where(one_sign, np.abs(values), 1.0))
-    power = values * np.gradient(logarithm, log_load, axis=0, edge_order=order)
-    return np.where(one_sign, power, plain)
-
-
-def _borrowed(i: int, points: Sequence[LoadCase], slopes: list[ComplexArray | None]) -> ComplexArray | None:
-    """Slope of the nearest excitation at the same load; K and C each keep theirs."""
-    p = points[i].point
-    neighbours = [
-        j
-        for j, slope in enumerate(slopes)
-        if slope is not None
-        and points[j].point.static_load == p.static_load
-        and points[j].point.static_load_direction_deg == p.static_load_direction_deg
-        and points[j].point.shaft_speed_hz == p.shaft_speed_hz
-    ]
-    if not neighbours:
-        return None
-    nearest = min(neighbours, key=lambda j: abs(points[j].point.excitation - p.excitation))
-    slope = slopes[nearest]
-    if slope is None:
-        return None
-    return np.asarray(slope.real + 1j * slope.imag * p.excitation / points[nearest].point.excitation)
-
-
-def to_set_point(data: PointData, miss: LoadMiss, slope: ComplexArray | None) -> PointData:
-    """The point's windows with forces as they would be at the set point; `slope` (2, 2)."""
-    if slope is None or np.abs(miss.size).max(initial=0.0) > MAX_MISS:
-        return data
-    change = miss.size[data.run_index][:, None] * (data.D @ slope.T)
-    return replace(data, F=data.F - change)
-
-
-def widened(est: DynamicStiffness, miss: LoadMiss, slope: ComplexArray | None) -> DynamicStiffness:
-    """Add what is not known of the miss, or what a known one may have done where the slope is not known."""
-    if not np.isfinite(est.h).all():
-        return est
-    if slope is None:
-        shift = UNKNOWN_EXPONENT * float(np.hypot(miss.size.mean(), miss.uncertainty)) * np.abs(est.vector)
-        return replace(est, covariance=est.covariance + np.diag(shift**2))
-    shift = miss.uncertainty * np.concatenate([slope.real.ravel(), slope.imag.ravel()])
-    return replace(est, covariance=est.covariance + np.outer(shift, shift))
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:

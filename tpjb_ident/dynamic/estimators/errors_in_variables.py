@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtri
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
-from tpjb_ident.dynamic.estimators.robust_constants import trimming_limits, trimming_weight
 from tpjb_ident.dynamic.estimators.uncertainty import (
     DirectionMeans,
     VarianceByDirection,
@@ -25,12 +24,12 @@ from tpjb_ident.dynamic.estimators.uncertainty import (
     pooled_effect,
     spread_of,
 )
+from tpjb_ident.estimate.robust_constants import trimming_limits, trimming_weight
+from tpjb_ident.estimate.window_means import aligned
 from tpjb_ident.phasors.line_means import complex_median
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
 _MIN_SPARE_REPEATS = 8.0
-#: |sum| over sum of moduli of a direction's windows below which its phase counts as wandering.
-LOCKED = 0.9
 #: A direction with less than this share of its windows accepted counts as rejected.
 _REJECTED = 0.2
 #: Share of its windows that must agree with one another for it to be a candidate.
@@ -186,33 +185,6 @@ def _score_iteration(
         if change < 1e-12:
             break
     return h, D_true
-
-
-def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[ComplexArray, int]:
-    """Turn windows to their direction's common phase where the phase wanders, (n, m).
-
-    Repeats are repeats of one phasor only while the actuators' generator is locked to the recorder. Where it is not,
-    each window's phasors turn by a common angle, which F = H D does not see, but an average does.
-
-    `z` (n, m), `direction` (n,), `weights` (n,).
-    """
-    result, wandering = z, 0
-    for d in range(int(direction.max()) + 1):
-        places = np.flatnonzero(direction == d)
-        good = places[weights[places] > 0]
-        if len(good) < 3:
-            continue
-        pattern = np.linalg.svd(z[good], full_matrices=False)[2][0].conj()
-        along = z[places] @ pattern
-        counted = z[good] @ pattern
-        if abs(counted.sum()) >= LOCKED * np.abs(counted).sum():
-            continue
-        if wandering == 0:
-            result = z.copy()
-        wandering += 1
-        turn = np.exp(-1j * np.angle(along))
-        result[places] = z[places] * turn[:, None]
-    return result, wandering
 
 
 def windows_used_again(table: PhasorTable, weights: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
-from tpjb_ident.dynamic.estimators.robust_constants import bisquare_weight, efficiency_constant
+from tpjb_ident.estimate.robust_constants import bisquare_weight, efficiency_constant
 
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
 _MIN_WINDOWS = 8

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtri
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.phasors.line_means import LineMean
@@ -38,8 +38,6 @@ _REFUSED = 0.05
 MAX_AMPLITUDE = 0.05
 #: and from which none is linear: where it looks so, the motion is not what the probes say.
 NEVER_LINEAR = 0.3
-#: A change is known to be no larger than the figure above; as a standard deviation it is this part of it.
-_AS_DEVIATION = 1 / 1.6
 
 
 @dataclass(frozen=True)
@@ -50,11 +48,11 @@ class FilmChange:
     hidden: float = np.inf
 
 
-def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], est: DynamicStiffness) -> FilmChange:
-    """Share by which h is off through the amplitude of the excitation, by the records' second harmonics."""
-    if not np.isfinite(est.h).all():
+def film_change(harmonics: Sequence[tuple[LineMean, LineMean]], h: ComplexArray) -> FilmChange:
+    """Share by which h (2, 2) [N/m] is off through the amplitude of the excitation, by the second harmonics."""
+    if not np.isfinite(h).all():
         return FilmChange()
-    doubled = est.h.real + 2j * est.h.imag
+    doubled = h.real + 2j * h.imag
     usable = [(a, b) for a, b in harmonics if np.isfinite(b.force).all() and np.linalg.norm(a.force) > 0]
     alone = [pair for pair in usable if not pair[1].shared]
     if len(usable) >= _MIN_RUNS:
@@ -96,12 +94,6 @@ def _quadratic_share(usable: Sequence[tuple[LineMean, LineMean]], doubled: Compl
     # what noise and mains leave by chance is taken off; what is more counts, also where it is not beyond doubt
     chance = remaining * float(fdtri(6, 2 * (len(usable) - 3), 1.0 - _CHANCE))
     return max(3 * (explained - chance) / len(usable), 0.0), unseen
-
-
-def change_spread(change: float, est: DynamicStiffness) -> FloatArray:
-    """Covariance (8, 8) of H when its entries may be off by a common share."""
-    shift = _AS_DEVIATION * change * np.abs(est.vector)
-    return np.diag(shift**2)
 
 
 def change_conditions(

@@ -134,19 +134,38 @@ def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
 
 def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
     soft_points = []
-    for p in points:
-        load, direction = p.point.static_load, p.point.static_load_direction
+    for load, direction, stiffness in _static_stiffness(points):
         along = np.array([np.cos(direction), np.sin(direction)])
-        stiffness = float(along @ p.stiffness.k @ along)
-        if load > 0 and 0 < stiffness < _LEAST_STIFF * load / clearance:
-            soft_points.append((stiffness * clearance / load, load, stiffness))
+        value = float(along @ stiffness @ along)
+        if load > 0 and 0 < value < _LEAST_STIFF * load / clearance:
+            soft_points.append((value * clearance / load, load, value))
     if not soft_points:
         return []
-    _, load, stiffness = min(soft_points)
+    _, load, value = min(soft_points)
     return [
-        f"{load / 1e3:g} kN on a stiffness of {stiffness / 1e6:.3g} MN/m would move the shaft by more than "
-        f"{1e6 * load / stiffness:.3g} um"
+        f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m would move the shaft by more than "
+        f"{1e6 * load / value:.3g} um"
     ]
+
+
+def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float, FloatArray]]:
+    """Load, direction and stiffness (2, 2) at rest: Re h = K - omega^2 M, extrapolated over the frequencies of a load.
+
+    A single frequency does not tell the film's and the housing's inertia from its stiffness: it says nothing.
+    """
+    groups: dict[tuple[float, ...], list[PointResult]] = {}
+    for p in points:
+        if np.isfinite(p.stiffness.h).all():
+            key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed_hz)
+            groups.setdefault(key, []).append(p)
+    result = []
+    for (load, direction, _), members in groups.items():
+        square = np.array([p.stiffness.omega**2 for p in members])
+        k = np.array([p.stiffness.k.ravel() for p in members])
+        if len(members) > 1 and np.ptp(square) > 0:
+            line = np.polynomial.polynomial.polyfit(square, k, 1)[0]
+            result.append((load, direction, line.reshape(2, 2)))
+    return result
 
 
 def channel_pairs(campaign: Campaign, sweeps: Sequence[SweptProbe] = ()) -> Pairs | None:

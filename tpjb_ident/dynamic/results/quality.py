@@ -113,12 +113,12 @@ def _missing(data: PointData) -> list[Condition]:
 
 
 def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
-    """Say where the dissipative part of H (its skew-Hermitian part) is negative beyond doubt."""
+    """Say where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it."""
     h = stiffness.h
     if not np.isfinite(h).all():
         return ()
     doubt = 3 * float(stiffness.standard_error[4:].max())
-    if not np.linalg.eigvalsh((h - h.conj().T) / 2j)[0] < -doubt:
+    if not np.linalg.eigvalsh((h.imag + h.imag.T) / 2)[0] < -doubt:
         return ()
     text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
     return (Condition("negative-damping", text),)

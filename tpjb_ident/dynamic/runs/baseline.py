@@ -42,7 +42,7 @@ class Baseline:
     def taken_off(self, data: PointData) -> PointData:
         """The point's windows with the film's force alone."""
         rig = self.at(data.omega)
-        return data if rig is None else replace(data, F=data.F - data.D @ rig[0].T)
+        return data if rig is None else replace(data, F=data.F - data.D @ rig[0].T, rig=rig[0])
 
     def missing(self, data: PointData) -> tuple[Condition, ...]:
         """Say where a campaign has baseline runs, but no answer of theirs at a point's frequency."""

@@ -45,6 +45,7 @@ class RunDigest:
     harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
     sample_rate: float = 0.0
     mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
+    window: float = 1.0  #: s: length of its windows
     seen: tuple[Observation, ...] = field(default=(), repr=False)
 
 
@@ -62,6 +63,7 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
         second_harmonics(phasors),
         sample_rate,
         mains_force(phasors),
+        phasors.length,
         result.seen,
     )
 

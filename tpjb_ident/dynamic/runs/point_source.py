@@ -10,10 +10,8 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.runs.baseline import Baseline
-from tpjb_ident.dynamic.runs.clock_rates import ClockRates
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
-from tpjb_ident.dynamic.runs.synchronous import without_shaft
 
 
 @dataclass(frozen=True)
@@ -24,7 +22,6 @@ class PointSource:
     members: tuple[tuple[int, int], ...]
     digests: tuple[RunDigest, ...]
     finished: FinishedRuns = field(repr=False)
-    clocks: ClockRates = field(default_factory=ClockRates)
     baseline: Baseline = field(default_factory=Baseline)
     _loaded: list[PointData] = field(init=False, default_factory=list, repr=False, compare=False)
 
@@ -33,14 +30,14 @@ class PointSource:
         return {**self.__dict__, "finished": None, "_loaded": [self.load()]}
 
     def load(self) -> PointData:
-        """All windows of the point, as if one clock had recorded them, without the rig's and the shaft's own part.
+        """All windows of the point, without the rig's own part.
 
         They are kept where the runs themselves are in memory.
         """
         if self._loaded:
             return self._loaded[0]
         recorded = point_data(self.point, [(self.finished.take(k), i) for k, i in self.members])
-        data = without_shaft(self.baseline.taken_off(self.clocks.apply(recorded)))
+        data = self.baseline.taken_off(recorded)
         if self.finished.all_in_memory:
             self._loaded.append(data)
         return data

@@ -1,20 +1,19 @@
-"""One operating point: its windows to an estimate by every method, with figures and flags."""
+"""Every method's answer on the windows of one operating point, and what is said of the default one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope, amplitude_slope
-from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
+from tpjb_ident.dynamic.results.point_result import WindowVerdict
 from tpjb_ident.dynamic.results.quality import (
     amplitude,
     coherence,
@@ -23,19 +22,13 @@ from tpjb_ident.dynamic.results.quality import (
     flags,
     rejected_windows,
 )
-from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
+from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.settings import IdentifySettings
 
 #: Windows that a run needs, for its mean to be nearly free of each window's own noise.
 _MIN_WINDOWS = 5
 #: Smallest sine of the angle between two excitation directions that counts as two.
 _MIN_SINE = 0.1
-
-
-def first_estimate(data: PointData, settings: IdentifySettings) -> DynamicStiffness:
-    """Estimate before any correction, for how H changes with load and how runs scatter; its weights are not needed."""
-    estimate = estimate_table(phasor_table(data.D, data.F, data.run_index), data.omega, own_method(settings.method))
-    return replace(estimate, weights=np.empty((0, 2)))
 
 
 def own_method(method: str) -> str:
@@ -47,7 +40,6 @@ def own_method(method: str) -> str:
 class Figures:
     """What the windows of a point say before its uncertainties are known."""
 
-    by_method: dict[str, DynamicStiffness]
     outlier_fraction: float
     coherence: float
     amplitude: float
@@ -56,19 +48,10 @@ class Figures:
     rejected: tuple[WindowVerdict, ...]
 
 
-@dataclass(frozen=True)
-class Completion:
-    """What corrections and systematic sources add: the estimates with their uncertainty, and what to say of them."""
-
-    by_method: dict[str, DynamicStiffness]
-    conditions: tuple[Condition, ...] = ()
-    load_miss: LoadMiss | None = None
-    budget: dict[str, FloatArray] = field(default_factory=dict)
-
-
-def point_figures(data: PointData, settings: IdentifySettings, differ: bool, known: float = 0.0) -> Figures:
-    """Every method's answer on the windows of a point, and what is said of the default one."""
-    by_method = _all_methods(data, settings, differ)
+def point_figures(
+    data: PointData, settings: IdentifySettings, by_method: dict[str, DynamicStiffness], known: float = 0.0
+) -> Figures:
+    """What the windows of a point say of the default method; `known` [N]: force of random phase that the runs hold."""
     best = by_method[settings.method]
     weights = best.weights.min(axis=1)
     figure = coherence(data.D, data.F, best.h, weights)
@@ -85,53 +68,21 @@ def point_figures(data: PointData, settings: IdentifySettings, differ: bool, kno
     )
     rejected = rejected_windows(data, best.h, weights)
     share = float((weights < REJECTED_WEIGHT).mean())
-    return Figures(by_method, share, figure, size, linearity, conditions, rejected)
+    return Figures(share, figure, size, linearity, conditions, rejected)
 
 
-def point_result(
-    data: PointData,
-    figures: Figures,
-    completion: Completion,
-    temperatures: dict[str, dict[int, float]],
-    settings: IdentifySettings,
-) -> PointResult:
-    """The point, made once, with everything that is known of it."""
-    positions = data.mean_positions
-    return PointResult(
-        point=data.point,
-        stiffness=completion.by_method[settings.method],
-        by_method=completion.by_method,
-        static_load_measured=float(np.linalg.norm(data.mean_loads.mean(axis=0))),
-        position=positions.mean(axis=0),
-        position_se=positions.std(axis=0, ddof=1) / np.sqrt(len(positions))
-        if len(positions) > 1
-        else np.full(2, np.nan),
-        temperatures=pad_means([temperatures.get(run.run, {}) for run in data.runs]),
-        n_records=len(data.runs),
-        n_windows=len(data.D),
-        outlier_fraction=figures.outlier_fraction,
-        coherence=figures.coherence,
-        amplitude=figures.amplitude,
-        quality=merged(figures.conditions, completion.conditions),
-        rejected=figures.rejected,
-        runs=tuple(run.run for run in data.runs),
-        load_miss=completion.load_miss,
-        linearity=figures.linearity,
-        inertia_corrected=data.runs[0].acceleration is not None,
-        clearance=settings.clearance,
-        budget=completion.budget,
-    )
-
-
-def _all_methods(data: PointData, settings: IdentifySettings, differ: bool) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case."""
+def all_methods(
+    data: PointData, settings: IdentifySettings, solved: dict[str, DynamicStiffness]
+) -> dict[str, DynamicStiffness]:
+    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already."""
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
-    table = replace(table, directions_differ=differ)
     estimates: dict[str, DynamicStiffness] = {}
     for name in dict.fromkeys((*settings.methods, settings.method)):
         method, _, norm = name.partition(":")
-        if method != "iv" or drive is not None or settings.method == "iv":
+        if name in solved:
+            estimates[name] = solved[name]
+        elif method != "iv" or drive is not None or settings.method == "iv":
             estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
     return estimates
 

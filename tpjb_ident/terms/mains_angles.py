@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.dynamic.estimators.r_matrix import ols_fit
 
 _STARTS = 2000
 _SWEEPS = 25
@@ -108,7 +107,7 @@ class MainsEquations:
     def _candidates(self) -> ComplexArray:
         """H of the best starts, (n, 2, 2)."""
         rng = np.random.default_rng(_SEED)
-        plain = ols_fit(self.D, self.F)
+        plain = np.linalg.lstsq(self.D, self.F, rcond=None)[0].T
         spread = np.linalg.norm(self.patterns) / np.sqrt(np.mean(np.abs(self.D) ** 2))
         wobble = rng.standard_normal((_STARTS, 2, 2)) + 1j * rng.standard_normal((_STARTS, 2, 2))
         wobble[0] = 0.0

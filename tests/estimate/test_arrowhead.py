@@ -1,0 +1,134 @@
+"""The arrow's normal equations against a dense least-squares solve with priors, and its budget against the sum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.estimate.block_cases import Case, made, solved
+from tpjb_ident.estimate.arrowhead import CONSIDERED, NUMBERS, Sums, step
+
+POINTS, PARAMETERS, BLOCKS, ROWS = 3, 5, 12, 6
+
+
+def problem(seed, weak=()):
+    """Weighted rows of blocks, priors, and the parameters of which the rows tell next to nothing."""
+    rng = np.random.default_rng(seed)
+    point = np.repeat(np.arange(POINTS), BLOCKS // POINTS)
+    r = rng.standard_normal((BLOCKS, ROWS))
+    J_h = rng.standard_normal((BLOCKS, ROWS, NUMBERS))
+    J_t = rng.standard_normal((BLOCKS, ROWS, PARAMETERS))
+    J_t[:, :, list(weak)] *= 1e-3
+    return point, r, J_h, J_t, rng.standard_normal(PARAMETERS), rng.uniform(0.2, 2.0, PARAMETERS)
+
+
+def taken(point, r, J_h, J_t):
+    sums = Sums.empty(POINTS, PARAMETERS)
+    for places in (slice(0, 5), slice(5, 12)):
+        sums.add(point[places], r[places], J_h[places], J_t[places])
+    return sums
+
+
+def dense(point, r, J_h, J_t, to_prior, precision):
+    """Least squares of all unknowns at once: rows of the blocks and of the priors."""
+    rows = np.zeros((BLOCKS * ROWS + PARAMETERS, NUMBERS * POINTS + PARAMETERS))
+    for b in range(BLOCKS):
+        place = slice(b * ROWS, (b + 1) * ROWS)
+        rows[place, NUMBERS * point[b] : NUMBERS * (point[b] + 1)] = J_h[b]
+        rows[place, NUMBERS * POINTS :] = J_t[b]
+    root = np.sqrt(precision)
+    rows[BLOCKS * ROWS :, NUMBERS * POINTS :] = np.diag(root)
+    answer = np.concatenate([r.ravel(), root * to_prior])
+    return np.linalg.lstsq(rows, answer, rcond=None)[0], np.linalg.inv(rows.T @ rows)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_is_the_dense_solve(seed):
+    point, r, J_h, J_t, to_prior, precision = problem(seed)
+    found = step(taken(point, r, J_h, J_t), to_prior, precision, np.ones(PARAMETERS, dtype=bool))
+    unknowns, covariance = dense(point, r, J_h, J_t, to_prior, precision)
+    numbers = NUMBERS * POINTS
+    np.testing.assert_allclose(found.h.ravel(), unknowns[:numbers], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(found.theta, unknowns[numbers:], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(found.S_inverse, covariance[numbers:, numbers:], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(found.deviation, np.sqrt(np.diag(covariance)[numbers:]), rtol=1e-10)
+    factors = found.factors()
+    for p in range(POINTS):
+        part = slice(NUMBERS * p, NUMBERS * (p + 1))
+        total = found.records()[p] + factors[:, p].T @ factors[:, p]
+        np.testing.assert_allclose(total, covariance[part, part], rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("weak", [(1,), (0, 4)])
+def test_what_the_rows_do_not_tell_is_considered(weak):
+    """Its value stays at its prior; the covariance is that of an estimator which takes it for known, and is wrong."""
+    point, r, J_h, J_t, to_prior, precision = problem(7, weak)
+    found = step(taken(point, r, J_h, J_t), to_prior, precision, np.zeros(PARAMETERS, dtype=bool))
+    np.testing.assert_array_equal(np.flatnonzero(~found.estimated), weak)
+    np.testing.assert_array_equal(found.theta[list(weak)], to_prior[list(weak)])
+    np.testing.assert_allclose(found.deviation[list(weak)], 1 / np.sqrt(precision[list(weak)]))
+    kept = np.flatnonzero(found.estimated)
+    remaining = r - J_t[:, :, list(weak)] @ to_prior[list(weak)]
+    rows = np.zeros((BLOCKS * ROWS + len(kept), NUMBERS * POINTS + len(kept)))
+    for b in range(BLOCKS):
+        place = slice(b * ROWS, (b + 1) * ROWS)
+        rows[place, NUMBERS * point[b] : NUMBERS * (point[b] + 1)] = J_h[b]
+        rows[place, NUMBERS * POINTS :] = J_t[b][:, kept]
+    root = np.sqrt(precision[kept])
+    rows[BLOCKS * ROWS :, NUMBERS * POINTS :] = np.diag(root)
+    unknowns = np.linalg.lstsq(rows, np.concatenate([remaining.ravel(), root * to_prior[kept]]), rcond=None)[0]
+    np.testing.assert_allclose(found.h.ravel(), unknowns[: NUMBERS * POINTS], rtol=1e-10, atol=1e-10)
+    inverse = np.linalg.inv(rows.T @ rows)
+    wrong = np.concatenate([J_t[:, :, list(weak)].reshape(-1, len(weak)), np.zeros((len(kept), len(weak)))])
+    passed = inverse @ rows.T @ wrong / np.sqrt(precision[list(weak)])
+    covariance = inverse + passed @ passed.T
+    factors = found.factors()
+    for p in range(POINTS):
+        part = slice(NUMBERS * p, NUMBERS * (p + 1))
+        total = found.records()[p] + factors[:, p].T @ factors[:, p]
+        np.testing.assert_allclose(total, covariance[part, part], rtol=1e-9, atol=1e-10)
+    across = np.einsum("qa,qb->ab", factors[:, 0], factors[:, 1])[np.ix_(range(8), range(8))]
+    assert np.isfinite(across).all()
+
+
+def test_always_means_always():
+    point, r, J_h, J_t, to_prior, precision = problem(8, (2,))
+    always = np.arange(PARAMETERS) == 2
+    assert step(taken(point, r, J_h, J_t), to_prior, precision, always).estimated.all()
+
+
+def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
+    """One row of size j tells 1 / sqrt(1 + j^2) of a prior of one."""
+    for tells, estimated in ((0.81, False), (0.79, True)):
+        assert (tells < CONSIDERED) is estimated
+        sums = Sums(np.eye(8)[None], np.zeros((1, 8, 1)), np.zeros((1, 8)), np.array([[tells**-2 - 1]]), np.zeros(1))
+        assert step(sums, np.zeros(1), np.ones(1), np.array([False])).estimated[0] == estimated
+
+
+def test_without_any_parameter_the_points_stand_alone():
+    point, r, J_h, _, _, _ = problem(9)
+    sums = Sums.empty(POINTS, 0)
+    sums.add(point, r, J_h, np.zeros((BLOCKS, ROWS, 0)))
+    found = step(sums, np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
+    for p in range(POINTS):
+        mine = point == p
+        alone = np.linalg.lstsq(J_h[mine].reshape(-1, NUMBERS), r[mine].ravel(), rcond=None)[0]
+        np.testing.assert_allclose(found.h[p], alone, rtol=1e-9)
+    assert found.factors().shape == (0, POINTS, NUMBERS)
+
+
+def test_every_share_of_a_campaign_s_budget_is_a_covariance():
+    case = Case(
+        miss=(0.005, 0.005),
+        mass_uncertainty=0.01,
+        stated={"displacement": {"uncertainty": 0.01, "axis_uncertainty": 0.005}, "force": {"delay_uncertainty": 1e-4}},
+    )
+    solution = solved(*made(case))
+    assert set(solution.shares) == {
+        "calibration", "axis", "delay", "mass", "housing", "load direction", "load miss",
+    }  # fmt: skip
+    for share in (solution.records, *solution.shares.values()):
+        size = np.abs(share).max()
+        assert np.linalg.eigvalsh(share / size).min() > -1e-9
+    squares = np.einsum("qpa,qpb->pab", solution.factors, solution.factors)
+    np.testing.assert_allclose(squares, sum(solution.shares.values()), rtol=1e-9, atol=1e-9 * squares.max())

@@ -1,0 +1,105 @@
+"""Windows of a point to one phasor a run and channel: weights, noise, slopes, drives that wander."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.dynamic.phasor_cases import complex_normal, hermitian
+from tpjb_ident.estimate.window_means import aligned, window_means
+
+RUNS, WINDOWS, CHANNELS = 5, 12, 4
+RUN = np.repeat(np.arange(RUNS), WINDOWS)
+TIME = np.tile(0.5 * np.arange(WINDOWS), RUNS)
+DEVICES = ("probes", "probes", "cells", "cells")
+TRUE = complex_normal(np.random.default_rng(1), RUNS, CHANNELS) + 2
+NOISE = 1e-4 * hermitian(np.random.default_rng(2), CHANNELS)
+
+
+def windows(seed, noise=NOISE):
+    rng = np.random.default_rng([9, seed])
+    return TRUE[RUN] + complex_normal(rng, len(RUN), CHANNELS) @ np.linalg.cholesky(noise).T
+
+
+def meant(z, weights=None, present=None):
+    weights = np.ones(len(RUN)) if weights is None else weights
+    present = np.ones((RUNS, CHANNELS), dtype=bool) if present is None else present
+    return window_means(z, RUN, TIME, DEVICES, weights, present)
+
+
+def test_without_noise_means_are_exact():
+    found = meant(TRUE[RUN])
+    np.testing.assert_allclose(found.mean, TRUE, rtol=1e-12)
+    np.testing.assert_allclose(found.slope, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.count, WINDOWS)
+    np.testing.assert_allclose(found.time, 2.75)
+    assert found.wandering == 0
+
+
+def test_noise_is_unbiased_and_means_scatter_by_it():
+    noises, means = [], []
+    for seed in range(200):
+        found = meant(windows(seed))
+        noises.append(found.noise)
+        means.append((found.mean - TRUE) * np.sqrt(found.count)[:, None])
+    np.testing.assert_allclose(np.mean(noises, axis=0), NOISE, atol=0.05 * np.abs(NOISE).max())
+    assert np.trace(np.mean(noises, axis=0)).real == pytest.approx(np.trace(NOISE).real, rel=0.05)
+    scatter = np.mean(np.abs(means) ** 2, axis=(0, 1))
+    np.testing.assert_allclose(scatter, np.diag(NOISE).real, rtol=0.12)
+
+
+def test_bad_windows_lose_their_weight_and_the_mean_does_not_move():
+    z = windows(1)
+    bad = [3, 17, 40]
+    z[bad, :2] += 0.5
+    found = meant(z)
+    assert found.weights[bad].max() < 0.01
+    assert np.delete(found.weights, bad).mean() > 0.85
+    np.testing.assert_allclose(found.mean, meant(windows(1)).mean, atol=0.02)
+    np.testing.assert_allclose(np.diag(found.noise), np.diag(NOISE), rtol=0.5)
+
+
+def test_windows_without_a_phasor_and_those_struck_before_do_not_count():
+    z, weights = windows(2), np.ones(len(RUN))
+    z[5, 1] = np.nan
+    weights[20] = 0.0
+    found = meant(z, weights=weights)
+    assert found.weights[5] == 0.0
+    np.testing.assert_allclose(found.mean, TRUE, atol=0.03)
+    assert meant(np.full_like(z, np.nan)) is None
+
+
+def test_a_channel_that_a_run_lacks_leaves_the_others_theirs():
+    z = windows(3)
+    present = np.ones((RUNS, CHANNELS), dtype=bool)
+    present[2, 3] = False
+    z[RUN == 2, 3] = np.nan
+    found = meant(z, present=present)
+    np.testing.assert_allclose(found.mean[present], TRUE[present], atol=0.03)
+    assert found.mean[2, 3] == 0
+    assert found.count[2] > 0.8 * WINDOWS
+    np.testing.assert_allclose(np.diag(found.noise), np.diag(NOISE), rtol=0.5)
+
+
+def test_a_drive_that_wanders_is_turned_to_one_phase():
+    """All channels of a window turn alike; what they are to one another stays."""
+    rng = np.random.default_rng(4)
+    turns = np.exp(1j * np.cumsum(rng.normal(0, 0.8, len(RUN))))
+    found = meant(windows(4) * turns[:, None])
+    assert found.wandering == RUNS
+    ratio = found.mean / found.mean[:, :1]
+    np.testing.assert_allclose(ratio, TRUE / TRUE[:, :1], rtol=0.03)
+    assert (np.abs(found.mean) > 0.97 * np.abs(TRUE)).all()
+    steady, wandering = aligned(windows(4), RUN, np.ones(len(RUN)))
+    assert wandering == 0
+    np.testing.assert_array_equal(steady, windows(4))
+
+
+@pytest.mark.parametrize("rate", [0.02, -0.04])
+def test_a_clock_shows_as_a_slope_of_its_device_and_not_as_noise(rate):
+    turn = np.exp(1j * rate * (TIME - 2.75))[:, None] * [0, 0, 1, 1] + [1, 1, 0, 0]
+    found = meant(windows(5) * turn)
+    slope = found.slope / found.mean
+    np.testing.assert_allclose(slope[:, 2:], 1j * rate, atol=6e-3)
+    np.testing.assert_allclose(slope[:, :2], 0.0, atol=6e-3)
+    np.testing.assert_allclose(np.diag(found.noise), np.diag(NOISE), rtol=0.5)

@@ -1,0 +1,274 @@
+"""Every term: what is wrong with an instrument is told where the records tell it, and else stands in the interval."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved
+from tpjb_ident.terms.amplitude import Amplitude
+from tpjb_ident.terms.load_turn import LoadTurn
+from tpjb_ident.terms.temperature import Temperature
+
+SEEDS = range(3)
+
+
+def stated(**by_sensor):
+    return {"stated": by_sensor}
+
+
+def of(solution, name):
+    return solution.fitted[name]
+
+
+def held(solution, truth, limit=4.0):
+    """H is within `limit` of its own standard deviations everywhere."""
+    return np.abs(away(solution, truth)).max() < limit
+
+
+def told(fitted, true, limit=4.0):
+    """All parameters are estimated, and near the truth by their own standard errors."""
+    return fitted.estimated.all() and (np.abs(fitted.value - true) < limit * fitted.deviation).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_gains_of_two_probes_are_considered_and_stand_in_the_interval(seed):
+    case = Case(
+        gains={"D1": 0.012, "F2": -0.004}, **stated(displacement={"uncertainty": 0.01}, force={"uncertainty": 0.005})
+    )
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    gains = of(solution, "calibration")
+    assert not gains.estimated.any()
+    np.testing.assert_array_equal(gains.value, 0.0)
+    assert held(solution, truth)
+    assert np.abs(solution.h / truth - 1)[:, [0, 1], [0, 1]].max() > 0.003
+    share = solution.shares["calibration"][:, 0, 0] / deviations(solution)[:, 0] ** 2
+    assert (share > 0.8).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_third_probe_tells_the_differences_of_gains(seed):
+    case = Case(probes=3, gains={"D1": 0.05}, **stated(displacement={"uncertainty": 0.02}))
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    gains = of(solution, "calibration")
+    difference = gains.value[0] - gains.value[1:3].mean()
+    assert difference == pytest.approx(0.05, abs=0.004)
+    assert held(solution, truth)
+    alone = made(replace(case, gains={}), seed)
+    assert solution.terms[0].conditions(of(solved(*alone), "calibration")) == ()
+
+
+def test_a_probe_far_beyond_what_is_stated_is_named():
+    case = Case(probes=3, gains={"D1": 0.05}, **stated(displacement={"uncertainty": 0.005}))
+    solution = solved(*made(case))
+    (found,) = solution.terms[0].conditions(of(solution, "calibration"))
+    assert found == "probe-gains-differ"
+    assert "D1" in found.detail
+
+
+def test_two_calibrations_of_one_probe_have_a_gain_each():
+    case = Case(probes=3, noise=1e-4, **stated(displacement={"uncertainty": 0.01}))
+    rig, blocks, truth = made(case)
+    later = blocks.point == 2
+    calibration, z = blocks.calibration.copy(), blocks.z.copy()
+    calibration[later, 0] = 1
+    z[later, 0] *= 1.03
+    solution = solved(rig, replace(blocks, calibration=calibration, z=z), truth)
+    (gain,) = [term for term in solution.terms if term.name == "calibration"]
+    assert [p.name for p in gain.parameters][:2] == ["D1, calibration 1", "D1, calibration 2"]
+    first, second = of(solution, "calibration").value[:2]
+    assert second - first == pytest.approx(np.log(1.03), abs=2e-3)
+    assert held(solution, truth)
+
+
+@pytest.mark.parametrize("mount", ["cells", "floating"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_delay_is_told_by_the_housing_s_equations(mount, seed):
+    """Standing: cells against accelerometers. Floating: probes against accelerometers."""
+    late = {"cells": "force", "floating": "acceleration"}[mount]
+    case = Case(mount=mount, late={late: 3e-4}, **{"stated": {late: {"delay_uncertainty": 3e-4}}})
+    case = replace(case, hertz=(30.0, 90.0), loads=(5000.0,))
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    delay = of(solution, "delay")
+    assert told(delay, 0.3)
+    assert delay.deviation[0] < 0.15
+    assert held(solution, truth)
+    ignored = solved(replace(rig, sensors=tuple(replace(s, delay_uncertainty=0.0) for s in rig.sensors)), blocks, truth)
+    assert np.abs(away(ignored, truth)).max() > np.abs(away(solution, truth)).max()
+
+
+def test_a_delay_of_the_probes_is_considered_where_cells_carry_the_housing():
+    case = Case(late={"displacement": 1e-4}, **stated(displacement={"delay_uncertainty": 1e-4}))
+    rig, blocks, truth = made(case)
+    solution = solved(rig, blocks, truth)
+    assert not of(solution, "delay").estimated.any()
+    assert held(solution, truth)
+    assert np.abs(solution.h / truth - 1).max() > 0.01
+
+
+@pytest.mark.parametrize("rate", [1e-4, -3e-4])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_clock_s_rate_is_told_by_how_phases_turn_within_the_records(rate, seed):
+    case = Case(
+        rates={"force": rate, "acceleration": rate},
+        stated={
+            "force": {"device": "second"},
+            "acceleration": {"device": "second"},
+            "displacement": {"device": "first"},
+        },
+    )
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    clock = of(solution, "clock")
+    assert told(clock, 1e4 * rate)
+    assert clock.deviation[0] < 0.05
+    assert held(solution, truth)
+    (term,) = [t for t in solution.terms if t.name == "clock"]
+    assert term.rates(clock.value)["second"] == pytest.approx(rate, rel=0.2)
+    (found,) = term.conditions(clock)
+    assert found == "clocks-differ"
+
+
+def test_clocks_that_agree_are_not_named():
+    case = Case(stated={"force": {"device": "b"}, "acceleration": {"device": "b"}, "displacement": {"device": "a"}})
+    solution = solved(*made(case))
+    (term,) = [t for t in solution.terms if t.name == "clock"]
+    assert term.conditions(of(solution, "clock")) == ()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_springs_under_the_housing_are_told(seed):
+    solution = solved(*made(Case(), seed))
+    housing = of(solution, "housing")
+    c = 1e9 * COMPLIANCE.real
+    assert told(housing, [c[0, 0], c[1, 1], c[0, 1], 0.01])
+    assert solution.terms[0].conditions(housing) == ()
+
+
+@pytest.mark.parametrize(
+    ("turn", "named"),
+    [
+        (lambda a: -a, "accelerometers-contradict-cells"),
+        (lambda a: a[:, ::-1], "accelerometers-contradict-cells"),
+        (lambda a: a * [0, 1], "accelerometers-contradict-cells"),
+        (lambda a: 0 * a, "accelerometers-contradict-cells"),
+        (lambda a: a * np.exp(-0.3j), "cells-and-accelerometers-out-of-phase"),
+    ],
+    ids=["inverted", "exchanged", "one dead", "both dead", "late"],
+)
+def test_accelerometers_that_no_housing_on_springs_has_are_named(turn, named):
+    rig, blocks, truth = made(Case(hertz=(60.0,)))
+    z = blocks.z.copy()
+    z[:, rig.of("acceleration")] = turn(z[:, rig.of("acceleration")])
+    solution = solved(rig, replace(blocks, z=z), truth)
+    (term,) = [t for t in solution.terms if t.name == "housing"]
+    assert term.conditions(of(solution, "housing")) == (named,)
+
+
+def test_inertia_that_no_accelerometer_shows_is_considered():
+    for case in (Case(accelerometers=False), Case(accelerometers=False, mount="unknown")):
+        rig, blocks, truth = made(case)
+        solution = solved(rig, blocks, truth)
+        assert not of(solution, "housing").estimated.any()
+        assert held(solution, truth)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_how_h_turns_with_the_load_s_direction_is_learnt_from_the_runs_own_misses(seed):
+    turning = drawn_turning(np.random.default_rng(seed))
+    case = Case(directions=6, noise=2e-4, miss=(0.004, 0.01), turning=turning)
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    turn = of(solution, "load direction")
+    assert (np.abs(turn.value - turning) < 4 * turn.deviation).all()
+    assert held(solution, truth)
+    without = solved(rig, blocks, truth, without=(LoadTurn,))
+    gain = np.abs(without.h - truth).max(axis=(1, 2)) / np.abs(solution.h - truth).max(axis=(1, 2))
+    assert np.median(gain) > 2
+
+
+def test_a_miss_that_all_loads_share_is_considered():
+    """The runs' scatter over the root of their number is how large it may be."""
+    outside = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        common = 0.02 / np.sqrt(12) * complex(*rng.standard_normal(2))
+        rig, blocks, truth = made(Case(miss=(0.02, 0.02), common_miss=common, noise=2e-4), seed)
+        solution = solved(rig, blocks, truth)
+        assert not of(solution, "load miss").estimated.any()
+        outside.append(np.abs(away(solution, truth)[:, [0, 3, 4, 7]]) > 1.96)
+    assert np.mean(outside) < 0.12
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_turns_with_the_shaft_is_told_from_the_motion(seed):
+    case = Case(shaft=0.5, loads=(5000.0,), directions=6)
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    assert held(solution, truth)
+    assert np.abs(solution.h / truth - 1)[:, [0, 1], [0, 1]].max() < 0.02
+    silent = solved(rig, replace(blocks, shaft=np.full(len(blocks), np.nan + 0j)), truth)
+    assert np.abs(silent.h / truth - 1).max() > 0.05
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_several_amplitudes_give_the_stiffness_at_none(seed):
+    case = Case(sizes=(0.3, 0.6, 1.0), bent=0.04, bent_told=0.08)
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    assert held(solution, truth)
+    assert of(solution, "amplitude").estimated.any()
+    without = solved(rig, blocks, truth, without=(Amplitude,))
+    diagonal = np.s_[:, [0, 1], [0, 1]]
+    assert np.abs(without.h / truth - 1)[diagonal].max() > 0.03
+    assert np.abs(solution.h / truth - 1)[diagonal].max() < 0.02
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_one_amplitude_does_not_tell_stands_in_the_interval(seed):
+    rig, blocks, truth = made(Case(bent=0.04, bent_told=0.05), seed)
+    solution = solved(rig, blocks, truth)
+    assert held(solution, truth)
+    blind = solved(rig, blocks, truth, without=(Amplitude,))
+    assert not held(blind, truth)
+    assert "amplitude" not in solved(*made(Case())).fitted
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_probe_s_drift_is_told_by_runs_at_several_temperatures(seed):
+    case = Case(drift={"D1": 5e-4}, kelvins=15.0, **stated(D1={"temperature_coefficient_uncertainty": 5e-4}))
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    drift = of(solution, "temperature")
+    assert told(drift, 0.5)
+    assert held(solution, truth)
+    without = solved(rig, blocks, truth, without=(Temperature,))
+    assert np.median(np.abs(without.h - truth)) > np.median(np.abs(solution.h - truth))
+    cold = replace(blocks, temperature=np.full(len(blocks), np.nan))
+    assert "temperature" not in solved(rig, cold, truth).fitted
+
+
+def test_a_turned_axis_is_considered_of_two_probes_and_stands_in_the_interval():
+    case = Case(turned={"D1": 0.01}, **stated(displacement={"axis_uncertainty": 0.01}))
+    rig, blocks, truth = made(case)
+    solution = solved(rig, blocks, truth)
+    assert held(solution, truth)
+    assert np.abs(numbers_off(solution, truth)).max() > 0.003
+
+
+def numbers_off(solution, truth):
+    return (solution.h - truth) / np.abs(truth).max()
+
+
+def test_the_housing_s_mass_is_considered():
+    case = Case(hertz=(90.0,), mass_error=0.02, mass_uncertainty=0.02)
+    rig, blocks, truth = made(case)
+    solution = solved(rig, blocks, truth)
+    assert not of(solution, "mass").estimated.any()
+    assert held(solution, truth)
+    assert solution.shares["mass"][0, 0, 0] > 0

@@ -1,0 +1,120 @@
+"""The measurement equation z = T B(h) u: what probes, cells, accelerometers and the housing make of the true motion.
+
+Rows are the sensors and two equations of the housing; columns the true displacement d and the housing's acceleration a,
+free in every block::
+
+    probe j           (  n_j^T       ,  0         )
+    cell j            (  n_j^T h     , -m n_j^T   )       F_cell = F_oil - m a, Eq. (13)
+    accelerometer j   (  0           ,  n_j^T     )
+    housing, cells    (  w^2 C h     ,  I - w^2 m C )     a + w^2 C F_cell = 0: it stands on its cells
+    housing, floating ( -kappa w^2 I ,  I         )       a = w^2 d: it hangs, and the shaft stands still
+
+With C = [c_xx c_xy; c_xy c_yy] (1 - i loss) the compliance of the cells. Where no accelerometer tells and the manifest
+does not say, kappa is not known: 0 of a housing that stands still, 1 of one that floats.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+
+#: Equations of the housing.
+HOUSING_ROWS = 2
+#: Unknowns of a block: d and a, X and Y each.
+UNKNOWNS = 4
+
+
+@dataclass
+class State:
+    """The last iterate of the solve, for one set of blocks (n of them, m sensors, P points)."""
+
+    h: ComplexArray  #: (P, 2, 2), N/m: at the set points
+    slope: ComplexArray  #: (P, 2, 2), N/m: dH / d ln W
+    slope_known: np.ndarray  #: (P,) bool
+    compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing
+    floating: float  #: kappa
+    factor: ComplexArray  #: (n, m): T
+    shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
+    u: ComplexArray  #: (n, 4): true motion
+    parameters: dict[str, FloatArray] = field(default_factory=dict)  #: by term
+
+    def at_run(self, blocks: Blocks) -> ComplexArray:
+        """H of every block at its run's own load, (n, 2, 2)."""
+        known = self.slope_known[blocks.point][:, None, None]
+        change = blocks.miss.real[:, None, None] * self.slope[blocks.point]
+        return self.h[blocks.point] + np.where(known, change, 0.0)
+
+    def factor_rows(self, rows: ComplexArray) -> ComplexArray:
+        """T times rows (n, m + 2, ..)."""
+        return with_factor(self.factor, rows)
+
+    def reading(self, rig: Rig, blocks: Blocks) -> ComplexArray:
+        """T B u, (n, m + 2)."""
+        return np.einsum("nri,ni->nr", with_factor(self.factor, motion_matrix(rig, blocks, self)), self.u)
+
+
+def motion_matrix(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
+    """B of every block, (n, m + 2, 4)."""
+    n, m = blocks.z.shape
+    B = np.zeros((n, m + HOUSING_ROWS, UNKNOWNS), complex)
+    h, along = state.at_run(blocks), blocks.along
+    probes, cells, accelerometers = (rig.of(q) for q in ("displacement", "force", "acceleration"))
+    B[:, probes, :2] = along[:, probes]
+    B[:, cells, :2] = along[:, cells] @ h
+    B[:, cells, 2:] = -rig.mass * along[:, cells]
+    B[:, accelerometers, 2:] = along[:, accelerometers]
+    square = (blocks.omega**2)[:, None, None]
+    if rig.mount == "cells":
+        B[:, m:, :2] = square * (state.compliance @ h)
+        B[:, m:, 2:] = np.eye(2) - square * rig.mass * state.compliance
+    else:
+        B[:, m:, :2] = -state.floating * square * np.eye(2)
+        B[:, m:, 2:] = np.eye(2)
+    B[:, :m][~blocks.present] = 0.0
+    return B
+
+
+def with_factor(factor: ComplexArray, B: ComplexArray) -> ComplexArray:
+    """T B; `factor` (n, m) on the sensors' rows of B (n, m + 2, ..)."""
+    result = B.copy()
+    m = factor.shape[1]
+    result[:, :m] *= factor.reshape(factor.shape + (1,) * (B.ndim - 2))
+    return result
+
+
+def force_rows(rig: Rig, blocks: Blocks, force: ComplexArray) -> ComplexArray:
+    """Forces (n, 2, ..) as the cells would read them, nothing in the other rows, (n, m + 2, ..)."""
+    n, m = blocks.z.shape
+    rows = np.zeros((n, m + HOUSING_ROWS, *force.shape[2:]), complex)
+    cells = rig.of("force")
+    seen = blocks.along[:, cells] * blocks.present[:, cells, None]
+    rows[:, cells] = np.einsum("nja,na...->nj...", seen, force)
+    return rows
+
+
+def film_columns(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
+    """d(T B u) / d(h_xx, h_xy, h_yx, h_yy), complex, (n, m + 2, 4): h at the set point moves h at the run's load."""
+    n = len(blocks)
+    h, d = state.h[blocks.point], state.u[:, :2]
+    growth = np.ones((n, 2, 2))
+    known = state.slope_known[blocks.point]
+    size = np.where(h.real == 0.0, 1.0, h.real)
+    power = np.clip(state.slope[blocks.point].real / size, -2.0, 2.0)
+    growth[known] += (blocks.miss.real[:, None, None] * power)[known]
+    force = np.zeros((n, 2, 4), complex)
+    for k in range(4):
+        force[:, k // 2, k] = growth[:, k // 2, k % 2] * d[:, k % 2]
+    return film_force_rows(rig, blocks, state, force)
+
+
+def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray) -> ComplexArray:
+    """Forces of the film (n, 2, ..) as the cells read them and the housing answers, (n, m + 2, ..)."""
+    rows = with_factor(state.factor, force_rows(rig, blocks, force))
+    if rig.mount == "cells":
+        square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
+        rows[:, blocks.z.shape[1] :] = square * np.einsum("ij,nj...->ni...", state.compliance, force)
+    return rows

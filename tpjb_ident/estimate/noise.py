@@ -1,0 +1,81 @@
+"""Covariance of a block's readings: the records' noise, and what differs from run to run beyond it.
+
+A random effect is one pattern c of the readings with a random size of variance s^2, it adds c c^H s^2: the error of a
+run's own mean load, a miss of the load where its effect is not known, and the scatter of the force from run to run.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_force_rows
+
+#: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
+UNKNOWN_EXPONENT = 0.6
+#: |d h / d alpha| over |h| of a load's direction, for the error of a run's own mean load.
+_UNKNOWN_TURN = 1.5
+#: Noise of the housing's equations over |a|: cells are no perfect springs, a floating stator has stingers.
+HOUSING_NOISE = {"cells": 0.03, "floating": 0.05, "unknown": 1e-3}
+#: What the usual noise of the housing counts as, in blocks, beside what the campaign's own show.
+_HOUSING_BLOCKS = 0.1
+#: Noise that readings have at least, of their own size: keeps the algebra alive on computed records.
+_LEAST = 1e-7
+
+
+def covariance(rig: Rig, blocks: Blocks, state: State, scatter: FloatArray, housing: float) -> ComplexArray:
+    """N of every block, (n, m + 2, m + 2).
+
+    `scatter` (n,): relative variance of the force from run to run; `housing`: noise of its equations over |a|.
+    """
+    n, m = blocks.z.shape
+    N = np.zeros((n, m + HOUSING_ROWS, m + HOUSING_ROWS), complex)
+    N[:, :m, :m] = blocks.noise
+    diagonal = np.arange(m)
+    N[:, diagonal, diagonal] += (_LEAST * np.abs(blocks.z)) ** 2 + np.where(blocks.present, 0.0, 1.0)
+    acceleration = np.linalg.norm(state.u[:, 2:], axis=1)
+    scale = (blocks.omega**2) * np.linalg.norm(state.u[:, :2], axis=1)
+    size = acceleration if rig.mount != "unknown" else scale
+    variance = (housing * size) ** 2 + (_LEAST * scale) ** 2 + 1e-30
+    N[:, m, m], N[:, m + 1, m + 1] = variance, variance
+    patterns = film_force_rows(rig, blocks, state, _force_effects(blocks, state, scatter))
+    return N + patterns @ patterns.conj().transpose(0, 2, 1)
+
+
+def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: ComplexArray) -> float:
+    """Noise of the housing's equations over |a|, by what they leave: the usual one counts as a few blocks.
+
+    `motion` (n, 4), `misfit` (n, 2) [m/s^2].
+    """
+    usual = HOUSING_NOISE[rig.mount]
+    size = np.linalg.norm(motion[:, 2:], axis=1)
+    if rig.mount == "unknown" or not np.any(size > 0) or len(rig.of("acceleration")) < 2:
+        return usual
+    rows = rig.of("acceleration")
+    share = np.sum(np.abs(misfit) ** 2, axis=1) / 2 / np.maximum(size, 1e-300) ** 2
+    records = np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real / len(rows) / np.maximum(size, 1e-300) ** 2
+    excess = np.median(np.maximum(share - records, 0.0)) / np.log(2)
+    n = len(blocks)
+    return float(np.sqrt((_HOUSING_BLOCKS * usual**2 + n * excess) / (_HOUSING_BLOCKS + n)))
+
+
+def _force_effects(blocks: Blocks, state: State, scatter: FloatArray) -> ComplexArray:
+    """Forces (n, 2, k) of one standard deviation of every random effect [N]."""
+    h, d = state.h[blocks.point], state.u[:, :2]
+    known = state.slope_known[blocks.point]
+    slope = np.einsum("nij,nj->ni", state.slope[blocks.point], d)
+    largest = np.abs(h).max(axis=(1, 2))[:, None] * d
+    effects = [blocks.miss_error[:, None] * slope, (blocks.miss_error * _UNKNOWN_TURN)[:, None] * largest]
+    own = np.einsum("nij,nj->ni", h, d)
+    unknown = UNKNOWN_EXPONENT * np.where(known, 0.0, np.abs(blocks.miss.real))
+    effects.append(unknown[:, None] * own)
+    effects += list(scatter_patterns(blocks, state, np.sqrt(scatter)))
+    return np.stack(effects, axis=2)
+
+
+def scatter_patterns(blocks: Blocks, state: State, size: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Forces (n, 2) along X and along Y, `size` (n,) of the film's force each [N]."""
+    force = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
+    length = (size * np.linalg.norm(force, axis=1))[:, None]
+    return length * np.array([1.0 + 0j, 0.0]), length * np.array([0.0 + 0j, 1.0])

@@ -1,0 +1,141 @@
+"""How much runs differ beyond their records' noise, and which of them stand apart.
+
+Blocks carry a bisquare weight on the campaign's scale, in points where enough good runs remain: one bad run of five is
+found because the other points say what is usual. The scatter of the force from run to run is found by moments, pooled
+over all points; a point whose runs differ clearly more than the others' has one of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtr, fdtrc
+
+from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.estimate.arrowhead import NUMBERS
+from tpjb_ident.estimate.blocks import Blocks, totals
+
+#: Real force equations of a block.
+FORCE_ROWS = 4.0
+#: Distance over its usual size at which a block has no weight.
+_NO_WEIGHT = 3.0
+#: A block counts as good from this weight on; good runs that a point keeps, at least, and the share of its runs.
+_GOOD, _MIN_GOOD, _SHARE = 0.3, 4, 0.7
+#: Probability of chance below which a point's runs differ more than the others'.
+_CHANCE = 1e-3
+#: Smallest reduced chi-square that the others are credited with.
+_LEAST_CHI = 0.3
+#: Scatter of the force that a good rig has from run to run (oil a little warmer), and the freedom that it counts as.
+_USUAL, _USUAL_FREEDOM = 5e-4, 4.0
+#: Step from which a point may have a scatter of its own.
+_OWN_FROM = 6
+#: Leverage of a block, at most, in the judgement of its distance.
+_MAX_LEVERAGE = 0.8
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the solve leaves of the blocks, (n,) each."""
+
+    chi_square: FloatArray
+    rows: FloatArray  #: real equations beyond the unknown motion
+    leverage: FloatArray  #: share of them that the point's numbers take
+    force: FloatArray  #: chi-square of the force equations alone, of four real rows
+    information: FloatArray  #: what a scatter of the force of variance one adds to it
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Relative variance of the force from run to run by point, and the blocks' weights."""
+
+    variance: FloatArray  #: (P,)
+    weights: FloatArray  #: (n,)
+    pooled: float
+    spare: float  #: degrees of freedom of the pooled variance
+    own: BoolArray  #: (P,): points with a scatter of their own
+    own_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
+
+    @staticmethod
+    def none(points: int, blocks: int) -> Scatter:
+        """No scatter, all blocks count."""
+        zero = np.zeros(points)
+        return Scatter(zero, np.ones(blocks), 0.0, 0.0, np.zeros(points, dtype=bool), zero)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the pooled variance, the usual one's included."""
+        return self.spare + _USUAL_FREEDOM
+
+    def updated(self, blocks: Blocks, fit: Residuals, solvable: BoolArray, count: int) -> Scatter:
+        """Weights after the first step, scatter from the third on."""
+        weights = self._weights(blocks, fit, solvable) if count != 1 else self.weights
+        if count < 3:
+            return Scatter(self.variance, weights, self.pooled, self.spare, self.own, self.own_spare)
+        points = len(blocks.points)
+        used = weights > 0.05
+        kept = np.asarray(weights / _expected(fit.rows), dtype=float)
+        chi = totals(blocks.point, kept * fit.force, points)
+        rows = FORCE_ROWS * totals(blocks.point, np.asarray(used), points)
+        information = totals(blocks.point, kept * fit.information, points)
+        spare = np.where(solvable, rows - NUMBERS, 0.0)
+        told = (spare > 0) & (information > 0)
+        gain = np.where(told, information * spare / np.maximum(rows, 1.0), 1.0)
+        unusual = _unusual(chi, spare, told, self.own)
+        pooled, freedom = self._pooled(chi, spare, gain, told & ~unusual)
+        # weights come to rest before a point's runs are said to differ more than the others'
+        own = unusual if count >= _OWN_FROM else self.own
+        variance = np.full(points, pooled)
+        excess = self.variance + (chi - spare) / gain
+        variance[own] = np.maximum(excess[own], pooled)
+        runs = totals(blocks.point, used, points)
+        return Scatter(variance, weights, pooled, freedom, own, np.maximum(runs - 2.0, 1.0))
+
+    def _pooled(self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray) -> tuple[float, float]:
+        """Variance that all points share, by moments, and its degrees of freedom; the usual one counts a little."""
+        if not told.any():
+            return max(self.pooled, _USUAL**2), 0.0
+        moment = max(0.0, self.pooled + float((chi - spare)[told].sum()) / float(gain[told].sum()))
+        freedom = float(spare[told].sum())
+        return (_USUAL_FREEDOM * _USUAL**2 + freedom * moment) / (_USUAL_FREEDOM + freedom), freedom
+
+    def _weights(self, blocks: Blocks, fit: Residuals, solvable: BoolArray) -> FloatArray:
+        freedom = fit.rows * (1 - np.minimum(fit.leverage, _MAX_LEVERAGE))
+        distance = fit.chi_square / np.maximum(freedom, 1.0)
+        judged = solvable[blocks.point]
+        usual = max(1.0, float(np.median(distance[judged]))) if judged.any() else 1.0
+        weights = np.asarray(np.maximum(1 - distance / usual / _NO_WEIGHT**2, 0.0) ** 2, dtype=float)
+        points = len(blocks.points)
+        good = totals(blocks.point, np.asarray(weights > _GOOD), points)
+        number = totals(blocks.point, np.ones(len(blocks)), points)
+        few = good < np.maximum(_MIN_GOOD, _SHARE * number)
+        return np.where(few[blocks.point], 1.0, weights)
+
+
+def _expected(rows: FloatArray) -> FloatArray:
+    """Mean of weight times chi-square over its degrees of freedom `rows` (n,), where nothing stands apart."""
+    k = np.maximum(rows, 1.0)
+    limit = k * _NO_WEIGHT**2
+    first = chdtr(k + 2, limit)
+    second = (k + 2) * chdtr(k + 4, limit)
+    third = (k + 2) * (k + 4) * chdtr(k + 6, limit)
+    return np.asarray(first - 2 * second / limit + third / limit**2)
+
+
+def _unusual(chi: FloatArray, spare: FloatArray, told: BoolArray, before: BoolArray) -> BoolArray:
+    """Points (P,) whose chi-square is improbable beside the others', the worst first; those of `before` stay so."""
+    own = before & told
+    for _ in range(int(told.sum()) // 2):
+        usual = told & ~own
+        if usual.sum() < 2:
+            break
+        ratio = np.where(usual, chi / np.maximum(spare, 1.0), -1.0)
+        worst = int(np.argmax(ratio))
+        others = usual.copy()
+        others[worst] = False
+        all_spare = float(spare[others].sum())
+        typical = max(float(chi[others].sum()) / max(all_spare, 1.0), _LEAST_CHI)
+        if float(fdtrc(spare[worst], max(all_spare, 1.0), ratio[worst] / typical)) >= _CHANCE:
+            break
+        own[worst] = True
+    return own

@@ -1,0 +1,325 @@
+"""One solve for all blocks of a campaign: H of every point together with what its sensors share, by Gauss-Newton.
+
+Columns are taken at the fitted true motion (variable projection), which is what keeps noise of the displacements from
+pulling H towards zero: there is no separate step of errors in variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, step
+from tpjb_ident.estimate.blocks import Blocks, Rig, totals
+from tpjb_ident.estimate.equation import (
+    HOUSING_ROWS,
+    UNKNOWNS,
+    State,
+    film_columns,
+    film_force_rows,
+    motion_matrix,
+    with_factor,
+)
+from tpjb_ident.estimate.load_slope import slopes_over_load
+from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
+from tpjb_ident.estimate.scatter import Residuals, Scatter
+from tpjb_ident.estimate.term import Fitted, Term
+
+#: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
+_STEPS, _CONVERGED = 18, 1e-9
+#: Steps in which weights and scatter follow.
+_SCATTER_STEPS = 12
+#: Blocks whose arrays are held at a time.
+_CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class Solution:
+    """H of every point with its covariance by source."""
+
+    h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
+    records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
+    shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
+    factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every parameter
+    fitted: dict[str, Fitted] = field(repr=False)
+    terms: tuple[Term, ...] = field(repr=False)
+    scatter: Scatter = field(repr=False)
+    chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
+    spare: FloatArray  #: (P,): real equations beyond the unknowns
+    weights: FloatArray = field(repr=False)  #: (n,): of the blocks
+    scatter_share: FloatArray = field(repr=False)  #: (n,): of the force equations' variance that is the runs' scatter
+    factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
+    shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
+    run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
+    motion: ComplexArray = field(repr=False)  #: (n, 4): true displacement and acceleration
+    housing_noise: float  #: scatter of the housing's equations over its acceleration
+    steps: int
+
+    def words(self) -> tuple[str, ...]:
+        """What the records tell of the terms' parameters."""
+        return tuple(sentence for term in self.terms for sentence in term.words(self.fitted[term.name]))
+
+
+class Solver:
+    """Gauss-Newton over all blocks, from a start of H."""
+
+    def __init__(
+        self, rig: Rig, blocks: Blocks, terms: Sequence[Term], start: ComplexArray, to_set_point: bool = True
+    ) -> None:
+        self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
+        self.terms = tuple(term for term in terms if term.parameters)
+        self.parameters = [p for term in self.terms for p in term.parameters]
+        ends = np.cumsum([0] + [len(term.parameters) for term in self.terms])
+        self.part = {term.name: slice(int(a), int(b)) for term, a, b in zip(self.terms, ends, ends[1:])}
+        self.mean = np.array([p.mean for p in self.parameters])
+        self.precision = 1 / np.array([p.deviation for p in self.parameters]) ** 2
+        self.always = np.array([t.always_estimated for t in self.terms for _ in t.parameters], dtype=bool)
+        self.theta = self.mean.copy()
+        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)))
+        self.h = np.where(self.solvable[:, None, None], start, 1.0)
+        self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
+        self.u = np.zeros((len(blocks), UNKNOWNS), complex)
+        self.scatter = Scatter.none(len(blocks.points), len(blocks))
+        self.moved = False
+        self.housing_noise = HOUSING_NOISE[rig.mount]
+
+    def run(self) -> Solution:
+        """Steps until H rests."""
+        last: Step | None = None
+        count = 0
+        # runs that stand apart are told at the robust start, before one of them pulls the others away
+        self.scatter = self.scatter.updated(self.blocks, self._sums(None)[1], self.solvable, 0)
+        for count in range(1, _STEPS + 1):
+            sums, fit = self._sums(last)
+            last = step(sums, self.mean - self.theta, self.precision, self.always)
+            change = self._move(last)
+            if count == 3:
+                self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
+            if count < _SCATTER_STEPS:
+                self.scatter = self.scatter.updated(self.blocks, fit, self.solvable, count)
+            elif change < _CONVERGED:
+                break
+        sums, fit = self._sums(last)
+        last = step(sums, self.mean - self.theta, self.precision, self.always)
+        return self._solution(last, fit, count)
+
+    def _housing_misfit(self) -> ComplexArray:
+        """What the housing's equations leave at the fitted motion, (n, 2)."""
+        slope, known = self._load_slopes()
+        parts = []
+        for places in self._slices():
+            blocks = self.blocks.part(places)
+            state = self._state(blocks, places, slope, known)
+            parts.append(state.reading(self.rig, blocks)[:, blocks.z.shape[1] :])
+        return np.concatenate(parts)
+
+    def _load_slopes(self) -> tuple[ComplexArray, BoolArray]:
+        h = np.where(self.solvable[:, None, None], self.h, np.nan)
+        slope, known = slopes_over_load(self.blocks.points, h)
+        return slope, known & self.to_set_point
+
+    def _slices(self) -> Iterator[slice]:
+        for first in range(0, max(len(self.blocks), 1), _CHUNK):
+            yield slice(first, first + _CHUNK)
+
+    def _sums(self, last: Step | None) -> tuple[Sums, Residuals]:
+        sums = Sums.empty(len(self.blocks.points), len(self.parameters))
+        fits = []
+        slope, known = self._load_slopes()
+        for places in self._slices():
+            blocks = self.blocks.part(places)
+            state = self._state(blocks, places, slope, known)
+            rows = self._rows(blocks, state, self.scatter.variance[blocks.point])
+            self.u[places] = state.u
+            weight = np.sqrt(self.scatter.weights[places] * self.solvable[blocks.point])
+            sums.add(
+                blocks.point,
+                rows.r * weight[:, None],
+                rows.J_h * weight[:, None, None],
+                rows.J_t * weight[:, None, None],
+            )
+            fits.append(self._fit(blocks, rows, weight**2, last))
+        sums.A[~self.solvable] = np.eye(NUMBERS)
+        joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
+        return sums, Residuals(*joined)
+
+    def _state(self, blocks: Blocks, places: slice, slope: ComplexArray, known: BoolArray) -> State:
+        n, m = blocks.z.shape
+        state = State(
+            self.h,
+            slope,
+            known,
+            np.zeros((2, 2), complex),
+            1.0 if self.rig.mount == "floating" else 0.0,
+            np.ones((n, m), complex),
+            np.zeros((n, m + HOUSING_ROWS), complex),
+            self.u[places],
+            {name: self.theta[part] for name, part in self.part.items()},
+        )
+        self._apply(blocks, state, additive=False)
+        if not self.moved:
+            state.u = _first_motion(self.rig, blocks, state)
+        self._apply(blocks, state, additive=True)
+        return state
+
+    def _apply(self, blocks: Blocks, state: State, additive: bool) -> None:
+        for term in self.terms:
+            if term.additive == additive:
+                term.apply(blocks, state, self.theta[self.part[term.name]])
+
+    def _rows(self, blocks: Blocks, state: State, scatter: FloatArray) -> _Rows:
+        """Equations of blocks without their motion, real and of unit variance; the state's motion is renewed."""
+        rig = self.rig
+        L = np.linalg.cholesky(covariance(rig, blocks, state, scatter, self.housing_noise))
+        TB = with_factor(state.factor, motion_matrix(rig, blocks, state))
+        Q, R = np.linalg.qr(np.linalg.solve(L, TB), mode="complete")
+        Q1, Q2 = (part.conj().transpose(0, 2, 1) for part in (Q[:, :, :UNKNOWNS], Q[:, :, UNKNOWNS:]))
+        z = np.concatenate([blocks.z, np.zeros((len(blocks), HOUSING_ROWS))], axis=1) - state.shift
+        z[:, : blocks.z.shape[1]] *= blocks.present
+        white = np.linalg.solve(L, z[:, :, None])
+        state.u = np.linalg.solve(R[:, :UNKNOWNS], Q1 @ white)[:, :, 0]
+        film = film_columns(rig, blocks, state) * self.unit
+        forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
+        others = [term.columns(blocks, state) for term in self.terms]
+        columns = np.concatenate([film, 1j * film, *others], axis=2)
+        projected = _real(Q2 @ np.linalg.solve(L, columns))
+        remainder = Q2 @ white
+        force = _along_force(Q2 @ np.linalg.solve(L, film_force_rows(rig, blocks, state, forces)), remainder)
+        r = _real(remainder)[:, :, 0]
+        J_h, J_t = np.split(projected, [NUMBERS], axis=2)
+        slopes = self._slope_rows(blocks, state)
+        if slopes is not None:
+            r = np.concatenate([r, slopes[0]], axis=1)
+            J_t = np.concatenate([J_t, slopes[1]], axis=1)
+            more = slopes[0].shape[1]
+            J_h = np.concatenate([J_h, np.zeros((len(blocks), more, NUMBERS))], axis=1)
+        counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
+        return _Rows(r, J_h, J_t, force, counted, 2 * Q2.shape[1])
+
+    def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
+        """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
+        if all(type(term).slope_columns is Term.slope_columns for term in self.terms):
+            return None
+        m = blocks.z.shape[1]
+        told = (blocks.windows > 3) & blocks.present.all(axis=1)
+        reading = state.reading(self.rig, blocks)[:, :m]
+        columns = np.concatenate([term.slope_columns(blocks, reading) for term in self.terms], axis=2)
+        safe = np.where(told[:, None, None], blocks.slope_noise, np.eye(m))
+        L = np.linalg.cholesky(safe)
+        Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
+        Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
+        J = _real(Q2 @ np.linalg.solve(L, columns)) * told[:, None, None]
+        r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
+        return r - J @ self.theta, J
+
+    def _fit(self, blocks: Blocks, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
+        r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
+        if last is None:
+            leverage = np.zeros(len(blocks))
+        else:
+            taken = np.einsum("nka,nab,nkb->n", J_h, last.A_inverse[blocks.point], J_h)
+            leverage = weight * taken / np.maximum(rows.counted, 1.0)
+        return Residuals(np.einsum("nk,nk->n", r, r), rows.counted, leverage, rows.force[:, 0], rows.force[:, 1])
+
+    def _move(self, taken: Step) -> float:
+        numbers = taken.h * self.unit * self.solvable[:, None]
+        change = (numbers[:, :4] + 1j * numbers[:, 4:]).reshape(-1, 2, 2)
+        self.h = self.h + change
+        self.theta = self.theta + taken.theta
+        self.moved = True
+        size = np.abs(self.h).max(axis=(1, 2))
+        return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
+
+    def _solution(self, last: Step, fit: Residuals, count: int) -> Solution:
+        points = len(self.blocks.points)
+        factors = last.factors() * self.unit
+        shares, fitted = {}, {}
+        for term in self.terms:
+            part = self.part[term.name]
+            own = factors[part]
+            shares[term.name] = np.einsum("qpa,qpb->pab", own, own)
+            fitted[term.name] = Fitted(self.theta[part], last.deviation[part], last.estimated[part])
+        weight = self.scatter.weights
+        chi_square = totals(self.blocks.point, weight * fit.chi_square, points)
+        counted = totals(self.blocks.point, fit.rows * (weight > 0.05), points)
+        spare = counted - NUMBERS
+        return Solution(
+            np.where(self.solvable[:, None, None], self.h, np.nan),
+            last.records() * self.unit**2,
+            shares,
+            factors,
+            fitted,
+            self.terms,
+            self.scatter,
+            chi_square / np.maximum(spare, 1.0),
+            spare,
+            weight,
+            np.clip(self.scatter.variance[self.blocks.point] * fit.information / 4, 0.0, 1.0),
+            *self._apart(),
+            self.u,
+            self.housing_noise,
+            count,
+        )
+
+    def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Factor and shift of the blocks' readings (n, m), and how their H differs from their point's (n, 2, 2)."""
+        slope, known = self._load_slopes()
+        factors, shifts, changes = [], [], []
+        for places in self._slices():
+            blocks = self.blocks.part(places)
+            state = self._state(blocks, places, slope, known)
+            change = state.at_run(blocks) - self.h[blocks.point]
+            shift = np.zeros_like(blocks.z)
+            for term in self.terms:
+                value = self.theta[self.part[term.name]]
+                of_film = term.film_change(blocks, state, value)
+                if of_film is not None:
+                    change = change + of_film
+                elif term.additive:
+                    shift = shift + (term.columns(blocks, state) @ value)[:, : shift.shape[1]]
+            factors.append(state.factor)
+            shifts.append(shift)
+            changes.append(change)
+        return np.concatenate(factors), np.concatenate(shifts), np.concatenate(changes)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    r: FloatArray  #: (n, k)
+    J_h: FloatArray  #: (n, k, 8)
+    J_t: FloatArray  #: (n, k, q)
+    force: FloatArray  #: (n, 2): chi-square of the force equations, and what a scatter of variance one adds to it
+    counted: FloatArray  #: (n,): equations that say something
+    block_rows: int  #: of r: the others are those of the clocks
+
+
+def _along_force(patterns: ComplexArray, remainder: ComplexArray) -> FloatArray:
+    """Chi-square of the remainder (n, k, 1) along the force patterns (n, k, 2), and the patterns' own, (n, 2)."""
+    unit = np.linalg.qr(patterns)[0].conj().transpose(0, 2, 1)
+    chi_square = 2 * np.sum(np.abs(unit @ remainder) ** 2, axis=(1, 2))
+    information = 2 * np.sum(np.abs(patterns) ** 2, axis=(1, 2))
+    return np.stack([chi_square, information], axis=1)
+
+
+def _real(rows: ComplexArray) -> FloatArray:
+    """Complex rows (n, k, ..) of unit variance as real ones, (n, 2 k, ..)."""
+    return np.sqrt(2.0) * np.concatenate([rows.real, rows.imag], axis=1)
+
+
+def _first_motion(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
+    """Motion (n, 4) by least squares over the sensors and the housing, each weighed by its own noise."""
+    n = len(blocks)
+    B = with_factor(state.factor, motion_matrix(rig, blocks, state))
+    size = np.sqrt(np.einsum("njj->nj", blocks.noise).real)
+    usual = np.abs(blocks.z) * 1e-3
+    deviation = np.where(blocks.present, np.maximum(size, usual) + 1e-300, 1.0)
+    housing = np.full((n, HOUSING_ROWS), 1.0) * np.maximum(
+        0.05 * (blocks.omega**2 * np.abs(blocks.z[:, rig.of("displacement")]).max(axis=1))[:, None], 1e-300
+    )
+    weight = 1 / np.concatenate([deviation, housing], axis=1)
+    z = np.concatenate([blocks.z * blocks.present, np.zeros((n, HOUSING_ROWS))], axis=1) * weight
+    solution = np.linalg.pinv(B * weight[:, :, None]) @ z[:, :, None]
+    return np.asarray(solution[:, :, 0])

@@ -1,0 +1,138 @@
+"""What a term of the measurement equation is: parameters with priors, and what they do to the readings.
+
+A term speaks of readings. It knows nothing of residuals, weights or points, nor of the solve: that makes it one file.
+A user's own term is a subclass handed to `tpjb_ident.estimate.solve`; docs/design.md has a worked example.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import HOUSING_ROWS, State
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a term, with what is stated of it beforehand."""
+
+    name: str
+    unit: str
+    deviation: float  #: prior standard deviation, in `unit`
+    mean: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What the records made of a term's parameters, (q,) each."""
+
+    value: FloatArray
+    deviation: FloatArray
+    estimated: np.ndarray  #: bool: else the records tell too little, and the prior stands
+
+
+class Term:
+    """A source of systematic error.
+
+    Attributes
+    ----------
+    name : str
+        As in the budget.
+    parameters : tuple of Parameter
+        None: the term does not apply to the campaign.
+    always_estimated : bool
+        Whether its parameters are estimated however little the records tell; else only where they tell clearly more
+        than the prior.
+    additive : bool
+        Whether it adds to readings, and so is applied after what multiplies them.
+
+    Examples
+    --------
+    >>> from tpjb_ident.terms.registry import TERMS
+    >>> [term.name for term in TERMS][:3]
+    ['calibration', 'temperature', 'axis']
+    """
+
+    name = ""
+    always_estimated = False
+    additive = False
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        self.rig = rig
+        self.parameters: tuple[Parameter, ...] = ()
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """Change of the readings per unit of every parameter at the true motion, (n, m + 2, q)."""
+        raise NotImplementedError
+
+    def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
+        """Bring the parameters' values (q,) into the state."""
+        raise NotImplementedError
+
+    def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray | None:
+        """By how much H of a run differs from its point's, (n, 2, 2) [N/m]; None of a term that is not the film's."""
+        return None
+
+    def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
+        """Change of the readings' slope over time [1/s] per unit of every parameter, (n, m, q); `reading` (n, m)."""
+        return np.zeros((*reading.shape, len(self.parameters)), complex)
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """What to say where the records contradict what was stated."""
+        return ()
+
+    def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
+        """What to say of one point (its number), `h` (2, 2) [N/m]."""
+        return ()
+
+    def words(self, fitted: Fitted) -> tuple[str, ...]:
+        """One sentence a parameter that the records tell."""
+        return ()
+
+    def no_columns(self, blocks: Blocks) -> ComplexArray:
+        """Zeros to be filled in, (n, m + 2, q)."""
+        n, m = blocks.z.shape
+        return np.zeros((n, m + HOUSING_ROWS, len(self.parameters)), complex)
+
+
+class Factor(Term):
+    """A term that multiplies readings: exp(sum of parameter times exponent)."""
+
+    def exponent(self, blocks: Blocks) -> ComplexArray:
+        """Change of the readings' logarithm per unit of every parameter, (n, m, q)."""
+        raise NotImplementedError
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """Exponent times reading."""
+        columns = self.no_columns(blocks)
+        m = blocks.z.shape[1]
+        columns[:, :m] = self.exponent(blocks) * state.reading(self.rig, blocks)[:, :m, None]
+        return columns
+
+    def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
+        """Multiply the state's factor."""
+        state.factor *= np.exp(self.exponent(blocks) @ value)
+
+
+class Additive(Term):
+    """A term that adds to readings."""
+
+    additive = True
+
+    def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
+        """Add to the state's shift."""
+        state.shift += self.columns(blocks, state) @ value
+
+
+def beyond(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
+    """Places of estimated parameters more than `limit` prior deviations, and standard errors, from the mean."""
+    places = []
+    for k, parameter in enumerate(parameters):
+        distance = abs(float(fitted.value[k]) - parameter.mean)
+        if fitted.estimated[k] and distance > limit * max(parameter.deviation, float(fitted.deviation[k])):
+            places.append(k)
+    return places

@@ -1,0 +1,179 @@
+"""Windows of one operating point to one phasor per run and channel, with noise, slope and weights.
+
+Which windows are good, all channels say together: a window far from its run's others in the metric of their own
+scatter loses its weight. Noise is their covariance about each device's own drift, pooled over the point's runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.blocks import totals
+from tpjb_ident.estimate.robust_constants import trimming_limits, trimming_weight
+
+#: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
+LOCKED = 0.9
+#: Windows of a run from which its drift is told.
+_DRIFT_WINDOWS = 4
+#: Rounds of trimming.
+_ROUNDS = 3
+#: Part of the noise's own mean variance that every direction has at least: keeps exact data solvable.
+_FLOOR = 1e-12
+
+
+@dataclass(frozen=True)
+class WindowMeans:
+    """Runs of one point, g of them, m channels."""
+
+    mean: ComplexArray  #: (g, m)
+    slope: ComplexArray  #: (g, m), 1/s
+    time: FloatArray  #: (g,), s: middle of the windows
+    count: FloatArray  #: (g,): effective number of windows
+    spread: FloatArray  #: (g,), s^2: sum of squared distances of the windows from their middle
+    noise: ComplexArray  #: (m, m): covariance of a single window
+    spare: float  #: degrees of freedom of the noise
+    weights: FloatArray  #: (n,): of the windows
+    wandering: int
+
+
+def window_means(
+    z: ComplexArray,
+    run: IntArray,
+    time: FloatArray,
+    devices: Sequence[str],
+    weights: FloatArray,
+    present: BoolArray,
+) -> WindowMeans | None:
+    """Means of a point's windows; None where no window has a phasor of every channel that its run has.
+
+    `z` (n, m) [SI], NaN where a window gives none, `run` (n,), `time` (n,) [s], `weights` (n,) of the robust start,
+    `present` (g, m): channels of every run.
+    """
+    z = np.where(present[run], z, 0.0)
+    whole = np.asarray(np.isfinite(z).all(axis=1))
+    good = np.where(whole, (weights > 0.2).astype(float), 0.0)
+    if not good.any():
+        return None
+    z = np.where(whole[:, None], z, 0.0)
+    scale = np.max(np.abs(z[whole]), axis=0) + 1e-300
+    turned, wandering = aligned(z / scale, run, good)
+    lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
+    state = _pooled(turned, run, time, devices, good, present)
+    for _ in range(_ROUNDS):
+        distance = _distances(state, state.noise)
+        size = totals(run, good, len(state.mean))[run]
+        inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
+        trimmed = np.where(whole & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
+        lost = totals(run, trimmed, len(state.mean)) < 1.0
+        good = np.where(lost[run], good, trimmed)
+        state = _pooled(turned, run, time, devices, good, present)
+    noise = state.noise / shrinkage * np.outer(scale, scale)
+    return WindowMeans(
+        state.mean * scale,
+        state.slope * scale,
+        state.time,
+        state.count,
+        state.spread,
+        noise,
+        state.spare,
+        good,
+        wandering,
+    )
+
+
+@dataclass(frozen=True)
+class _State:
+    mean: ComplexArray
+    slope: ComplexArray
+    time: FloatArray
+    count: FloatArray
+    spread: FloatArray
+    noise: ComplexArray
+    spare: float
+    residual: ComplexArray  #: (n, m)
+
+
+def _pooled(
+    z: ComplexArray,
+    run: IntArray,
+    time: FloatArray,
+    devices: Sequence[str],
+    weights: FloatArray,
+    present: BoolArray,
+) -> _State:
+    """Weighted mean and slope of every run, and the covariance of a window about them."""
+    g = len(present)
+    total = totals(run, weights, g)
+    safe = np.maximum(total, 1e-12)
+    mean = _sums(weights[:, None] * z, run, g) / safe[:, None]
+    middle = totals(run, weights * time, g) / safe
+    away = time - middle[run]
+    spread = totals(run, weights * away**2, g)
+    slope = _sums((weights * away)[:, None] * z, run, g) / np.maximum(spread, 1e-12)[:, None]
+    slope[total < _DRIFT_WINDOWS] = 0.0
+    drift = _drift(mean, slope, devices)
+    residual = z - mean[run] - drift[run] * away[:, None]
+    taken = 1.0 + 0.5 * (total >= _DRIFT_WINDOWS)  # the mean, and one complex rate a device of several channels
+    each = np.maximum(total - taken, 0.0)
+    spare = float(each.sum())
+    # a channel that some runs lack has fewer residuals: its row and column are scaled alike, which keeps N positive
+    told = np.maximum(each @ present, 1.0)
+    root = np.sqrt(1 / told)
+    noise = (weights[:, None] * residual).T @ residual.conj() * np.outer(root, root)
+    noise = noise + (1e-24 + _FLOOR * float(np.trace(noise).real)) * np.eye(z.shape[1])
+    return _State(mean, slope, middle, total, spread, noise, spare, residual)
+
+
+def _sums(rows: ComplexArray, run: IntArray, g: int) -> ComplexArray:
+    """Sums of rows (n, m) by run, (g, m)."""
+    table = np.zeros((g, rows.shape[1]), complex)
+    np.add.at(table, run, rows)
+    return table
+
+
+def _drift(mean: ComplexArray, slope: ComplexArray, devices: Sequence[str]) -> ComplexArray:
+    """Slope that all channels of a device share as one complex rate of their readings, (g, m) [1/s]."""
+    drift = np.zeros_like(slope)
+    for device in dict.fromkeys(devices):
+        columns = [j for j, name in enumerate(devices) if name == device]
+        power = np.sum(np.abs(mean[:, columns]) ** 2, axis=1)
+        rate = np.sum(mean[:, columns].conj() * slope[:, columns], axis=1) / np.maximum(power, 1e-300)
+        drift[:, columns] = rate[:, None] * mean[:, columns]
+    return drift
+
+
+def _distances(state: _State, noise: ComplexArray) -> FloatArray:
+    """Squared distance of every window from its run's others, (n,)."""
+    solved = np.linalg.solve(noise, state.residual.T)
+    return np.asarray(2 * np.einsum("na,an->n", state.residual.conj(), solved).real)
+
+
+def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[ComplexArray, int]:
+    """Turn windows to their direction's common phase where the phase wanders, (n, m).
+
+    Repeats are repeats of one phasor only while the actuators' generator is locked to the recorder. Where it is not,
+    each window's phasors turn by a common angle, which F = H D does not see, but an average does.
+
+    `z` (n, m), `direction` (n,), `weights` (n,).
+    """
+    result, wandering = z, 0
+    for d in range(int(direction.max()) + 1):
+        places = np.flatnonzero(direction == d)
+        good = places[weights[places] > 0]
+        if len(good) < 3:
+            continue
+        pattern = np.linalg.svd(z[good], full_matrices=False)[2][0].conj()
+        along = z[places] @ pattern
+        counted = z[good] @ pattern
+        if abs(counted.sum()) >= LOCKED * np.abs(counted).sum():
+            continue
+        if wandering == 0:
+            result = z.copy()
+        wandering += 1
+        turn = np.exp(-1j * np.angle(along))
+        result[places] = z[places] * turn[:, None]
+    return result, wandering

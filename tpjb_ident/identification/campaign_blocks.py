@@ -1,0 +1,191 @@
+"""Rig and blocks of a campaign from the means of its points."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.calibration import Channel
+from rigdata.campaign import Campaign
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.dynamic.runs.point_source import PointSource
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
+from tpjb_ident.identification.point_means import PointMeans
+
+#: Degrees of freedom below which the noise of a point is taken together with the other points'.
+_FREEDOM = 60.0
+#: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
+_FLOATS = 0.3
+#: Cells over set points between which the cells carry the static load.
+_CARRIED = (0.5, 2.0)
+#: Error of a run's mean load where its windows do not tell, relative.
+_LOAD_ERROR = 2e-4
+#: Misses that no scatter of loads explains say nothing of how H changes with the load.
+_MAX_MISS = 0.05
+
+
+def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
+    """Probes, cells and accelerometers of a campaign's dynamic runs."""
+    channels = dict(campaign.channels)
+    for run in campaign.of_kind("dynamic"):
+        channels = dict(run.channels) | channels
+    sensors = []
+    for quantity in QUANTITIES:
+        for channel in channels.values():
+            if channel.quantity != quantity or channel.axis is None:
+                continue
+            sensors.append(
+                Sensor(
+                    channel.name,
+                    quantity,
+                    channel.uncertainty,
+                    channel.axis_uncertainty,
+                    channel.delay_uncertainty,
+                    channel.clock,
+                    channel.plane,
+                    channel.temperature_coefficient_uncertainty,
+                )
+            )
+    return tuple(sensors)
+
+
+def with_start(sensors: Sequence[Sensor], start: float) -> tuple[Sensor, ...]:
+    """The sensors; devices beside the first start recording within `start` [s] of it where no delay is stated."""
+    first = sensors[0].device
+    return tuple(
+        replace(s, delay_uncertainty=start) if s.device != first and not s.delay_uncertainty else s for s in sensors
+    )
+
+
+def campaign_blocks(
+    sources: Sequence[PointSource],
+    means: Sequence[PointMeans],
+    misses: Sequence[LoadMiss],
+    bent: FloatArray,
+    temperatures: Mapping[str, float],
+) -> Blocks:
+    """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
+    noises, freedoms = _pooled_noise(means, [source.digests[0].window for source in sources])
+    names: list[str] = []
+    known: list[list[Hashable]] = []
+    nothing = _no_blocks(len(means[0].channels[0]))
+    columns: dict[str, list[object]] = {name: [] for name in nothing}
+    for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
+        w = point.means
+        for g, (digest, (_, line)) in enumerate(zip(source.digests, source.members)):
+            if w is None or not w.count[g] > 0:
+                continue
+            channels = point.channels[g]
+            known = known or [[] for _ in channels]
+            load = max(source.point.static_load, 1e-9)
+            usable = abs(miss.size[g]) < _MAX_MISS and abs(miss.sideways[g]) < _MAX_MISS
+            present = np.array([channel is not None for channel in channels])
+            row = {
+                "point": p,
+                "run": len(names),
+                "omega": 2 * np.pi * digest.excitations[line],
+                "z": w.mean[g] * present,
+                "present": present,
+                "along": _axes(channels),
+                "calibration": _calibrations(channels, known),
+                "noise": noises[p] / w.count[g],
+                "dof": freedoms[p],
+                "slope": w.slope[g],
+                "slope_noise": noises[p] / max(float(w.spread[g]), 1e-12),
+                "windows": w.count[g],
+                "time": w.time[g],
+                "temperature": temperatures.get(digest.run, np.nan),
+                "miss": complex(miss.size[g], miss.sideways[g]) if usable else 0j,
+                "miss_error": point.load_error[g] / load if source.point.static_load > 0 else _LOAD_ERROR,
+                "shaft": point.shaft[g],
+            }
+            names.append(digest.run)
+            for name in columns:
+                columns[name].append(row[name])
+    arrays = {name: np.array(values) if names else nothing[name] for name, values in columns.items()}
+    points = tuple(source.point for source in sources)
+    return Blocks(points=points, runs=tuple(names), bent=bent, **arrays)
+
+
+def _axes(channels: Sequence[Channel | None]) -> FloatArray:
+    """Unit vectors of the axes (m, 2); zero where a run has no such channel."""
+    rows = [(0.0, 0.0) if c is None else (np.cos(c.axis or 0.0), np.sin(c.axis or 0.0)) for c in channels]
+    return np.array(rows)
+
+
+def _calibrations(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:
+    """Numbers of the channels' calibrations (m,); `known` holds those of each sensor, new ones join it."""
+    numbers = []
+    for channel, calibrations in zip(channels, known):
+        calibration = None if channel is None else channel.calibration
+        if channel is not None and calibration not in calibrations:
+            calibrations.append(calibration)
+        numbers.append(0 if channel is None else calibrations.index(calibration))
+    return numbers
+
+
+def _no_blocks(m: int) -> dict[str, np.ndarray]:
+    """Columns of the blocks of m sensors where no run says anything."""
+    numbers = dict.fromkeys(("omega", "dof", "windows", "time", "temperature", "miss_error"), np.zeros(0))
+    places = dict.fromkeys(("point", "run"), np.zeros(0, dtype=int))
+    return {
+        **numbers,
+        **places,
+        **dict.fromkeys(("miss", "shaft"), np.zeros(0, complex)),
+        **dict.fromkeys(("z", "slope"), np.zeros((0, m), complex)),
+        **dict.fromkeys(("noise", "slope_noise"), np.zeros((0, m, m), complex)),
+        "present": np.zeros((0, m), dtype=bool),
+        "calibration": np.zeros((0, m), dtype=int),
+        "along": np.zeros((0, m, 2)),
+    }
+
+
+def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tuple[list[ComplexArray], FloatArray]:
+    """Noise of a window at every point with its degrees of freedom; with few, the campaign's own noise joins in.
+
+    What points share is the noise's density: that of a window goes with one over its length [s].
+    """
+    told = [(p.means, length) for p, length in zip(means, lengths) if p.means is not None and p.means.spare > 0]
+    total = sum(w.spare for w, _ in told)
+    m = told[0][0].noise.shape[0] if told else 1
+    density = np.zeros((m, m), complex)
+    for w, length in told:
+        density += w.spare * length * w.noise / max(total, 1.0)
+    noises: list[ComplexArray] = []
+    freedoms: list[float] = []
+    for p, length in zip(means, lengths):
+        spare = 0.0 if p.means is None else p.means.spare
+        more = min(max(_FREEDOM - spare, 0.0), total - spare)
+        pool = density / max(length, 1e-9)
+        own = pool if p.means is None else p.means.noise
+        freedom = max(spare + more, 1.0)
+        noise = (spare * own + more * pool) / freedom
+        # the inverse of a covariance of few degrees of freedom is too large on average
+        noises.append(np.asarray(noise * max(freedom / max(freedom - m, 1.0), 1.0), complex))
+        freedoms.append(freedom)
+    return noises, np.array(freedoms)
+
+
+def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:
+    """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
+
+    Without accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the
+    housing stands on them. Cells of a floating stator show none; then it is "unknown".
+    """
+    if stated:
+        return stated
+    rig = Rig(tuple(sensors), 1.0)
+    carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
+    if len(rig.of("acceleration")) < 2:
+        return carried
+    a = vector(rig, blocks, "acceleration")
+    d = vector(rig, blocks, "displacement") * (blocks.omega**2)[:, None]
+    told = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1)
+    if not told.any():
+        return carried
+    power = np.sum(np.abs(d[told]) ** 2, axis=0)
+    quotient = np.sum(d[told].conj() * a[told], axis=0) / np.maximum(power, 1e-300)
+    return "floating" if np.abs(quotient - 1).max() < _FLOATS else "cells"

@@ -1,0 +1,188 @@
+"""A campaign's dynamic runs to dynamic coefficients: the whole path, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from rigdata.campaign import Campaign
+from rigdata.vector import zero_uncertainty
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.broadband.band_point import BandSettings, is_broadband
+from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
+from tpjb_ident.dynamic.results.gains import channel_pairs, swept_probes, with_probe_doubts
+from tpjb_ident.dynamic.results.identification import Identification
+from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
+from tpjb_ident.dynamic.runs.baseline import measured_baseline
+from tpjb_ident.dynamic.runs.checked_runs import check_finished
+from tpjb_ident.dynamic.runs.excluded_runs import named_runs
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
+from tpjb_ident.dynamic.runs.point_source import point_sources
+from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
+from tpjb_ident.dynamic.runs.run_store import RunStore
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.identification.campaign_solution import CampaignSolution, solve_campaign
+from tpjb_ident.identification.methods import own_method
+from tpjb_ident.identification.point import RUN_TERMS, PointTask, finished_point, point_share
+from tpjb_ident.phasors.mains_frequency import mains_frequency
+from tpjb_ident.runtime.executors import InProcessWorkers, Workers, map_ordered
+
+
+def identify(
+    campaign: Campaign,
+    settings: IdentifySettings | None = None,
+    progress: Progress | None = None,
+    workers: Workers | None = None,
+    store: RunStore | None = None,
+) -> Identification:
+    """Identify every operating point of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    settings : IdentifySettings, optional
+    progress : callable, optional
+        Called as progress(text, done, total).
+    workers : tpjb_ident.runtime.executors.Workers, optional
+        Processes or machines over which the reading of runs and the points are spread; the numbers are the same.
+    store : RunStore, optional
+        Keeps finished runs, so that another call after a kill goes on where this one stopped.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    BadInputError
+        The campaign has no dynamic run, or an unknown method is asked for.
+    rigdata.problem.RigDataError
+        None of the records can be read. Single ones are left out and named in the result's conditions.
+    RecordTooShortError
+        None of the records can tell its lines apart.
+
+    Examples
+    --------
+    >>> result = ti.identify(demo)
+    >>> print(result.points[0])
+    2.5 kN, 25 Hz: kxx 53.12 ± 0.63 MN/m, cxx 582.3 ± 6.6 kN s/m, kyy 90.7 ± 1.1 MN/m, cyy 689.1 ± 8.0 kN s/m
+    """
+    settings = settings or IdentifySettings()
+    runs = campaign.of_kind("dynamic")
+    if not runs:
+        raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
+    report = progress or (lambda text, done, total: None)
+    settings = _with_mains(settings, campaign)
+    sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
+    bands = None
+    if any(is_broadband(run) for run in runs):
+        rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
+        bands = identify_bands(campaign, _band_settings(settings), report, rig)
+    if not sines.of_kind("dynamic"):
+        identification = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
+    else:
+        with all_runs(sines, settings.phasors, report, workers, store) as finished:
+            identification = assemble(sines, finished, settings, report, workers)
+    identification = identification if bands is None else _with_bands(identification, bands)
+    return _with_zero_uncertainty(identification, campaign)
+
+
+def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -> Identification:
+    """Positions of the shaft are as uncertain as the probes' stated zeros."""
+    zero = zero_uncertainty(campaign.channels.values(), "displacement")
+    if not zero.any():
+        return identification
+    points = tuple(replace(p, position_se=np.hypot(p.position_se, zero)) for p in identification.points)
+    return replace(identification, points=points)
+
+
+def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
+    """The points of sines and those of bands together, sorted as ever."""
+    points = [*result.points, *(p for band in bands.results for p in band.points)]
+    joint = np.concatenate([result.calibration_changes, bands.changes], axis=1)
+    changes = joint.reshape(len(joint), len(points), 8)
+    order = sorted(range(len(points)), key=lambda i: points[i].point)
+    table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
+    return replace(
+        result,
+        points=tuple(points[i] for i in order),
+        calibration_changes=changes[:, order].reshape(len(changes), -1),
+        conditions=tuple(table.values()),
+        bands=bands.results,
+    )
+
+
+def _band_settings(settings: IdentifySettings) -> BandSettings:
+    phasors = settings.phasors
+    lines, draws = phasors.lines.mains, (settings.n_calibration, settings.seed)
+    return BandSettings(lines, phasors.delays, settings.correct, *draws, settings.clearance)
+
+
+def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
+    lines = settings.phasors.lines
+    mains = mains_frequency(campaign, lines.mains)
+    if mains == lines.mains:
+        return settings
+    return replace(settings, phasors=replace(settings.phasors, lines=replace(lines, mains=mains)))
+
+
+def assemble(
+    campaign: Campaign,
+    finished: FinishedRuns,
+    settings: IdentifySettings,
+    report: Progress,
+    workers: Workers | None = None,
+) -> Identification:
+    """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time."""
+    workers = workers or InProcessWorkers()
+    checked = check_finished(campaign, finished)
+    digests = finished.digests
+    baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
+    sources = [replace(source, baseline=baseline) for source in point_sources(finished)]
+    sweeps = swept_probes(campaign)
+    report("estimating", 0, len(sources))
+    solved = solve_campaign(campaign, sources, digests, workers, settings.correct)
+    temperatures = {digest.run: digest.temperatures for digest in digests}
+    task = PointTask(settings, solved.task, temperatures, channel_pairs(campaign, sweeps), checked)
+    jobs = [(source, point_share(solved, source, p)) for p, source in enumerate(sources)]
+    points = []
+    for point in map_ordered(workers, finished_point, jobs, task):
+        points.append(point)
+        report("estimating", len(points), len(sources))
+    excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
+    conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
+    named = with_probe_doubts(sweeps, named_at_points(points, excluded, several), settings.clearance)
+    changes = systematic_changes(solved)
+    return Identification(campaign.id, settings.method, named, changes, unstated(campaign) + conditions)
+
+
+def systematic_changes(solved: CampaignSolution) -> FloatArray:
+    """What every source that points share does to the entries of all P points, (q, 8 P) [N/m].
+
+    One row a parameter, scaled so that the mean of the rows' products is the covariance.
+    """
+    solution = solved.solution
+    rows, first = [], 0
+    for term in solution.terms:
+        last = first + len(term.parameters)
+        if term.name not in RUN_TERMS:
+            rows.append(solution.factors[first:last])
+        first = last
+    points = len(solution.h)
+    if not rows or not sum(len(row) for row in rows):
+        return np.zeros((1, 8 * points))
+    factors = np.concatenate(rows)
+    return np.asarray(factors.reshape(len(factors), -1) * np.sqrt(len(factors)))
+
+
+def unstated(campaign: Campaign) -> tuple[Condition, ...]:
+    """Say which probes and cells have no uncertainty in the manifest."""
+    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
+    names = [c.name for c in main if c.uncertainty is None]
+    if not names:
+        return ()
+    text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
+    return (Condition("calibration-uncertainty-unstated", text),)

@@ -1,0 +1,249 @@
+"""The windows of one operating point: a robust start of H, and one phasor per run and channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.calibration import Channel
+from rigdata.campaign import Campaign
+from rigdata.vector import directions
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
+from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.dynamic.runs.point_source import PointSource
+from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
+from tpjb_ident.estimate.window_means import WindowMeans, window_means
+from tpjb_ident.phasors.shaft import shaft_order
+from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
+
+#: A run with less than this share of its windows accepted differs as a whole: its windows are judged among themselves.
+_ACCEPTED = 0.2
+#: Share of a run's windows in which a channel has a phasor, at least, to count as recorded.
+_LEAST_WINDOWS = 0.4
+#: A channel whose phasors are below this share of its quantity's is dead.
+_NOTHING = 1e-6
+#: A window whose phasors are below this share of its run's loud ones (nine in ten are less loud) has no drive.
+_RESTS, _LOUD = 0.1, 0.9
+#: Condition number of the displacement directions from which one direction is missing.
+_ONE_LINE = 1e6
+
+
+@dataclass(frozen=True)
+class PointMeans:
+    """What the windows of a point say before the solve."""
+
+    start: ComplexArray  #: (2, 2), N/m: NaN where the windows give none
+    means: WindowMeans | None
+    channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
+    mean_load: FloatArray  #: (g, 2), N
+    load_error: FloatArray  #: (g,), N: standard error of the mean load's size
+    condition: float
+    attenuation: FloatArray = field(repr=False)  #: (2,)
+    status: tuple[Condition, ...] = ()
+    shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
+    shaft_conditions: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeansTask:
+    """What every point's windows are averaged with."""
+
+    sensors: tuple[Sensor, ...]
+    along: FloatArray  #: (m, 2)
+    rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
+    temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
+
+
+def point_means(task: MeansTask, source: PointSource) -> PointMeans:
+    """Robust start and means of one point."""
+    data = source.load()
+    z, channels = channel_windows(data, task)
+    time = window_times(data)
+    z = _driven(z * clock_turns(data, task, time), data)
+    present = np.array([[channel is not None for channel in run] for run in channels])
+    D, F = vectors(z, data, task)
+    table = phasor_table(D, F, data.run_index)
+    loads, errors = _loads(data)
+    weights, start, status = _robust_start(table)
+    means = window_means(z, data.run_index, time, [s.device for s in task.sensors], weights, present)
+    condition = displacement_condition(table.D, weights[table.valid])
+    attenuation = np.full(2, np.nan) if means is None else _attenuation(means, task)
+    shaft, conditions = _shaft(data, means, task)
+    return PointMeans(start, means, channels, loads, errors, condition, attenuation, status, shaft, conditions)
+
+
+def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, tuple[Condition, ...]]:
+    """Unit phasor of what turns with the shaft in every run (g,), where the runs tell it from the motion."""
+    none = np.full(len(data.runs), np.nan + 0j)
+    first = data.runs[0].lines
+    order = shaft_order(first.excitation[data.lines[0]].frequency, first.speed)
+    name = f"{order}X on excitation line"
+    if not order or not any(name in run.conditions for run in data.runs):
+        return none, ()
+    s = np.array([run.shaft_phase[i] if len(run.shaft_phase) else np.nan for run, i in zip(data.runs, data.lines)])
+    motion = np.full((len(data.runs), 2), np.nan + 0j)
+    if means is not None and len(means.mean) == len(s):
+        rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "displacement"]
+        motion = means.mean[:, rows] @ np.linalg.pinv(task.along[rows]).T
+    reason = not_told(order, s, motion)
+    if reason:
+        return none, (Condition(name, f"what turns with the shaft cannot be told from the motion: {reason}"),)
+    text = f"what turns with the shaft is told from the motion by the shaft's phase in {len(s)} runs"
+    return s, (Condition(SHAFT_FITTED, text),)
+
+
+def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
+    """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
+
+    What is known of a channel is taken off: the drift of its gain with the run's temperature, in the cells the rig
+    without its bearing.
+    """
+    rows: list[ComplexArray] = []
+    described: list[list[Channel | None]] = []
+    for run, line in zip(data.runs, data.lines):
+        places = {channel.name: k for k, channel in enumerate(run.channels)}
+        z = np.full((len(run.start), len(task.sensors)), np.nan + 0j)
+        channels: list[Channel | None] = []
+        for j, sensor in enumerate(task.sensors):
+            channel = run.channels[places[sensor.name]] if sensor.name in places else None
+            values = None if channel is None else run.z[:, line, places[sensor.name]]
+            if channel is None or values is None or channel.quantity != sensor.quantity or not _usual(values):
+                channels.append(None)
+                continue
+            z[:, j] = values / _warm_gain(channel, task.temperatures.get(run.run))
+            channels.append(channel)
+        rows.append(z)
+        described.append(channels)
+    z = _without_dead(np.concatenate(rows), task)
+    alive = np.array([np.isfinite(z[data.run_index == g]).any(axis=0) for g in range(len(data.runs))])
+    if data.rig is not None:
+        cells = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "force"]
+        z[:, cells] -= data.D @ data.rig.T @ task.along[cells].T
+    living = []
+    for g, run_channels in enumerate(described):
+        living.append(tuple(c if alive[g, j] else None for j, c in enumerate(run_channels)))
+    return z, tuple(living)
+
+
+def _without_dead(z: ComplexArray, task: MeansTask) -> ComplexArray:
+    """Phasors (n, m) without channels that show nothing of what others of their quantity do."""
+    sizes = np.nanmax(np.abs(np.nan_to_num(z)), axis=0, initial=0.0)
+    for j, sensor in enumerate(task.sensors):
+        like = [sizes[k] for k, other in enumerate(task.sensors) if other.quantity == sensor.quantity]
+        if sizes[j] <= _NOTHING * max(like):
+            z[:, j] = np.nan
+    return z
+
+
+def _driven(z: ComplexArray, data: PointData) -> ComplexArray:
+    """Phasors (n, m) without windows in which the drive rests, beside the others of their run."""
+    usual = np.nanmax(np.abs(z), axis=0, initial=0.0) + 1e-300
+    size = np.nanmax(np.abs(z) / usual, axis=1, initial=0.0)
+    for g in range(len(data.runs)):
+        places = np.flatnonzero(data.run_index == g)
+        rests = size[places] < _RESTS * np.nanquantile(size[places], _LOUD, method="higher")
+        z[places[rests]] = np.nan
+    return z
+
+
+def _usual(values: ComplexArray) -> bool:
+    """Whether a channel has phasors in most of a run's windows, and not zeros throughout."""
+    finite = np.isfinite(values)
+    return bool(finite.mean() > _LEAST_WINDOWS and np.abs(values[finite]).max() > 0)
+
+
+def _warm_gain(channel: Channel, temperature: float | None) -> float:
+    """Gain of a channel beside that of its reference temperature."""
+    if not channel.temperature_coefficient or temperature is None or channel.temperature_reference is None:
+        return 1.0
+    return 1 + channel.temperature_coefficient * (temperature - channel.temperature_reference)
+
+
+def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexArray, ComplexArray]:
+    """Displacement and oil force of channels' phasors (n, m), (n, 2) each, from the sensors that have one."""
+    plane = {}
+    for quantity in QUANTITIES:
+        rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == quantity]
+        if len(rows) > 1:
+            plane[quantity] = _plane(z[:, rows], task.along[rows])
+    force = plane["force"]
+    if "acceleration" in plane:
+        inertia = data.mass * plane["acceleration"]
+        force = force + np.where(np.isfinite(inertia), inertia, 0.0)
+    return plane["displacement"], force
+
+
+def _plane(z: ComplexArray, along: FloatArray) -> ComplexArray:
+    """X and Y (n, 2) of sensors' phasors (n, k) along their axes (k, 2); NaN where fewer than two are there."""
+    result = np.full((len(z), 2), np.nan + 0j)
+    finite = np.isfinite(z)
+    for pattern in np.unique(finite, axis=0):
+        rows = (finite == pattern).all(axis=1)
+        if np.linalg.matrix_rank(along[pattern], tol=1e-6) == 2:
+            result[rows] = z[np.ix_(rows, pattern)] @ np.linalg.pinv(along[pattern]).T
+    return result
+
+
+def window_times(data: PointData) -> FloatArray:
+    """Middles of the windows of all runs, (n,) [s]."""
+    return np.concatenate([run.start + 0.5 * run.length for run in data.runs])
+
+
+def clock_turns(data: PointData, task: MeansTask, time: FloatArray) -> ComplexArray:
+    """Unit phasors (n, m) that take off how far the devices' clocks have run ahead."""
+    rates = np.array([task.rates.get(sensor.device, 0.0) for sensor in task.sensors])
+    omega = 2 * np.pi * np.array([r.lines.excitation[i].frequency for r, i in zip(data.runs, data.lines)])
+    return np.asarray(np.exp(1j * np.multiply.outer(omega[data.run_index] * time, rates)))
+
+
+def sensor_axes(sensors: Sequence[Sensor], campaign: Campaign) -> FloatArray:
+    """Unit vectors of the sensors' axes, (m, 2)."""
+    channels = dict(campaign.channels)
+    for run in campaign.of_kind("dynamic"):
+        channels = dict(run.channels) | channels
+    return directions(np.array([channels[sensor.name].axis for sensor in sensors], dtype=float))
+
+
+def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[Condition, ...]]:
+    """Weights (n,) of all given windows, H (2, 2) and the start's conditions."""
+    weights = np.zeros(len(table.valid))
+    none = np.full((2, 2), np.nan + 0j)
+    if len(table) < 3 or table.n_directions < 2 or not displacement_condition(table.D) < _ONE_LINE:
+        weights[table.valid] = 1.0
+        return weights, none, ()
+    fit = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)
+    good = fit.weights.copy()
+    size = np.bincount(table.direction, minlength=table.n_directions)
+    share = np.bincount(table.direction, weights=good > 0.2, minlength=table.n_directions) / size
+    # a run as a whole is no outlier of the windows: the scatter of runs, or the weight of its block, takes it
+    good[(share < _ACCEPTED)[table.direction]] = 1.0
+    weights[table.valid] = good
+    return weights, fit.coefficients * table.h_scale, fit.conditions
+
+
+def _loads(data: PointData) -> tuple[FloatArray, FloatArray]:
+    """Mean cell force of every run (g, 2), and the standard error of its size (g,) [N]."""
+    means, errors = [], []
+    for run in data.runs:
+        rows = run.cell_force.mean[np.isfinite(run.cell_force.mean).all(axis=1)]
+        means.append(rows.mean(axis=0) if len(rows) else np.full(2, np.nan))
+        spread = np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows)) if len(rows) > 1 else 0.0
+        errors.append(float(spread))
+    return np.array(means), np.array(errors)
+
+
+def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
+    """Noise over total power of the displacements along their principal directions, larger first, (2,)."""
+    rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "displacement"]
+    plane = np.linalg.pinv(task.along[rows])
+    d = means.mean[:, rows] @ plane.T
+    noise = plane @ means.noise[np.ix_(rows, rows)] @ plane.T
+    total = max(float(means.count.sum()), 1e-12)
+    signal = (means.count[:, None] * d).T @ d.conj() / total
+    power = signal + noise * (1 - len(d) / total)
+    return np.sort(np.linalg.eigvals(np.linalg.solve(power, noise)).real)[::-1]

@@ -1,0 +1,1 @@
+"""What stands between readings and the film: one term of the measurement equation a file."""

@@ -1,0 +1,35 @@
+"""Angles of the sensors' axes, as far as the manifest states their uncertainty: one number a sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.term import Additive, Parameter
+
+
+class Axis(Additive):
+    """A sensor turned by an angle reads its share of the motion across its stated axis."""
+
+    name = "axis"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        self._rows = [j for j, sensor in enumerate(rig.sensors) if sensor.axis_uncertainty]
+        self.parameters = tuple(
+            Parameter(rig.sensors[j].name, "rad", rig.sensors[j].axis_uncertainty) for j in self._rows
+        )
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """(-sin, cos) times the vector that the sensor measures."""
+        columns = self.no_columns(blocks)
+        d, a = state.u[:, :2], state.u[:, 2:]
+        force = np.einsum("nij,nj->ni", state.at_run(blocks), d) - self.rig.mass * a
+        vectors = {"displacement": d, "force": force, "acceleration": a}
+        for k, j in enumerate(self._rows):
+            across = np.stack([-blocks.along[:, j, 1], blocks.along[:, j, 0]], axis=1)
+            measured = vectors[self.rig.sensors[j].quantity]
+            columns[:, j, k] = state.factor[:, j] * np.einsum("na,na->n", across, measured) * blocks.present[:, j]
+        return columns

@@ -1,0 +1,54 @@
+"""Delays of devices against one another, as far as the manifest states them: one number a device.
+
+Sensors of one clock share a device; where no clock is stated, those of one quantity do. The housing's equations tell
+cells from accelerometers (a spring knows no phase); probes against cells only a film of known form would tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+
+_MILLISECOND = 1e-3
+
+
+class Delay(Factor):
+    """A sensor that comes later by tau reads exp(-i omega tau) times the truth."""
+
+    name = "delay"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        deviations: dict[str, float] = {}
+        for sensor in rig.sensors:
+            if sensor.delay_uncertainty:
+                device = sensor.device or sensor.quantity
+                deviations[device] = max(sensor.delay_uncertainty, deviations.get(device, 0.0))
+        self.parameters = tuple(Parameter(name, "ms", dev / _MILLISECOND) for name, dev in deviations.items())
+        self._late = np.zeros((len(rig), len(deviations)))
+        for k, device in enumerate(deviations):
+            for j, sensor in enumerate(rig.sensors):
+                self._late[j, k] = (sensor.device or sensor.quantity) == device and sensor.delay_uncertainty > 0
+
+    def exponent(self, blocks: Blocks) -> ComplexArray:
+        """-i omega, per ms."""
+        return np.asarray(-1j * _MILLISECOND * blocks.omega[:, None, None] * self._late, complex)
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """Devices that are later than stated."""
+        names = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
+        if not names:
+            return ()
+        return (Condition("cells-and-accelerometers-out-of-phase", f"{'; '.join(self.words(fitted))}"),)
+
+    def words(self, fitted: Fitted) -> tuple[str, ...]:
+        """Delays that the records tell."""
+        return tuple(
+            f"{p.name} late by {fitted.value[k]:.3g} ms (standard error {fitted.deviation[k]:.2g} ms)"
+            for k, p in enumerate(self.parameters)
+            if fitted.estimated[k]
+        )

@@ -1,0 +1,63 @@
+"""Gains of single sensors, as far as the manifest states their uncertainty: one number a sensor for the campaign."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+
+
+class Gain(Factor):
+    """Logarithm of a sensor's gain; two probes and two cells tell nothing of it, a third probe the differences."""
+
+    name = "calibration"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        self._places: list[tuple[int, int]] = []
+        parameters = []
+        for j, sensor in enumerate(rig.sensors):
+            if not sensor.uncertainty:
+                continue
+            calibrations = np.unique(blocks.calibration[:, j]).tolist() or [0]
+            for k in calibrations:
+                name = sensor.name if len(calibrations) == 1 else f"{sensor.name}, calibration {k + 1}"
+                self._places.append((j, k))
+                parameters.append(Parameter(name, "1", sensor.uncertainty))
+        self.parameters = tuple(parameters)
+
+    def exponent(self, blocks: Blocks) -> ComplexArray:
+        """One in the sensor's own row, in the runs of that calibration."""
+        exponent = np.zeros((*blocks.z.shape, len(self._places)), complex)
+        for q, (j, k) in enumerate(self._places):
+            exponent[:, j, q] = blocks.calibration[:, j] == k
+        return exponent
+
+    def spread(self, fitted: Fitted) -> dict[str, float]:
+        """Standard deviation of the gains of a quantity (by its name) whose channels differ beyond what is stated."""
+        outliers = {self.rig.sensors[self._places[k][0]].quantity for k in beyond(fitted, self.parameters)}
+        table = {}
+        for quantity in outliers:
+            values = [v for (j, _), v in zip(self._places, fitted.value) if self.rig.sensors[j].quantity == quantity]
+            table[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
+        return table
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """Sensors that differ from the others beyond what is stated."""
+        outliers = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
+        if not outliers:
+            return ()
+        text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
+        return (Condition("probe-gains-differ", text),)
+
+    def words(self, fitted: Fitted) -> tuple[str, ...]:
+        """Gains that the records tell."""
+        sentences = []
+        for k, parameter in enumerate(self.parameters):
+            if fitted.estimated[k]:
+                share, error = 100 * fitted.value[k], 100 * fitted.deviation[k]
+                sentences.append(f"{parameter.name} reads {share:+.2f} % (standard error {error:.2f} %)")
+        return tuple(sentences)

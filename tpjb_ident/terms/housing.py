@@ -1,0 +1,134 @@
+"""What the housing stands on: the compliance of its cells and their loss, or whether it floats.
+
+Standing on cells, a = -omega^2 C F_cell: swapped, inverted or late accelerometers break it, whatever the bearing does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.term import Fitted, Parameter, Term
+
+_NANOMETRE = 1e-9
+#: Compliance of usual cells and what is plausible about it [nm/N]: 5e8 N/m, down to 5e7 N/m; across the axes; loss.
+_CELLS = (2.0, 20.0, 5.0, 0.3)
+#: What is plausible of cells whose housing has no accelerometers [nm/N]: they may be as soft as 3e8 N/m.
+_SOFT = 3.3
+#: Nothing is known of a housing that neither manifest nor accelerometer tells of: it stands still, or it floats.
+_UNKNOWN = 1.0
+#: A sign is beyond doubt from so many standard errors on.
+_CLEAR = 5.0
+#: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
+_LOSS = 0.04
+#: No housing stands on springs as stiff as this [nm/N]: a steel bar of 1 m^2 and 2 m has it.
+_STIFFEST = 0.01
+#: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
+HARMLESS = 2e-3
+
+
+class Housing(Term):
+    """Compliance [nm/N] and loss of the cells; kappa where it is not known whether the housing floats."""
+
+    name = "housing"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
+        self._inertia = _inertia_share(rig, blocks)
+        usual, wide, across, loss = _CELLS
+        if len(rig.of("acceleration")) < 2:
+            usual, wide, across = 0.0, _SOFT, 0.3 * _SOFT  # the inertia stays in F, as is said of the point
+        if rig.mount == "cells":
+            self.parameters = (
+                Parameter("c_xx", "nm/N", wide, usual),
+                Parameter("c_yy", "nm/N", wide, usual),
+                Parameter("c_xy", "nm/N", across),
+                Parameter("loss", "1", loss),
+            )
+        elif rig.mount == "unknown":
+            self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
+
+    def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
+        """Compliance or kappa of the state."""
+        if self.rig.mount == "cells":
+            xx, yy, xy, loss = (float(v) for v in value)
+            state.compliance = np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
+        elif self.rig.mount == "unknown":
+            state.floating = float(value[0])
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """In the housing's own rows."""
+        columns = self.no_columns(blocks)
+        m, square = blocks.z.shape[1], blocks.omega**2
+        d, a = state.u[:, :2], state.u[:, 2:]
+        if self.rig.mount == "unknown":
+            columns[:, m:, 0] = -square[:, None] * d
+            return columns
+        force = np.einsum("nij,nj->ni", state.at_run(blocks), d) - self.rig.mass * a
+        loss = complex(1 - 1j * state.parameters[self.name][3])
+        scaled = square[:, None] * _NANOMETRE * loss * force
+        columns[:, m, 0], columns[:, m + 1, 1] = scaled[:, 0], scaled[:, 1]
+        columns[:, m, 2], columns[:, m + 1, 2] = scaled[:, 1], scaled[:, 0]
+        columns[:, m:, 3] = -1j * square[:, None] * np.einsum("ij,nj->ni", state.compliance / loss, force)
+        return columns
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
+        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+            return ()
+        (xx, yy, xy, loss), error = fitted.value, fitted.deviation
+        faults = []
+        if min(xx + _CLEAR * error[0], yy + _CLEAR * error[1]) < 0:
+            faults.append("they move with the cells' force, and not against it")
+        elif abs(xy) > max(_CLEAR * error[2], 0.5 * np.sqrt(abs(xx * yy))):
+            faults.append("each answers the force along the other's axis")
+        silent = [axis for axis, c, e in zip("XY", (xx, yy), error) if abs(c) + _CLEAR * e < _STIFFEST]
+        if silent:
+            faults.append(f"they show nothing along {' and '.join(silent)}: are they connected?")
+        if faults:
+            text = f"{'; '.join(faults)}; inertia is {100 * self._inertia:.2g} % of the force"
+            springs = max((abs(c) for axis, c in zip("XY", (xx, yy)) if axis not in silent), default=_SOFT)
+            missing = self.rig.mass * self._omega**2 * springs * _NANOMETRE if silent else 0.0
+            grave = max(self._inertia, missing) > HARMLESS
+            name = "accelerometers-contradict-cells" if grave else "accelerometers-doubtful"
+            return (Condition(name, text),)
+        if abs(loss) < _LOSS + 3 * error[3]:
+            return ()
+        late = "cells" if loss < 0 else "accelerometers"
+        lag = 1e3 * abs(loss) / self._omega
+        text = (
+            f"{np.degrees(abs(loss)):.1f} deg, as if the {late} were {lag:.2g} ms late or behind a filter; between "
+            "springs and their housing there is none. State `delay` or `filter` of the channels"
+        )
+        return (Condition("cells-and-accelerometers-out-of-phase", text),)
+
+    def lag_of_cells(self, fitted: Fitted) -> float:
+        """By how much the cells come late [s]: a spring's loss is positive, late cells make it negative."""
+        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+            return 0.0
+        loss, error = float(fitted.value[3]), float(fitted.deviation[3])
+        return -loss / self._omega if loss < -2 * error else 0.0
+
+    def words(self, fitted: Fitted) -> tuple[str, ...]:
+        """Springs under the housing."""
+        if self.rig.mount != "cells":
+            return ()
+        return tuple(
+            f"{p.name} of the cells {fitted.value[k]:.3g} {p.unit} (standard error {fitted.deviation[k]:.2g})"
+            for k, p in enumerate(self.parameters)
+            if fitted.estimated[k]
+        )
+
+
+def _inertia_share(rig: Rig, blocks: Blocks) -> float:
+    """Median share of the housing's inertia in the force."""
+    if len(rig.of("acceleration")) < 2:
+        return 0.0
+    inertia = rig.mass * np.linalg.norm(blocks.z[:, rig.of("acceleration")], axis=1)
+    force = np.linalg.norm(blocks.z[:, rig.of("force")], axis=1)
+    told = force > 0
+    return float(np.median(inertia[told] / force[told])) if told.any() else 0.0

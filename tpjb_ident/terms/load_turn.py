@@ -1,0 +1,84 @@
+"""How the coefficients turn with the static load's direction, learnt from the runs' own misses.
+
+The load's direction misses its set point by some tenths of a degree, differently in every run, and the cells tell by
+how much. The cross-coupled coefficients follow it by about the direct stiffness per radian. One point's runs cannot
+tell dH / d alpha; those of a campaign together can, since relative to the direct coefficients it depends on load alone,
+and weakly::
+
+    dH / d alpha = k (Sk + ln(W / W0) Sk') + i omega c (Sc + ln(W / W0) Sc')
+
+with k, omega c the mean direct coefficients of the point and four real 2 x 2 matrices a load direction and speed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.term import Additive, Parameter
+
+#: Plausible of a bearing: relative slope [1/rad], and its change per unit of ln W, one standard deviation.
+PLAUSIBLE = (1.5, 0.75)
+#: Numbers of a load direction: Sk and Sc, and their change over load.
+_SLOPES, _NUMBERS = 8, 16
+
+
+class LoadTurn(Additive):
+    """Sk, Sc, Sk', Sc' of every load direction and speed."""
+
+    name = "load direction"
+    always_estimated = True
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        keys = [(p.static_load_direction_deg, p.shaft_speed_hz) for p in blocks.points]
+        self.families = list(dict.fromkeys(keys))
+        self._family = np.array([self.families.index(key) for key in keys])
+        self._log_load = np.log(np.maximum([p.static_load for p in blocks.points], 1e-9))
+        self._middle = np.array([self._log_load[self._family == k].mean() for k in range(len(self.families))])
+        if not np.any(blocks.miss.imag):
+            return
+        parameters = []
+        for direction, _ in self.families:
+            deviations = [PLAUSIBLE[0]] * _SLOPES + [PLAUSIBLE[1]] * (_NUMBERS - _SLOPES)
+            parameters += [Parameter(f"{direction:g} deg, {i}", "1/rad", dev) for i, dev in enumerate(deviations)]
+        self.parameters = tuple(parameters)
+
+    def per_radian(self, blocks: Blocks, state: State) -> ComplexArray:
+        """Readings of a load turned by one radian, (n, m + 2, q)."""
+        h, d = state.h[blocks.point], state.u[:, :2]
+        direct = np.stack([np.abs(h.real[:, [0, 1], [0, 1]]).mean(1), np.abs(h.imag[:, [0, 1], [0, 1]]).mean(1)])
+        force = np.zeros((len(blocks), 2, _NUMBERS), complex)
+        log_load = self._log_load[blocks.point] - self._middle[self._family[blocks.point]]
+        for i in range(_SLOPES):
+            size = direct[0] if i < 4 else 1j * direct[1]
+            force[:, i % 4 // 2, i] = size * d[:, i % 2]
+            force[:, i % 4 // 2, i + _SLOPES] = log_load * force[:, i % 4 // 2, i]
+        rows = film_force_rows(self.rig, blocks, state, force)
+        columns = np.zeros((*rows.shape[:2], _NUMBERS * len(self.families)), complex)
+        for k in range(len(self.families)):
+            mine = self._family[blocks.point] == k
+            columns[mine, :, _NUMBERS * k : _NUMBERS * (k + 1)] = rows[mine]
+        return columns
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """Readings per unit of every number, each run turned by its own miss."""
+        return self.per_radian(blocks, state) * blocks.miss.imag[:, None, None]
+
+    def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
+        """DH / d alpha times the run's own miss."""
+        h = state.h[blocks.point]
+        k = np.abs(h.real[:, [0, 1], [0, 1]]).mean(axis=1)
+        c = np.abs(h.imag[:, [0, 1], [0, 1]]).mean(axis=1)
+        numbers = value.reshape(len(self.families), 4, 2, 2)[self._family[blocks.point]]
+        log_load = (self._log_load[blocks.point] - self._middle[self._family[blocks.point]])[:, None, None]
+        stiffness = numbers[:, 0] + log_load * numbers[:, 2]
+        damping = numbers[:, 1] + log_load * numbers[:, 3]
+        slope = k[:, None, None] * stiffness + 1j * c[:, None, None] * damping
+        return np.asarray(blocks.miss.imag[:, None, None] * slope)
+
+    def turned(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
+        """Readings of a load turned by one radian with the numbers (q,) found, (n, m + 2)."""
+        return np.asarray(self.per_radian(blocks, state) @ value)

@@ -1,0 +1,30 @@
+"""All terms of the measurement equation, in the order of the budget: a new term is one file and its name here."""
+
+from __future__ import annotations
+
+from tpjb_ident.estimate.term import Term
+from tpjb_ident.terms.amplitude import Amplitude
+from tpjb_ident.terms.axis import Axis
+from tpjb_ident.terms.clock import Clock
+from tpjb_ident.terms.delay import Delay
+from tpjb_ident.terms.gain import Gain
+from tpjb_ident.terms.housing import Housing
+from tpjb_ident.terms.load import Load
+from tpjb_ident.terms.load_turn import LoadTurn
+from tpjb_ident.terms.mass import Mass
+from tpjb_ident.terms.shaft import Shaft
+from tpjb_ident.terms.temperature import Temperature
+
+TERMS: tuple[type[Term], ...] = (
+    Gain,
+    Temperature,
+    Axis,
+    Delay,
+    Clock,
+    Mass,
+    Housing,
+    Shaft,
+    LoadTurn,
+    Load,
+    Amplitude,
+)

@@ -1,0 +1,49 @@
+"""Drift of probes' gains with temperature, as far as the manifest states how well their coefficients are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+
+#: Parts in a thousand per kelvin, the unit of a coefficient in the solve.
+_UNIT = 1e-3
+
+
+class Temperature(Factor):
+    """A sensor reads more by its coefficient for every kelvin away from the reference."""
+
+    name = "temperature"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        known = np.isfinite(blocks.temperature)
+        self._reference = float(blocks.temperature[known].mean()) if known.any() else 0.0
+        uncertain = [j for j, sensor in enumerate(rig.sensors) if sensor.temperature_coefficient_uncertainty]
+        self._rows = uncertain if known.any() else []
+        self.parameters = tuple(
+            Parameter(rig.sensors[j].name, "1e-3/K", rig.sensors[j].temperature_coefficient_uncertainty / _UNIT)
+            for j in self._rows
+        )
+
+    def exponent(self, blocks: Blocks) -> ComplexArray:
+        """Kelvins away from the reference, in the sensor's own row."""
+        away = np.nan_to_num(blocks.temperature - self._reference)
+        return _UNIT * away[:, None, None] * np.eye(len(self.rig))[:, self._rows].astype(complex)
+
+    def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """Drifts beyond what is stated."""
+        if not beyond(fitted, self.parameters):
+            return ()
+        return (Condition("probes-drift", "; ".join(self.words(fitted))),)
+
+    def words(self, fitted: Fitted) -> tuple[str, ...]:
+        """Drifts that the records tell."""
+        return tuple(
+            f"{p.name} reads {fitted.value[k] / 10:+.3f} % more per K (standard error {fitted.deviation[k] / 10:.3f} %)"
+            for k, p in enumerate(self.parameters)
+            if fitted.estimated[k]
+        )
