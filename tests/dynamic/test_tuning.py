@@ -199,6 +199,7 @@ def test_a_drift_counts_once_it_turns_a_window_or_is_clear_of_the_noise(share, f
 
 
 N = 4096
+NONE = np.empty(0)
 TIME = np.arange(N) / RATE
 
 
@@ -217,12 +218,14 @@ def heard(force=(), displacement=(), noise=1e-4):
 
 def fitted(rows):
     """The record in one fit, and as a run of one window."""
-    record = fitted_whole(Samples(rows, None, None), RATE, LINES, LINES.frequencies)
-    return record, in_channels(record.fit.z, record.fit.scale, np.zeros(1), N / RATE, np.full(1, 22.0))
+    frequencies = np.array([line.frequency for line in LINES.whole])
+    record = fitted_whole(Samples(rows, None, None), RATE, LINES, frequencies, [0, 1, 2, 3])
+    windows = record.z[None, : len(LINES.frequencies)]
+    return (record,), in_channels(windows, np.full((1, 4), 1e-3), np.zeros(1), N / RATE, np.full(1, 22.0))
 
 
 def lines_in(*args, **keywords):
-    return unexpected_lines(*fitted(heard(*args, **keywords)))
+    return unexpected_lines(*fitted(heard(*args, **keywords)), NONE)
 
 
 def test_lines_that_nobody_mentioned_are_found_in_either_quantity():
@@ -251,14 +254,14 @@ def test_glitches_and_slow_movements_hide_no_line_and_make_none():
     rows = heard([(61.3, 0.02)])
     rows[:, 1000:1003] += 5.0
     rows += 2.0 * (TIME - 1.5) ** 3
-    extra, _ = unexpected_lines(*fitted(rows))
+    extra, _ = unexpected_lines(*fitted(rows), NONE)
     np.testing.assert_allclose(extra, [61.3], atol=0.02)
     rows[2, 17] = np.nan
     rows[:2] += 0.1 * np.cos(2 * math.pi * 36.4 * TIME)
-    np.testing.assert_allclose(unexpected_lines(*fitted(rows))[0], [36.4, 61.3], atol=0.02)
+    np.testing.assert_allclose(unexpected_lines(*fitted(rows), NONE)[0], [36.4, 61.3], atol=0.02)
     record, result = fitted(heard([], [(61.3, 0.02)]))
     empty = replace(result, z=result.z * np.array([np.nan, np.nan, 1.0, 1.0]))
-    assert unexpected_lines(record, empty) == ((), ())
+    assert unexpected_lines(record, empty, NONE) == ((), ())
 
 
 def test_a_second_harmonic_on_the_excitation_is_told():

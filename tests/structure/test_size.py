@@ -15,7 +15,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (130.9, 15_920),
+    "measurement": (134.7, 16_290),
     "model": (90.9, 12_050),
     "rigdata": (69.9, 9_540),
     "diagnosis": (42.6, 5_220),

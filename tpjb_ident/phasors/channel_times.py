@@ -4,35 +4,17 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.calibration import Channel
+from rigdata.device import Device
+from rigdata.problem import refuse
 from rigdata.run import Run
+from rigdata.vector import inverse_directions
 from tpjb_ident.phasors.run_data import QUANTITIES
-
-
-@dataclass(frozen=True)
-class DeviceChannels:
-    """Channels of one device: one rate, one row of times."""
-
-    name: str
-    channels: tuple[Channel, ...]  #: with a direction, of displacement, force, acceleration in this order
-    tachometer: Channel | None
-    rate: float
-    length: int
-
-    @property
-    def groups(self) -> list[slice]:
-        """Channels of one quantity: so few stay in a core's cache while they are fitted."""
-        quantities = [c.quantity for c in self.channels]
-        groups, first = [], 0
-        for _, members in itertools.groupby(quantities):
-            count = len(list(members))
-            groups.append(slice(first, first + count))
-            first += count
-        return groups
 
 
 @dataclass(frozen=True)
@@ -44,32 +26,91 @@ class Samples:
     speed: FloatArray | None  #: (n,), rad/s, by tachometer
 
 
-def vector_channels_of(run: Run) -> tuple[Channel, ...]:
-    """Channels with a direction; refused where a quantity's do not span the plane."""
-    directed = [c for c in run.channels.values() if c.axis is not None]
+@dataclass(frozen=True)
+class DeviceReader:
+    """Channels of one device: one rate, one row of times."""
+
+    run: Run
+    device: Device
+    channels: tuple[Channel, ...]  #: with a direction, of displacement, force, acceleration in this order
+    tachometer: Channel | None
+    rate: float
+    length: int
+
+    @property
+    def groups(self) -> list[slice]:
+        """Channels of one quantity: so few stay in a core's cache while they are fitted."""
+        groups, first = [], 0
+        for _, members in itertools.groupby(c.quantity for c in self.channels):
+            count = len(list(members))
+            groups.append(slice(first, first + count))
+            first += count
+        return groups
+
+    def read(self, start: int, stop: int) -> Samples:
+        """Samples start..stop-1."""
+        tachometer = [] if self.tachometer is None else [self.tachometer.name]
+        time, rows = self.run.read_device(self.device, [c.name for c in self.channels] + tachometer, start, stop)
+        return Samples(rows[: len(self.channels)], time, rows[-1] if tachometer else None)
+
+    @cached_property
+    def stamps(self) -> FloatArray | None:
+        """Times of all samples [s]; None where they are counted."""
+        if self.device.counted:
+            return None
+        parts = [self.read(k, min(k + 2**17, self.length)).time for k in range(0, self.length, 2**17)]
+        return np.concatenate([part for part in parts if part is not None])
+
+    def first_samples(self, start: FloatArray) -> IntArray:
+        """First sample at or after each of some times (n,) [s]."""
+        if self.stamps is None:
+            return np.ceil(start * self.rate - 1e-6).astype(int)
+        return np.searchsorted(self.stamps, start - 1e-6 / self.rate)
+
+    def shows(self, frequencies: FloatArray) -> np.ndarray:
+        """Which frequencies [Hz] its rate can show, (n,)."""
+        return np.asarray(frequencies < 0.45 * self.rate)
+
+
+def device_readers(run: Run) -> tuple[DeviceReader, ...]:
+    """Devices of a run that have channels with a direction, that of the first displacement channel first."""
+    _check_directions(run)
+    directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
+    tachometers = [c for c in run.channels.values() if c.quantity == "speed"][:1]
+    devices = _devices(run)
+    for name in directed.keys() - {name for device in devices for name in device.channels}:
+        run.record(name, 0, 0)  # says that the file lacks it
+    readers = []
+    for device in devices:
+        channels = tuple(c for name, c in directed.items() if name in device.channels)
+        own = [c for c in tachometers if c.name in device.channels]
+        rate = device.rate if np.isfinite(device.rate) else run.sample_rate
+        # of a run that ends early all devices do
+        length = min(device.length, int(np.ceil(run.length / run.sample_rate * rate)))
+        if channels:
+            readers.append(DeviceReader(run, device, channels, own[0] if own else None, rate, length))
+    return tuple(readers)
+
+
+def _devices(run: Run) -> tuple[Device, ...]:
+    if hasattr(run.reader, "devices"):
+        return run.devices
+    counted = getattr(run.reader, "counted", None)
+    return (Device("", tuple(run.channels), run.sample_rate, run.length, counted is not None and counted()),)
+
+
+def _check_directions(run: Run) -> None:
+    """Refuse a run whose channels of a quantity do not span the plane."""
     for quantity in QUANTITIES:
-        if quantity != "acceleration" or any(c.quantity == quantity for c in run.channels.values()):
-            run.vector(quantity, 0, 0)  # says what is missing
-    return tuple(c for quantity in QUANTITIES for c in directed if c.quantity == quantity)
-
-
-class ChannelReader:
-    """Reads the channels of a run device by device."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-        self.channels = vector_channels_of(run)
-        tachometers = [c for c in run.channels.values() if c.quantity == "speed"]
-        tachometer = tachometers[0] if tachometers else None
-        self.devices = (DeviceChannels("", self.channels, tachometer, run.sample_rate, run.length),)
-        counted = getattr(run.reader, "counted", None)
-        self._counted = counted is not None and counted()
-
-    def read(self, device: DeviceChannels, start: int, stop: int) -> Samples:
-        """Samples start..stop-1 of a device."""
-        wanted = [*device.channels, *([] if device.tachometer is None else [device.tachometer])]
-        readings = self._run.reader.read([c.name for c in wanted], start, stop)
-        values = [channel.to_si(reading) for channel, reading in zip(wanted, readings, strict=True)]
-        speed = None if device.tachometer is None else values.pop()
-        time = None if self._counted else self._run.reader.time(start, stop)
-        return Samples(np.array(values), time, speed)
+        described = [c for c in run.channels.values() if c.quantity == quantity]
+        if quantity == "acceleration" and not described:
+            continue
+        chosen = [c for c in described if c.axis is not None]
+        remedy = f"Describe two {quantity} channels with different axes in the manifest"
+        if len(chosen) < 2:
+            fault = f"has {len(chosen)} channels, two are needed"
+            raise refuse(run.file, f"quantity {quantity}", fault, remedy, run.id)
+        if np.isnan(inverse_directions(tuple(float(c.axis or 0.0) for c in chosen))).any():
+            names = ", ".join(c.name for c in chosen)
+            remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
+            raise refuse(run.file, f"channels {names}", "all measure along one line", remedy, run.id)

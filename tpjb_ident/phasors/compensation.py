@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.channel_times import device_readers
+from tpjb_ident.phasors.filled import SlowerChannel, slower_condition
 from tpjb_ident.phasors.lines import LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 
@@ -32,43 +33,19 @@ _LOOK = 2**14
 _CLIPPED = 0.05
 
 
-@dataclass(frozen=True)
-class SlowerChannel:
-    """How a channel was filled up."""
-
-    rate: float
-    export_rate: float
-    held: bool
-
-    def at(self, frequency: FloatArray) -> ComplexArray:
-        """What the filling does to a sine of `frequency` (n,) [Hz]: sinc^2 for lines, sinc and half a step for steps.
-
-        Where the rates divide evenly the sums over the samples of a period take the place of the integrals.
-        """
-        f = np.asarray(frequency, dtype=float)
-        ratio = self.export_rate / self.rate
-        even = abs(ratio - round(ratio)) < 1e-6 * ratio
-        small = np.sin(np.pi * f / self.export_rate) * ratio if even else np.pi * f / self.rate
-        gain = np.where(f > 0, np.sin(np.pi * f / self.rate) / np.where(f > 0, small, 1.0), 1.0)
-        if not self.held:
-            return np.asarray(gain**2, dtype=complex)
-        late = 0.5 / self.rate - (0.5 / self.export_rate if even else 0.0)
-        return np.asarray(gain * np.exp(-2j * np.pi * f * late))
-
-
 def compensated(result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
     """The run's phasors as channels without filters and delays would have given them."""
     gains = channel_gains(run, result.channels, slower, result.lines)
-    return result if gains is None else result.with_phasors(result.z / gains)
+    return result if gains is None else result.divided(gains)
 
 
 def channel_gains(
     run: Run, channels: Sequence[Channel], slower: Mapping[str, SlowerChannel], lines: LineSet
 ) -> ComplexArray | None:
-    """What channels made of a sine of size one at every line, (n_lines, n_channels); None where nothing."""
+    """What channels made of a sine of size one at every line, (n_whole_lines, n_channels); None where nothing."""
     if not any(c.response or c.name in slower for c in channels):
         return None
-    frequencies = lines.frequencies
+    frequencies = np.array([line.frequency for line in lines.whole])
     gains = np.ones((len(frequencies), len(channels)), dtype=complex)
     for k, channel in enumerate(channels):
         if channel.response:
@@ -106,7 +83,7 @@ def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | 
             continue
         rate = _rhythm(bent.astype(float), export_rate, held)
         if rate is not None:
-            return SlowerChannel(rate, export_rate, held)
+            return SlowerChannel(rate, export_rate, 1 if held else 2)
     return None
 
 
@@ -163,10 +140,19 @@ def inspect_readings(run: Run) -> tuple[dict[str, SlowerChannel], tuple[Conditio
             slower[name] = slow
     if clipped:
         raise RigDataError(clipped)
-    if not slower:
-        return {}, ()
-    rates = ", ".join(f"{n} {'held' if s.held else 'interpolated'} from {s.rate:.4g} Hz" for n, s in slower.items())
-    return slower, (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
+    return slower, slower_condition(slower)
+
+
+def refuse_clipped(run: Run) -> None:
+    """Refuse a run in which a channel was driven into its limits: what was cut off cannot be had back."""
+    clipped: list[Problem] = []
+    for reader in device_readers(run):
+        rows = reader.read(0, min(reader.length, _LOOK)).rows
+        for channel, values in zip(reader.channels, rows):
+            if channel.quantity != "acceleration":
+                clipped += _clipped(run, channel.name, (values - channel.zero) / channel.slope)
+    if clipped:
+        raise RigDataError(clipped)
 
 
 def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:

@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.whole_record import WholeRecord
+from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude
 
 #: A line stands this many times above the noise floor around it,
 _PROMINENCE = 15.0
@@ -26,8 +26,13 @@ MAX_LINES = 10
 _LOBE = 4.0
 
 
-def unexpected_lines(record: WholeRecord, result: RunPhasors) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
-    """Frequencies of lines beside those of the windows [Hz], and what to say about the ones that nobody expects."""
+def unexpected_lines(
+    records: tuple[WholeRecord, ...], result: RunPhasors, images: FloatArray
+) -> tuple[tuple[float, ...], tuple[Condition, ...]]:
+    """Frequencies of lines beside those of the windows [Hz], and what to say about the ones that nobody expects.
+
+    `images` (m,): frequencies at which lines stand that are none [Hz].
+    """
     whole = np.array([line.frequency for line in result.lines.whole])
     frequencies: list[float] = []
     for quantity in ("force", "displacement"):
@@ -35,14 +40,17 @@ def unexpected_lines(record: WholeRecord, result: RunPhasors) -> tuple[tuple[flo
         sizes = np.linalg.norm(result.z[:, : len(result.lines.excitation)][:, :, places], axis=2)
         if np.isfinite(sizes).any():
             smallest = MIN_SHARE * float(np.nanmedian(sizes))
-            frequencies += _peaks(record, places, np.append(whole, frequencies), smallest)
+            for record in records:
+                columns = [k for k, place in enumerate(record.places) if place in places]
+                if columns:
+                    frequencies += _peaks(record, columns, np.append(whole, frequencies), smallest)
     top = REACH * max(line.frequency for line in result.lines.excitation)
-    extra = tuple(sorted(f for f in frequencies if f < top))[:MAX_LINES]
-    strange = [f for f in extra if f not in whole]
-    if not strange:
-        return extra, ()
-    listed = ", ".join(f"{f:.4g}" for f in strange)
-    conditions = [Condition("unexpected lines", f"lines at {listed} Hz; fitted along")]
+    apart = _LOBE / records[0].duration
+    frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > apart]
+    strange = tuple(sorted(f for f in frequencies if f not in whole))[:MAX_LINES]
+    if not strange:  # what leaks from lines that nobody expects makes faint ones stand out
+        return tuple(sorted(set(frequencies))), ()
+    conditions = [lines_beside(strange)]
     for line in result.lines.excitation:
         coincident = [f for f in strange if abs(2 * f - line.frequency) < 0.05]
         if coincident:
@@ -52,16 +60,18 @@ def unexpected_lines(record: WholeRecord, result: RunPhasors) -> tuple[tuple[flo
                     f"the second harmonic of the line at {coincident[0]:.4g} Hz falls on the excitation",
                 )
             )
-    return extra, tuple(conditions)
+    return strange, tuple(conditions)
 
 
-def _peaks(record: WholeRecord, places: list[int], known: FloatArray, smallest: float) -> list[float]:
+def lines_beside(frequencies: tuple[float, ...]) -> Condition:
+    """What to say of lines that nobody expects."""
+    listed = ", ".join(f"{f:.4g}" for f in frequencies)
+    return Condition("unexpected lines", f"lines at {listed} Hz; fitted along")
+
+
+def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest: float) -> list[float]:
     """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
-    bins = np.nan_to_num(record.spectrum[:, places])
-    # Hann's window, as a sum of neighbours
-    windowed = np.zeros(bins.shape)
-    windowed[1:-1] = np.abs(bins[1:-1] - 0.5 * (bins[:-2] + bins[2:]))
-    amplitude = np.linalg.norm(windowed, axis=1)
+    amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     floor = median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest")
     step = 1 / record.duration
     frequency = np.arange(len(amplitude)) * step
@@ -74,7 +84,7 @@ def _peaks(record: WholeRecord, places: list[int], known: FloatArray, smallest: 
     candidate[[0, -1]] = False
     peaks = [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
     faint = record.lines.faint
-    sizes = np.linalg.norm(record.fit.z[0, len(record.lines.whole) - len(faint) :, places], axis=0)
+    sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)
     return peaks + [line.frequency for line, size, limit in zip(faint, sizes, least[at]) if size > limit]
 

@@ -117,14 +117,15 @@ def _shaft_line(result: RunPhasors) -> int | None:
     return len(result.lines.excitation) + names.index("1X") if "1X" in names else None
 
 
-def _shaft_slip(result: RunPhasors, rate: float) -> float:
+def _shaft_slip(result: RunPhasors, rate: float, places: list[int] | None = None) -> float:
     index = _shaft_line(result)
-    return 0.0 if index is None else _line_slip(result, index, rate)
+    return 0.0 if index is None else _line_slip(result, index, rate, places)
 
 
-def _line_slip(result: RunPhasors, line: int, rate: float) -> float:
-    """Frequency error of a line by all channels together, each weighted by its power over its noise [Hz]."""
-    z, noise = result.z[:, line], usual_scale(result.scale) / np.sqrt(result.length * rate)
+def _line_slip(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> float:
+    """Frequency error of a line by some channels together, each weighted by its power over its noise [Hz]."""
+    chosen = slice(None) if places is None else places
+    z, noise = result.z[:, line, chosen], usual_scale(result.scale[:, chosen]) / np.sqrt(result.length * rate)
     present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
     if not present.any():
         return 0.0
@@ -133,13 +134,13 @@ def _line_slip(result: RunPhasors, line: int, rate: float) -> float:
     return frequency_slip(z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny), result.start, 1.0)
 
 
-def exact_frequencies(result: RunPhasors, rate: float) -> FloatArray:
-    """Frequencies of the whole record's lines as the windows' phases show them, (n_whole_lines,) [Hz]."""
-    turning = _shaft_slip(result, rate)
+def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> FloatArray:
+    """Frequencies of the whole record's lines by the clock of some channels, (n_whole_lines,) [Hz]."""
+    turning = _shaft_slip(result, rate, places)
     frequencies = np.array([line.frequency + turning * line.order for line in result.lines.whole])
     for k, line in enumerate(result.lines.whole):
         if line.name in ("excitation", "mains"):
-            frequencies[k] += _line_slip(result, k, rate)
+            frequencies[k] += _line_slip(result, k, rate, places)
     return frequencies
 
 

@@ -92,6 +92,18 @@ def joined_windows(parts: list[WindowFit]) -> WindowFit:
     return WindowFit(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
+def joined_channels(fits: list[WindowFit]) -> WindowFit:
+    """Channels of the same windows side by side."""
+    z = np.concatenate([fit.z for fit in fits], axis=2)
+    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=1) for n in ("mean", "scale", "lost")))
+
+
+def no_windows(count: int, lines: int, channels: int) -> WindowFit:
+    """Windows of which nothing was recorded."""
+    none = np.full((count, channels), np.nan)
+    return WindowFit(np.full((count, lines, channels), np.nan + 0j), none, none.copy(), np.ones((count, channels)))
+
+
 class LineFitter:
     """Joint fit of lines and a drift on equal windows of an even grid: one pseudo-inverse for all of them."""
 

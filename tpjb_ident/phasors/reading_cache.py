@@ -80,7 +80,8 @@ def with_kept_beginning(run: Run) -> Run:
     """The run with its beginning kept."""
     if isinstance(run.reader, _ReadingCache | _Beginning):
         return run
-    names = [name for name, channel in run.channels.items() if channel.quantity != "time"]
+    apart: frozenset[str] = getattr(run.reader, "apart", frozenset)()
+    names = [name for name, c in run.channels.items() if c.quantity != "time" and name not in apart]
     return replace(run, reader=_ReadingCache(run.reader, names))
 
 

@@ -118,10 +118,25 @@ class RunPhasors:
 
     def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
         """The run without delays of whole quantities."""
-        if not any(delays.values()):
-            return self
+        return self.divided(self._late(delays)) if any(delays.values()) else self
+
+    def _late(self, delays: Mapping[str, float]) -> ComplexArray:
+        frequencies = np.array([line.frequency for line in self.lines.whole])
         late = np.array([delays.get(c.quantity, 0.0) for c in self.channels])
-        return replace(self, z=self.z * np.exp(2j * np.pi * np.multiply.outer(self.lines.frequencies, late)))
+        return np.exp(-2j * np.pi * np.multiply.outer(frequencies, late))
+
+    def divided(self, gains: ComplexArray) -> RunPhasors:
+        """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
+        residual = tuple(bins / gain for bins, gain in zip(self.residual, gains))
+        record = self.record / gains if len(self.record) else self.record
+        return replace(self, z=self.z / gains[: self.z.shape[1]], record=record, residual=residual)
+
+    def with_record(
+        self, record: ComplexArray, residual: tuple[ComplexArray, ...], delays: Mapping[str, float]
+    ) -> RunPhasors:
+        """The run with phasors and residual of its whole record, without delays of whole quantities."""
+        late = self._late(delays)
+        return replace(self, record=record / late, residual=tuple(bins / gain for bins, gain in zip(residual, late)))
 
     def oil_force(self, line: int = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N]."""

@@ -13,15 +13,17 @@ import numpy as np
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, inspect_readings
-from tpjb_ident.phasors.extra_lines import unexpected_lines
+from tpjb_ident.phasors.compensation import compensated, refuse_clipped
+from tpjb_ident.phasors.extra_lines import lines_beside, unexpected_lines
 from tpjb_ident.phasors.extraction import extract
+from tpjb_ident.phasors.filled import filled_channels, slower_condition
 from tpjb_ident.phasors.frequency import DRIFT, retuned, tuned
-from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.lines import LineSet, known_lines
+from tpjb_ident.phasors.near_lines import near_line
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
-from tpjb_ident.phasors.shaft import shaft_speed
-from tpjb_ident.phasors.whole_record import whole_record
+from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed
+from tpjb_ident.phasors.whole_record import WholeRecord, record_phasors, residual_beside, whole_records
 from tpjb_ident.phasors.windows import RecordTooShortError
 
 
@@ -33,59 +35,98 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         cure = "Excite with sines, or leave the run out"
         raise RigDataError(Problem("error", run.file, "excitation", text, cure, run.id))
     run = with_kept_beginning(run)
-    slower, conditions = inspect_readings(run)
-    result = compensated(_fitted(run, housing_mass, settings), run, slower)
-    return replace(result, conditions=merged(result.conditions, conditions)) if conditions else result
-
-
-def _fitted(run: Run, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
-    """The run's phasors as recorded."""
-    if run.length <= SHORT:
-        return _inspected(run, housing_mass, settings)
-    try:
-        first = _inspected(beginning_of(run, SHORT), housing_mass, settings)
-    except RecordTooShortError:  # the beginning is not enough; all of it may be
-        return _inspected(run, housing_mass, settings)
-    lines, conditions = (
-        first.lines,
-        tuple(c for c in first.conditions if c not in first.lines.conditions and c != DRIFT),
+    refuse_clipped(run)
+    inspection = _inspected(run, housing_mass, settings)
+    result, slower = inspection.result, inspection.slower
+    if inspection.run.length < run.length:
+        result = _continued(run, inspection, settings)
+    device = tuple(
+        f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    result = extract(run, housing_mass, settings, lines)
-    driven = settings.excitation_lines or (run.point.excitation_hz,)
-    better = tuned(run, result, driven, lines.speed, settings)
+    conditions = merged(result.conditions, slower_condition(slower))
+    return compensated(replace(result, conditions=conditions, device=device), run, slower)
+
+
+def _inspected(run: Run, housing_mass: float, settings: PhasorSettings) -> _Inspection:
+    """Inspection of a run, of the beginning of a long one."""
+    if run.length > SHORT:
+        try:
+            return _Inspection(beginning_of(run, SHORT), housing_mass, settings)
+        except RecordTooShortError:  # the beginning is not enough; all of it may be
+            pass
+    return _Inspection(run, housing_mass, settings)
+
+
+def _continued(run: Run, inspection: _Inspection, settings: PhasorSettings) -> RunPhasors:
+    """All of a long run, with the lines of its beginning."""
+    first, mass = inspection.result, inspection.result.housing_mass
+    lines = first.lines
+    conditions = tuple(c for c in first.conditions if c not in lines.conditions and c != DRIFT)
+    result = extract(run, mass, settings, lines)
+    better = tuned(run, result, inspection.driven, lines.speed, settings)
     if better is not None:
         conditions = merged(conditions, better.conditions)
         quick = retuned(result, better.lines) if better.follow is None else None
-        result = quick or extract(run, housing_mass, settings, better.lines, better.follow)
+        result = quick or extract(run, mass, settings, better.lines, better.follow)
     # the noise of a phasor of the whole record is less than that of its beginning
-    share = np.sqrt(SHORT / run.length)
+    share = np.sqrt(inspection.run.length / run.length)
     residual = tuple(share * bins for bins in first.residual)
-    return replace(
-        result, conditions=merged(conditions, result.lines.conditions), record=first.record, residual=residual
-    )
+    conditions = merged(conditions, result.lines.conditions)
+    return replace(result, conditions=conditions, record=first.record, residual=residual)
 
 
-def _inspected(run: Run, housing_mass: float, settings: PhasorSettings) -> RunPhasors:
-    """Fit, look for lines that nobody mentioned and for wrong frequencies, fit again where there are any."""
-    speed, conditions = shaft_speed(run)
-    driven = settings.excitation_lines or (run.point.excitation_hz,)
-    duration = run.length / run.sample_rate
-    lines = known_lines(driven, speed, run.sample_rate, settings.lines, (), duration)
-    result = extract(run, housing_mass, settings, lines)
-    record = whole_record(run, result)
-    extra, unexpected = unexpected_lines(record, result) if settings.find_lines else ((), ())
-    if extra:
-        conditions += unexpected
-        lines = known_lines(driven, speed, run.sample_rate, settings.lines, extra, duration)
-        result = extract(run, housing_mass, settings, lines)
-    better = tuned(run, result, driven, speed, settings)
-    if better is not None:
-        conditions += better.conditions
-        result = extract(run, housing_mass, settings, better.lines, better.follow)
-    if result.lines is not record.lines:
-        record = whole_record(run, result)
-    residual = tuple(record.beside(i) for i in range(len(result.lines.excitation)))
-    return replace(result, conditions=conditions + result.lines.conditions, record=record.fit.z[0], residual=residual)
+class _Inspection:
+    """Fit of a record: lines that nobody mentioned are looked for, wrong frequencies put right, and fitted again."""
+
+    result: RunPhasors
+    records: tuple[WholeRecord, ...]
+
+    def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
+        self.run, self.mass, self.settings = run, housing_mass, settings
+        self.driven = settings.excitation_lines or (run.point.excitation_hz,)
+        speed, self.conditions = shaft_speed(run)
+        self._fit(self._lines(self.driven, speed, ()), None)
+        self.slower = filled_channels(self.records, self.result)
+        if settings.find_lines:
+            self._add_unexpected(speed)
+        better = tuned(run, self.result, self.driven, speed, settings)
+        if better is not None:
+            self.conditions += better.conditions
+            self._fit(better.lines, better.follow)
+        if settings.find_lines:
+            self._add_near()
+        channels, lines = len(self.result.channels), self.result.lines
+        residual = tuple(residual_beside(self.records, i, channels) for i in range(len(lines.excitation)))
+        result = replace(self.result, conditions=self.conditions + lines.conditions)
+        self.result = result.with_record(record_phasors(self.records, channels), residual, settings.delays)
+
+    def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
+        rate = self.run.sample_rate
+        return known_lines(excitation, speed, rate, self.settings.lines, extra, self.run.length / rate)
+
+    def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+        self.follow: ShaftCourse | None = follow
+        self.result = extract(self.run, self.mass, self.settings, lines, follow)
+        self.records = whole_records(self.run, self.result)
+
+    def _add_unexpected(self, speed: float) -> None:
+        """Fit lines along that stand out of the residual, but for the images of what was filled up."""
+        images = [slow.images(self.result.lines.frequencies) for slow in self.slower.values()]
+        extra, conditions = unexpected_lines(self.records, self.result, np.ravel(images))
+        if extra:
+            self.conditions += conditions
+            self._fit(self._lines(self.driven, speed, extra), None)
+
+    def _add_near(self) -> None:
+        """Fit lines along that no window tells from the excitation."""
+        lines = self.result.lines
+        near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
+        beside = tuple(frequency for frequency in near if frequency is not None)
+        if beside:
+            found = tuple(line.frequency for line in lines.nuisance if line.name == "found")
+            exact = tuple(line.frequency for line in lines.excitation)
+            self._fit(self._lines(exact, lines.speed, (*found, *beside)), self.follow)
+            self.conditions += (lines_beside(beside),)
 
 
 __all__ = ["PhasorSettings", "RunPhasors", "run_phasors"]

@@ -13,9 +13,9 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
-from tpjb_ident.phasors.channel_times import ChannelReader, Samples
+from tpjb_ident.phasors.channel_times import Samples, device_readers
 from tpjb_ident.phasors.frequency import exact_frequencies
-from tpjb_ident.phasors.line_fit import LineFitter, WindowFit
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 
@@ -32,7 +32,9 @@ class WholeRecord:
     """One device's record, fitted as one window."""
 
     lines: LineSet
-    fit: WindowFit  #: of one window
+    places: tuple[int, ...]  #: of its channels among those of the run
+    z: ComplexArray  #: (n_whole_lines, n_channels): NaN where the rate does not show a line
+    used: FloatArray  #: (n_channels,): share of the samples that are neither missing nor bad
     residual: FloatArray  #: (n_channels, n), SI: bad samples are zero
     rate: float
     start: float
@@ -45,35 +47,64 @@ class WholeRecord:
     @cached_property
     def spectrum(self) -> ComplexArray:
         """Amplitudes of the residual with phases from t = 0, (n_bins, n_channels), a bin every 1 / duration."""
-        used = self.residual.shape[1] * (1 - self.fit.lost[0])
-        bins = np.fft.rfft(self.residual, axis=1).T * (2 / np.where(used > 0, used, np.nan))
+        used = self.residual.shape[1] * np.where(self.used > 0, self.used, np.nan)
+        bins = np.fft.rfft(self.residual, axis=1).T * (2 / used)
         turn = np.exp(-2j * np.pi * np.arange(len(bins)) * self.start / self.duration) if self.start else 1.0
         return np.asarray(bins * np.reshape(turn, (-1, 1)))
 
-    def beside(self, driven: int) -> ComplexArray:
-        """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
-        frequencies = np.array([line.frequency for line in self.lines.whole])
-        center = round(frequencies[driven] * self.duration)
-        offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
-        bins = np.concatenate([center - offsets[::-1], center + offsets])
-        bins = bins[(bins > 0) & (bins < len(self.spectrum))]
-        others = np.delete(frequencies, driven) * self.duration
-        free = np.abs(bins[:, None] - others).min(axis=1, initial=np.inf) > _CLEAR_OF
-        return self.spectrum[bins[free]]
+
+def hann_amplitude(spectrum: ComplexArray) -> FloatArray:
+    """Amplitudes (n_bins, n_channels) with Hann's window, as a sum of neighbours; zero where there is none."""
+    bins = np.nan_to_num(spectrum)
+    amplitude = np.zeros(bins.shape)
+    amplitude[1:-1] = np.abs(bins[1:-1] - 0.5 * (bins[:-2] + bins[2:]))
+    return amplitude
 
 
-def whole_record(run: Run, result: RunPhasors) -> WholeRecord:
-    """Fit a run in one, with its lines where the phases of its windows show them."""
-    reader = ChannelReader(run)
-    (device,) = reader.devices
-    samples = reader.read(device, 0, device.length)
-    return fitted_whole(samples, device.rate, result.lines, exact_frequencies(result, device.rate))
+def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:
+    """Fit every device's record in one, with its lines where the phases of its windows show them."""
+    records = []
+    for reader in device_readers(run):
+        names = [c.name for c in reader.channels]
+        places = [k for k, c in enumerate(result.channels) if c.name in names]
+        frequencies = exact_frequencies(result, places, reader.rate)
+        records.append(fitted_whole(reader.read(0, reader.length), reader.rate, result.lines, frequencies, places))
+    return tuple(records)
 
 
-def fitted_whole(samples: Samples, rate: float, lines: LineSet, frequencies: FloatArray) -> WholeRecord:
+def fitted_whole(
+    samples: Samples, rate: float, lines: LineSet, frequencies: FloatArray, places: list[int]
+) -> WholeRecord:
     """Fit all samples of a device in one; times that stray from an even grid are taken for even."""
-    fitter = LineFitter(samples.rows.shape[1], rate, frequencies, _DRIFT_ORDER)
+    shown = frequencies < 0.45 * rate
+    fitter = LineFitter(samples.rows.shape[1], rate, frequencies[shown], _DRIFT_ORDER)
     time = samples.time
     start = 0.0 if time is None or not np.isfinite(time[0]) else float(time[0])
     fit, residual = fitter.fit_with_residual(samples.rows[:, None], np.array([start]))
-    return WholeRecord(lines, fit, residual[:, 0], rate, start)
+    z = np.full((len(shown), len(places)), np.nan + 0j)
+    z[shown] = fit.z[0]
+    return WholeRecord(lines, tuple(places), z, 1 - fit.lost[0], residual[:, 0], rate, start)
+
+
+def residual_beside(records: tuple[WholeRecord, ...], driven: int, channels: int) -> ComplexArray:
+    """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
+    first = records[0]
+    frequencies = np.array([line.frequency for line in first.lines.whole]) * first.duration
+    offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
+    bins = round(frequencies[driven]) + np.concatenate([-offsets[::-1], offsets])
+    free = np.abs(bins[:, None] - np.delete(frequencies, driven)).min(axis=1, initial=np.inf) > _CLEAR_OF
+    bins = bins[free & (bins > 0) & (bins < len(first.spectrum))]
+    beside = np.full((len(bins), channels), np.nan + 0j)
+    for record in records:
+        at = np.round(bins * (record.duration / first.duration)).astype(int)
+        within = at < len(record.spectrum)
+        beside[np.ix_(within, record.places)] = record.spectrum[at[within]]
+    return beside
+
+
+def record_phasors(records: tuple[WholeRecord, ...], channels: int) -> ComplexArray:
+    """Phasors (n_whole_lines, n_channels) of all lines."""
+    z = np.full((len(records[0].z), channels), np.nan + 0j)
+    for record in records:
+        z[:, list(record.places)] = record.z
+    return z

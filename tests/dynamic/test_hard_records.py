@@ -1,0 +1,200 @@
+"""Records that rigs really give: bad samples, a line beside the drive, a late or switched drive, channels apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.device import Device
+from tests.rigs.held_run import POINT, HeldReader, channels, run_of
+from tpjb_ident.phasors.run_phasors import run_phasors
+
+RATE, SECONDS = 2000.0, 4.0
+TIME = np.arange(round(RATE * SECONDS)) / RATE
+QUANTITIES = ("displacement", "force", "acceleration")
+#: Phasors of the excitation by channel, noise of a sample, runout or unbalance.
+Z = {"DX": 2e-6 + 1e-6j, "DY": -1e-6 + 2e-6j, "FX": 300.0 + 40.0j, "FY": 200.0j - 100.0, "AX": 0.4j, "AY": 0.2 - 0.1j}
+NOISE = {"D": 4e-8, "F": 3.0, "A": 0.02}
+TURNING = {"D": 3e-6, "F": 20.0, "A": 0.0}
+ALL = tuple(Z)
+
+
+def reading(name, time, rng, drive=25.0, level=1.0, shaft=22.0):
+    """Samples of a channel at its own times."""
+    kind = name[0]
+    wave = np.real(level * Z[name] * np.exp(2j * np.pi * drive * time))
+    wave += TURNING[kind] * np.cos(2 * np.pi * shaft * time + (name[1] == "Y"))
+    return wave + (700.0 if kind == "F" else 0.0) + NOISE[kind] * rng.standard_normal(len(time))
+
+
+def record(seed=1, time=TIME, **drive):
+    rng = np.random.default_rng(seed)
+    return {name: reading(name, time, rng, **drive) for name in ALL}
+
+
+def phasors_of(data, point=POINT):
+    return run_phasors(run_of(HeldReader(data, RATE), channels(QUANTITIES), point), 30.0)
+
+
+def error(result, expected=Z, windows=None):
+    """Largest error of the mean phasors, over the largest of the quantity."""
+    z = result.z[:, 0] if windows is None else result.z[windows, 0]
+    mean = {c.name: np.nanmean(z[:, k]) for k, c in enumerate(result.channels)}
+    size = {kind: max(abs(v) for n, v in Z.items() if n[0] == kind) for kind in "DFA"}
+    return max(abs(mean[name] - expected[name]) / size[name[0]] for name in ALL if name[0] != "A")
+
+
+def test_channels_stand_in_order_and_make_the_vectors():
+    result = phasors_of(record())
+    assert [c.name for c in result.channels] == list(ALL)
+    assert result.device == ("",) * 6
+    assert error(result) < 1e-3
+    np.testing.assert_allclose(result.displacement.phasors, result.z[:, :, :2])
+    np.testing.assert_allclose(result.oil_force(0), result.z[:, 0, 2:4] + 30.0 * result.z[:, 0, 4:])
+    # phasors of the whole record, with the film's own lines, and the noise beside the excitation
+    assert [line.name for line in result.lines.faint] == ["3X", "4X", "harmonic 3", "2X-f", "2f-X"]
+    assert result.record.shape == (len(result.lines.whole), 6)
+    assert np.abs(result.record[0, :4] / np.array([Z[n] for n in ALL[:4]]) - 1).max() < 3e-3
+    (beside,) = result.residual
+    variance = np.mean(np.abs(beside) ** 2, axis=0)
+    expected = np.array([4 * NOISE[n[0]] ** 2 / len(TIME) for n in ALL])
+    assert (variance / expected).min() > 0.4
+    assert (variance / expected).max() < 2.0
+
+
+def test_isolated_bad_samples_take_nothing_with_them():
+    data = record()
+    rng = np.random.default_rng(5)
+    for name in ("DX", "FY"):
+        at = rng.choice(len(TIME), len(TIME) // 20, replace=False)
+        data[name][at] += rng.choice((-1, 1), len(at)) * 40 * NOISE[name[0]] * rng.uniform(0.5, 5.0, len(at))
+    result = phasors_of(data)
+    assert error(result) < 1e-3
+    np.testing.assert_allclose(result.lost[:, [0, 3]].mean(axis=0), 0.05, atol=0.01)
+    assert result.lost[:, [1, 2, 4, 5]].max() == 0.0
+
+
+@pytest.mark.parametrize("distance", [0.4, -0.3, 0.8])
+def test_a_line_beside_the_drive_is_found_and_fitted_along(distance):
+    data = record()
+    for name in ("FX", "FY", "DX", "DY"):
+        other = 0.12 * abs(Z[name]) * np.cos(2 * np.pi * (25.0 + distance) * TIME + 0.7)
+        data[name] = data[name] + other
+    result = phasors_of(data)
+    assert error(result) < 2e-3
+    assert "unexpected lines" in result.conditions
+    found = [line.frequency for line in result.lines.nuisance if line.name == "found"]
+    assert found == [pytest.approx(25.0 + distance, abs=0.01)]
+
+
+def test_a_drive_that_grows_or_wanders_is_no_second_line():
+    for level in (1 + 0.1 * TIME / SECONDS, 1 + 0.03 * np.cos(2 * np.pi * 0.4 * TIME)):
+        assert "unexpected lines" not in phasors_of(record(level=level)).conditions
+
+
+def test_a_shaft_at_twice_the_excitation_is_the_shafts():
+    point = replace(POINT, shaft_speed=2 * np.pi * 50.1)
+    data = record(shaft=50.1)
+    run = run_of(HeldReader(data, RATE), channels(QUANTITIES), point)
+    result = run_phasors(run, 30.0)
+    assert [line.name for line in result.lines.nuisance].count("harmonic 2") == 0
+    assert error(result) < 1e-3
+
+
+class ApartReader(HeldReader):
+    """Cells (and what else is named) at times of their own beside the probes."""
+
+    def __init__(self, data, times, rate, letter=""):
+        super().__init__(data, RATE)
+        self.times, self.slow_rate, self.letter = times, rate, letter
+        self.slow = tuple(name for name in data if len(data[name]) != len(TIME))
+
+    def devices(self):
+        own = tuple(name for name in self.data if name not in self.slow)
+        apart = Device("B", self.slow, self.slow_rate, len(self.data[self.slow[0]]), self.times is None)
+        return Device("", own, RATE, len(TIME), True), apart
+
+    def apart(self):
+        return frozenset(self.slow)
+
+    def length(self):
+        return len(TIME)
+
+    def read(self, names, start, stop):
+        assert not set(names) & set(self.slow), "nothing is interpolated"
+        return super().read(names, start, stop)
+
+    def read_device(self, names, start, stop):
+        return [self.data[name][start:stop] for name in names]
+
+    def device_time(self, name, start, stop):
+        return self.times[start:stop]
+
+
+@pytest.mark.parametrize("rate", [150.0, 300.0, 500.0])
+@pytest.mark.parametrize("stamped", [True, False])
+def test_cells_at_a_rate_of_their_own_are_fitted_at_their_own_times(rate, stamped):
+    rng = np.random.default_rng(2)
+    times = np.arange(round(rate * SECONDS)) / rate + (0.0013 if stamped else 0.0)
+    data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
+    run = run_of(ApartReader(data, times if stamped else None, rate), channels(QUANTITIES))
+    result = run_phasors(run, 30.0)
+    assert result.device == ("", "", "B", "B", "", "")
+    assert error(result) < 2e-3
+    # 25 Hz again and again, error of a probes' phasor: 1e-4, of the cells at 150 Hz 1e-3
+    assert not {"clocks-differ", "slower-channels"} & {str(c) for c in result.conditions}
+    (beside,) = result.residual
+    variance = np.mean(np.abs(beside[:, 2:4]) ** 2, axis=0)
+    assert variance == pytest.approx(4 * NOISE["F"] ** 2 / len(times), rel=0.7)
+    assert np.isfinite(result.record[0]).all()
+
+
+def test_a_device_that_ends_early_leaves_its_last_windows_empty():
+    rng = np.random.default_rng(2)
+    times = np.arange(round(300.0 * 3.0)) / 300.0
+    data = {n: reading(n, times if n[0] == "F" else TIME, rng) for n in ALL}
+    result = run_phasors(run_of(ApartReader(data, times, 300.0), channels(QUANTITIES)), 30.0)
+    late = result.start + result.length > 3.0
+    assert np.isnan(result.z[late][:, :, 2:4]).all()
+    assert np.isfinite(result.z[late][:, 0, :2]).all()
+    assert error(result) < 2e-3
+
+
+def filled(values, times, held, step=0.0, missing=0):
+    """What a logger program makes of readings at their own times, on the export's."""
+    if held:
+        written = values[np.clip(np.searchsorted(times, TIME + 1e-9, side="right") - 1, 0, None)]
+    else:
+        written = np.interp(TIME, times, values)
+    written = np.round(written / step) * step if step else written
+    written[np.linspace(500, 7000, missing).astype(int)] = np.nan
+    return written
+
+
+@pytest.mark.parametrize(
+    ("rate", "drive", "held"),
+    [(200.0, 25.0, True), (250.0, 25.0, True), (400.0, 45.0, True), (500.0, 45.0, True), (150.0, 25.0, False),
+     (300.0, 25.0, False), (300.0, 45.0, False), (400.0, 45.0, False), (500.0, 45.0, False)],
+)  # fmt: skip
+def test_cells_filled_up_by_the_export_are_told_by_their_images(rate, drive, held):
+    """Rounded after the filling, with readings missing."""
+    rng = np.random.default_rng(3)
+    data = record(drive=drive)
+    times = np.arange(-2, round(rate * SECONDS) + 4) / rate
+    for name in ("FX", "FY"):
+        data[name] = filled(reading(name, times, rng, drive=drive), times, held, 0.5, 3)
+    result = phasors_of(data, replace(POINT, excitation=2 * np.pi * drive))
+    assert "slower-channels" in result.conditions
+    assert result.device[2:4] == (f"{rate:g} Hz",) * 2
+    assert error(result) < 2e-3
+    assert "unexpected lines" not in result.conditions
+
+
+def test_plain_channels_are_not_filled():
+    for step in (0.0, 0.5, 20.0):
+        data = record()
+        for name in ("FX", "FY"):
+            data[name] = np.round(data[name] / step) * step if step else data[name]
+        assert "slower-channels" not in phasors_of(data).conditions
