@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import signal
 import subprocess
@@ -216,3 +217,34 @@ def test_an_error_leaves_nothing_behind(path, tmp_path):
     assert result.exit_code == 2
     assert "X1A" in result.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]
+
+
+def without_mark(meta):
+    del meta["fingerprint"]
+
+
+def of_another_kind(meta):
+    meta["lines"] = 5
+
+
+def with_a_mark_that_is_none(meta):
+    meta["fingerprint"] = {"a": 1}
+
+
+def without_blocks(meta):
+    meta["conditions"] = [["one"]]
+
+
+@pytest.mark.parametrize("damage", [without_mark, of_another_kind, with_a_mark_that_is_none, without_blocks])
+def test_an_entry_that_somebody_has_changed_is_done_again(path, whole, counted, tmp_path, damage):
+    campaign, store = load_campaign(path), RunStore(tmp_path / "kept")
+    all_runs(campaign, PhasorSettings(), silent, store=store)
+    first = store._file(campaign.runs[0].id)
+    with np.load(first, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    meta = json.loads(str(arrays.pop("meta")))
+    damage(meta)
+    np.savez(first, meta=np.array(json.dumps(meta)), **arrays)
+    counted.clear()
+    again = all_runs(campaign, PhasorSettings(), silent, store=store)
+    assert same(again, whole)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 import tomllib
 
 import numpy as np
@@ -316,3 +317,16 @@ def test_ross_itself_reads_what_was_written(tmp_path):
     done = subprocess.run([python, "-c", ROSS, str(tmp_path)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.count("read ross_") == 2
+
+
+@pytest.mark.parametrize("form", ["excel", "mat", "parquet"])
+def test_the_same_results_are_the_same_bytes(form, tmp_path):
+    if form == "excel":
+        pytest.importorskip("openpyxl")
+    bytes_of = []
+    for name in ("a", "b"):
+        export(table(SERIES), form, tmp_path / name)
+        (path,) = (tmp_path / name).iterdir()
+        bytes_of.append(path.read_bytes())
+        time.sleep(1.1 if form != "parquet" else 0.0)  # the times that their libraries write are in seconds
+    assert bytes_of[0] == bytes_of[1]

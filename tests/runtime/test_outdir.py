@@ -51,7 +51,7 @@ def test_commands_share_a_folder_and_its_record(tmp_path):
     fill(tmp_path / "out", "pivot", ["pivots.toml"])
     fill(tmp_path / "out", "identify", ["coefficients.csv"])
     data = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert data["schema"] == "tpjb-run/1"
+    assert data["schema"] == "tpjb-run/2"
     assert set(data["commands"]) == {"pivot", "identify"}
     assert data["commands"]["pivot"]["outputs"] == ["pivots.toml"]
     assert data["commands"]["identify"]["inputs_sha256"] == {"in.h5": "0" * 64}

@@ -179,5 +179,10 @@ def test_documents_that_are_none_are_refused(tmp_path, text):
 def test_every_version_so_far_is_read(tmp_path):
     path = tmp_path / "run.json"
     for version in ("tpjb-run/1", "tpjb-run/2"):
-        path.write_text(json.dumps({"schema": version, "commands": {"locus": {}}}), encoding="utf-8")
-        assert read_document(path, "tpjb-run")["commands"] == {"locus": {}}
+        entry = (
+            {"settings": {"a": 1, "bearing": "b.toml"}, "inputs_at": {}}
+            if version.endswith("1")
+            else {"settings": {}, "options": {"a": 1}}
+        )
+        path.write_text(json.dumps({"schema": version, "commands": {"locus": entry}}), encoding="utf-8")
+        assert read_document(path, "tpjb-run")["commands"]["locus"]["options"] == {"a": 1}

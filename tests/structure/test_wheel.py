@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import site
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -122,3 +124,15 @@ def test_the_demo_says_where_its_report_is(demo):
     assert text.count("<svg") == len(list((out / "figures").glob("*.svg"))) >= 15
     assert "http://" not in text.replace("http://www.w3.org/", "")
     assert "https://" not in text
+
+
+def test_a_release_is_built_twice_and_says_what_it_is_made_of(tmp_path):
+    call(sys.executable, ROOT / ".ci" / "release.py", tmp_path)
+    (built,) = tmp_path.glob("*.whl")
+    bill = json.loads((tmp_path / "sbom.cdx.json").read_text(encoding="utf-8"))
+    names = {part["name"].lower() for part in bill["components"]}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert {requirement.split(">=")[0] for requirement in project["dependencies"]} <= names
+    assert all(part["version"] and part["purl"].startswith("pkg:pypi/") for part in bill["components"])
+    (digest,) = bill["metadata"]["component"]["hashes"]
+    assert digest["content"] == hashlib.sha256(built.read_bytes()).hexdigest()

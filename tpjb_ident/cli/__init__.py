@@ -10,29 +10,42 @@ def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     _one_thread_for_small_matrices()
     sys.unraisablehook = _interrupt_again
+    _end_in_order()
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
         from tpjb_ident.cli.app import app
 
         app(prog_name="tpjb")
-    except KeyboardInterrupt:  # while the libraries are loaded, before any command has begun
+    except KeyboardInterrupt as error:  # while the libraries are loaded, before any command has begun
         print("tpjb: interrupted: nothing was written.", file=sys.stderr)
-        sys.exit(130)
+        sys.exit(143 if error.args else 130)
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)
 
 
+def _end_in_order() -> None:
+    """Let SIGTERM end a command as Ctrl-C does: what it began is cleared away, its workers are ended."""
+    import signal
+
+    def terminate(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt(number)
+
+    signal.signal(signal.SIGTERM, terminate)
+
+
 def _interrupt_again(lost: Any) -> None:
-    """Deliver a Ctrl-C once more that fell into a callback, as of an import lock: Python drops what is raised there."""
+    """Deliver a Ctrl-C or SIGTERM again that fell into a callback, as of an import lock: Python drops such errors."""
     import signal
     import threading
     from _thread import interrupt_main
 
+    number = next(iter(getattr(lost.exc_value, "args", ())), signal.SIGINT)  # SIGTERM says its own
+
     def interrupt() -> None:
         if hasattr(signal, "pthread_kill"):  # wakes a thread that waits, which the other one does not
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            signal.pthread_kill(threading.main_thread().ident or 0, number)
         else:
             interrupt_main()
 

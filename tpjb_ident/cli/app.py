@@ -17,6 +17,7 @@ from tpjb_ident.cli.commands.locus import locus
 from tpjb_ident.cli.commands.pivot import pivot
 from tpjb_ident.cli.commands.plan import plan
 from tpjb_ident.cli.commands.predict import predict
+from tpjb_ident.cli.commands.rerun import rerun
 from tpjb_ident.cli.commands.show import show
 from tpjb_ident.cli.commands.simulate import simulate
 from tpjb_ident.cli.commands.verify import verify
@@ -59,7 +60,7 @@ def _common(
 
 _COMMANDS = (
     init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
-    watch, verify,
+    watch, verify, rerun,
 )  # fmt: skip
 for command in _COMMANDS:
     lines = "\n".join(f"  {example}" for example in command.examples)  # type: ignore[attr-defined]

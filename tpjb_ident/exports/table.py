@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import re
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +12,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.exports.formats import COLUMNS, ExportError, StaticPoint
+from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
 from tpjb_ident.schema import ENTRIES
 
@@ -18,6 +22,9 @@ if TYPE_CHECKING:
 NAME = "bearing_coefficients"
 #: Beside files of a form that holds no intervals.
 INTERVALS = f"{NAME}_intervals.csv"
+_TIME, _NO_TIME = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:.]+Z"), b"1980-01-01T00:00:00Z"
+#: Text at the start of a MATLAB file, in place of one with the time.
+_MAT_HEAD = b"MATLAB 5.0 MAT-file, written by tpjb-ident".ljust(116)
 _FIELDS = (
     "load_N", "direction_deg", "speed_Hz", "frequency_rad_per_s", "K", "C", "K_lo", "K_hi", "C_lo", "C_hi",
     "quality", "trusted",
@@ -60,12 +67,8 @@ def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
 
 def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
     """Write bearing_coefficients.parquet; the source stands in the table's metadata."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = pa.Table.from_pandas(_coefficient_table(points), preserve_index=False)
-    table = table.replace_schema_metadata({**(table.schema.metadata or {}), b"source": printable(source).encode()})
-    write_atomic(folder / f"{NAME}.parquet", lambda part: pq.write_table(table, part))
+    frame = _coefficient_table(points)
+    write_atomic(folder / f"{NAME}.parquet", lambda part: tables.write_parquet(part, frame, source=printable(source)))
 
 
 def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
@@ -103,7 +106,17 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
         lines += [f"{point.load:g} N {flag}" for flag in point.flags]
     for row, line in enumerate(lines, start=1):
         _text(about.cell(row, 1), line)
-    write_atomic(folder / f"{NAME}.xlsx", lambda part: book.save(part))
+    content = io.BytesIO()
+    book.save(content)
+    write_atomic(folder / f"{NAME}.xlsx", lambda part: _without_times(content, part))
+
+
+def _without_times(book: io.BytesIO, path: Path) -> None:
+    """Write a workbook without the times of its making: the same results are the same bytes."""
+    with zipfile.ZipFile(book) as archive, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as written:
+        for name in archive.namelist():
+            entry = _TIME.sub(_NO_TIME, archive.read(name)) if name == "docProps/core.xml" else archive.read(name)
+            written.writestr(zipfile.ZipInfo(name), entry, zipfile.ZIP_DEFLATED)
 
 
 def _fill(cell: Any, value: Any) -> None:
@@ -137,7 +150,13 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
             np.array([printable(text) for text in p.quality], dtype=object), p.trusted,
         )  # fmt: skip
     content = {"bearing": array, "source": printable(source)}
-    write_atomic(folder / f"{NAME}.mat", lambda part: savemat(part, content, oned_as="column", appendmat=False))
+    file = io.BytesIO()
+    savemat(file, content, oned_as="column", appendmat=False)
+
+    def write(part: Path) -> None:
+        part.write_bytes(_MAT_HEAD + file.getvalue()[len(_MAT_HEAD) :])
+
+    write_atomic(folder / f"{NAME}.mat", write)
 
 
 def _matrices(values: dict[str, FloatArray], kind: str) -> FloatArray:

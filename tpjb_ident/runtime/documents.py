@@ -15,7 +15,14 @@ _LARGEST = 2**26
 
 
 def _run_from_1(document: Document) -> Document:
-    """Version 1 did not say where a file is that an option may name in place of a word, as --pivots."""
+    """Version 1 did not tell the options as they were typed from the settings that they became."""
+    commands = document.get("commands")
+    for entry in commands.values() if isinstance(commands, dict) else ():
+        settings = entry.get("settings") if isinstance(entry, dict) else None
+        if isinstance(settings, dict) and isinstance(places := entry.get("inputs_at"), dict):
+            # a file without a place of its own is one that the campaign carries: nobody typed it
+            typed = {k: v for k, v in settings.items() if k in places or not str(v).endswith(".toml")}
+            entry.setdefault("options", typed)
     return document
 
 

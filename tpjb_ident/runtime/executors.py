@@ -156,10 +156,13 @@ class PoolWorkers:
             self._executor = self._opened()
             self._executor.submit(int).result()
 
-    def close(self, wait: bool = True) -> None:
-        """End the executor; with it the jobs that have not begun."""
+    def close(self, wait: bool = True, at_once: bool = False) -> None:
+        """End the executor; with it the jobs that have not begun, and `at_once` those that have."""
         if self._executor is not None:
             if isinstance(self._executor, ProcessPoolExecutor):
+                processes = dict(self._executor._processes or {}) if at_once else {}
+                for process in processes.values():
+                    process.terminate()
                 self._executor.shutdown(wait=wait, cancel_futures=True)
             else:  # others need not know that argument
                 self._executor.shutdown(wait=wait)
@@ -275,6 +278,7 @@ def _portable(error: Exception) -> Exception:
 def _begin_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it; the cores are shared already."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy of the parent has its handler
     limit_threads()
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -307,12 +311,38 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
     context = multiprocessing.get_context(start or ("forkserver" if "forkserver" in known else "spawn"))
     if context.get_start_method() == "forkserver":
         context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
+        _start_forkserver()
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     with one_thread_each(), _shared_memory(context.get_start_method() == "fork"):
         try:
             yield pool
-        finally:
-            pool.close()
+        except BaseException:  # nobody waits for what its workers are still at
+            pool.close(at_once=True)
+            _stop_forkserver()
+            raise
+        pool.close()
+
+
+def _start_forkserver() -> None:
+    """Start the process that workers are copies of deaf to Ctrl-C: it would end with a traceback while it imports."""
+    from multiprocessing import forkserver, resource_tracker
+
+    resource_tracker.ensure_running()  # the forkserver starts it otherwise, and that lets Ctrl-C through again
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what comes meanwhile is delivered afterwards
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _stop_forkserver() -> None:
+    """End the process that workers are copies of: it may still import, and start workers that nobody waits for."""
+    from multiprocessing import forkserver
+
+    pid = getattr(forkserver._forkserver, "_forkserver_pid", None)
+    if pid is not None:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGTERM)
 
 
 @contextmanager

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.runtime.documents import TABLE_SCHEMA
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -48,8 +50,19 @@ def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Pat
     csv, parquet = folder / f"{name}.csv", folder / f"{name}.parquet"
     safe = safe_for_spreadsheets(frame)
     write_atomic(csv, lambda path: safe.to_csv(path, index=False, encoding="utf-8", lineterminator="\n"))
-    write_atomic(parquet, lambda path: frame.to_parquet(path, index=False))
+    write_atomic(parquet, lambda path: write_parquet(path, frame))
     return csv, parquet
+
+
+def write_parquet(path: Path, frame: pd.DataFrame, **metadata: str) -> None:
+    """Write a Parquet file with the schema of all tables in its metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), "schema": TABLE_SCHEMA, **metadata})
+    with path.open("wb") as stream:  # pyarrow takes no path that is not UTF-8
+        pq.write_table(table, stream)
 
 
 def safe_for_spreadsheets(frame: pd.DataFrame) -> pd.DataFrame:

@@ -22,7 +22,7 @@ def read_series(path: Path) -> list[Series]:
     import pyarrow.parquet as pq
 
     columns, units = {}, {}
-    with pq.ParquetFile(path) as table:
+    with path.open("rb") as stream, pq.ParquetFile(stream) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
         numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
         refuse_claim(SAMPLE * rows * (len(numeric) + 1), path.stat().st_size, path.name)

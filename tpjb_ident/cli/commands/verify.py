@@ -36,7 +36,7 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
         refuse_special(path)
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
-    files = [file for name, entry in entries.items() for file in _files(results, name, entry, given or ())]
+    files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
     _show(c, results, entries, files)
     if c.out is not None:
         c.options = {"results": results}
@@ -73,7 +73,7 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     return entries
 
 
-def _files(results: Path, name: str, entry: dict[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
+def files_of(results: Path, name: str, entry: dict[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
     """Compare the files of one command with its entry: as verify.json lists them."""
     hashes = _texts(entry.get("outputs_sha256"))
     for file in outputs_of(entry):

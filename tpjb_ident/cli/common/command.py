@@ -13,6 +13,7 @@ import functools
 import inspect
 import json
 import os
+import re
 import sys
 import tempfile
 import traceback
@@ -38,10 +39,14 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
 
-_BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED = 1, 2, 3, 130
+_BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED, _TERMINATED = 1, 2, 3, 130, 143
+#: What numpy says of single operations is for programmers: run.json lists it, people are told by conditions.
+_ARITHMETIC = re.compile(r"encountered in|empty slice|All-NaN|[Dd]egrees of freedom|poorly conditioned")
 #: A result table of more rows is named in the document of ``--json``, not repeated in it.
 _MOST_ROWS = 5000
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
+#: Every command by its name, as its file is imported.
+COMMANDS: dict[str, Callable[..., None]] = {}
 #: Options that change how a command runs, not what it computes.
 _UNRECORDED = ("workers", "scheduler")
 
@@ -62,7 +67,9 @@ class Command(Terminal):
         super().__init__(as_json, quiet)
         self.name, self.out = name, out
         self.options = dict(options)  #: as run.json records them
+        self.given = {name: _plain(value) for name, value in options.items()}  #: as they were typed
         self.remarks: Sequence[str] = ()  #: flags that run.json repeats
+        self.arithmetic: dict[str, None] = {}  #: warnings of single operations, in order
         self.target = out or Path(f"tpjb-{name}-out")
         self._sources: list[Path] = []
         self._opened: list[Campaign | Path] = []
@@ -126,7 +133,8 @@ class Command(Terminal):
         entry = entry or self.name
         with output_folder(self.target, entry, tuple(self._sources)) as self.folder:
             yield self.folder
-            names = write_record(self.folder, self.target, entry, self.options, self.inputs, self.remarks)
+            notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": self.given}
+            names = write_record(self.folder, self.target, entry, self.options, self.inputs, notes)
         self.wrote(*names)
 
     def table(self, name: str, frame: pd.DataFrame) -> None:
@@ -150,9 +158,10 @@ class Command(Terminal):
         except NotTrustedError as error:
             self.error("not to be trusted", str(error))
             return _NOT_TRUSTED
-        except KeyboardInterrupt:
-            self.error("interrupted", "nothing was written.")
-            return _INTERRUPTED
+        except KeyboardInterrupt as error:
+            kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)
+            self.error(kind, "nothing was written.")
+            return exit_code
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
         except Exception as error:
@@ -167,7 +176,11 @@ class Command(Terminal):
     def _show_warning(
         self, message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
     ) -> None:
-        self.warn(f"{category.__name__}: {message} ({filename}:{lineno})")
+        text = f"{category.__name__}: {message} ({filename}:{lineno})"
+        if _ARITHMETIC.search(str(message)):
+            self.arithmetic.setdefault(text, None)
+        else:
+            self.warn(text)
 
     def document(self, exit_code: int) -> dict[str, Any]:
         """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
@@ -229,6 +242,7 @@ def command(
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         run.__annotations__ = hints
         run.examples = examples  # type: ignore[attr-defined]
+        COMMANDS[name] = run
         return run
 
     return decorate
@@ -245,9 +259,10 @@ def _print_document(document: Mapping[str, Any]) -> None:
 def _rows(path: Path) -> Any:
     import pyarrow.parquet as pq
 
-    table = pq.ParquetFile(path)
-    count = table.metadata.num_rows
-    return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
+    with path.open("rb") as stream:
+        table = pq.ParquetFile(stream)
+        count = table.metadata.num_rows
+        return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
 
 
 def _bad_input_message(error: Exception) -> str | None:
@@ -298,7 +313,7 @@ def write_record(
     entry: str,
     settings: Mapping[str, Any],
     inputs: Mapping[str, str],
-    remarks: Sequence[str] = (),
+    notes: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Write run.json into the temporary folder of a command, last; the files that it lists.
 
@@ -313,20 +328,22 @@ def write_record(
         "inputs_sha256": dict(inputs),
         "outputs": outputs,
         "outputs_sha256": {name: sha256(staging / name) for name in outputs},
-        "inputs_at": _places(settings, target),
-        **({"remarks": list(remarks)} if remarks else {}),
+        "inputs_at": _places(settings, target, inputs),
+        **{name: note for name, note in (notes or {}).items() if note},
     }
     write_text(staging / RECORD, record_text({**former_runs(target), entry: record}))
     return outputs
 
 
-def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
+def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]) -> dict[str, str]:
     """Where files and folders among `settings` are, as seen from the output folder; only those that exist."""
     places = {}
     for name, value in settings.items():
-        if isinstance(value, Path) and value.exists():
+        # a word may name a file in place of a choice, as of --pivots
+        path = Path(value) if isinstance(value, str) and Path(value).name in inputs else value
+        if isinstance(path, Path) and path.exists():
             with contextlib.suppress(ValueError):  # another drive: there is no relative way
-                places[name] = Path(os.path.relpath(value.resolve(), target.resolve())).as_posix()
+                places[name] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
     return places
 
 

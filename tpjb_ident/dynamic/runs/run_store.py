@@ -36,6 +36,8 @@ from tpjb_ident.runtime.tables import write_atomic
 
 _ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase", "record")
 _LINES = ("excitation", "nuisance", "faint")
+#: What reading says of an entry that is cut off, or that somebody else wrote.
+_NOT_OURS = (OSError, ValueError, LookupError, TypeError, EOFError, MemoryError, RecursionError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,11 @@ class RunStore:
             with self._file(run_id).open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
             meta = json.loads(str(arrays.pop("meta")))
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            if meta["run"] != run_id or not isinstance(meta["fingerprint"], str):
+                return None
+        except _NOT_OURS:
             return None  # not there, cut off, or not ours: the run is simply done again
-        return (meta, arrays) if isinstance(meta, dict) and meta.get("run") == run_id else None
+        return meta, arrays
 
     def keep(self, mark: str, result: RunResult) -> None:
         """Keep a finished run under its fingerprint `mark`."""
@@ -115,7 +119,14 @@ class RunStore:
         stored = self._read(run.id)
         if not mark or stored is None or stored[0]["fingerprint"] != mark:
             return None
-        meta, arrays = stored
+        try:
+            return self._unpacked(run, *stored, housing_mass)
+        except _NOT_OURS:
+            return None
+
+    def _unpacked(
+        self, run: Run, meta: dict[str, Any], arrays: dict[str, np.ndarray], housing_mass: float
+    ) -> RunResult:
         residual = [arrays.pop(f"residual.{i}") for i in range(len(arrays) - len(_ARRAYS))]
         phasors = RunPhasors(
             run=run.id,

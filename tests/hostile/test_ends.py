@@ -1,0 +1,93 @@
+"""How a command ends: names that are not UTF-8, warnings of numpy, signals while workers are busy."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident.cli.common.command import Command
+
+ROOT = Path(__file__).parents[2]
+DEMO = ROOT / "rigdata" / "samples" / "demo.h5"
+#: Seconds within which a command ends that is told to.
+PATIENCE = 2.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize("words", [("locus",), ("show",), ("check",), ("identify", "--method", "ols")])
+def test_names_that_are_not_utf_8_are_names(small_campaign, tmp_path, words):
+    campaign = tmp_path / os.fsdecode(b"d\xff.h5")
+    shutil.copy(small_campaign, campaign)
+    result = tpjb(words[0], campaign, *words[1:], "--out", tmp_path / os.fsdecode(b"o\xff"), "-q")
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize(
+    "words", [("check",), ("predict",), ("export", "--to", "csv"), ("verify",), ("rerun",), ("init",), ("view",)]
+)
+def test_files_of_such_names_that_are_not_there_are_bad_input(tmp_path, words):
+    assert tpjb(words[0], tmp_path / os.fsdecode(b"none\xff.x"), *words[1:]).exit_code == 2
+
+
+def test_warnings_of_arithmetic_go_to_the_record_and_others_to_people(tmp_path, capsys):
+    def work(c):
+        with c.results():
+            warnings.warn("invalid value encountered in divide", RuntimeWarning, stacklevel=1)
+            warnings.warn("Mean of empty slice", RuntimeWarning, stacklevel=1)
+            warnings.warn("the cache cannot be written", RuntimeWarning, stacklevel=1)
+
+    command = Command("locus", {}, tmp_path / "o")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert command.run(work, {}) == 0
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "the cache cannot be written" in printed
+    assert "encountered" not in printed
+    (entry,) = json.loads((tmp_path / "o" / "run.json").read_text(encoding="utf-8"))["commands"].values()
+    assert len(entry["arithmetic"]) == 2
+
+
+def is_alive(group: int) -> bool:
+    """Whether a process of a group is left."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("words", [("diagnose", "--workers", "2"), ("identify", "--workers", "2"), ("compare",)])
+def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_nothing(tmp_path, words, number, code):
+    command = [sys.executable, "-m", "tpjb_ident", words[0], str(DEMO), *words[1:], "--out", str(tmp_path / "o")]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    until = time.monotonic() + 60.0
+    while not list(tmp_path.glob(".o.part-*")) and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    time.sleep(1.0)
+    os.killpg(process.pid, number)
+    began = time.monotonic()
+    output, _ = process.communicate(timeout=60)
+    assert time.monotonic() - began < PATIENCE
+    assert process.returncode == code, output
+    assert "Traceback" not in output
+    assert list(tmp_path.iterdir()) == []
+    while is_alive(process.pid) and time.monotonic() - began < 20.0:  # the system's own helpers end with their pipes
+        time.sleep(0.02)
+    assert not is_alive(process.pid)

@@ -1,0 +1,122 @@
+"""`tpjb rerun`: the same computed again, with the options and inputs of a run.json, and what differs."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
+from tpjb_ident.cli.common.command import COMMANDS, Command, command
+from tpjb_ident.columns import Column, words
+from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
+from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of
+
+Record = Annotated[Path, typer.Argument(metavar="RUN.json", help="run.json of an output folder, or that folder.")]
+Tolerance = Annotated[
+    float, typer.Option(min=0.0, help="Difference that is rounding: relative, or of half an interval's width.")
+]
+#: Commands whose results hang on their options and inputs alone.
+_REPEATABLE = (
+    "check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "simulate", "demo", "export",
+)  # fmt: skip
+#: Options of this command itself: a record from elsewhere decides neither where to write nor whom to connect to.
+_OURS = ("out", "as_json", "quiet", "workers", "scheduler")
+_WORDS = {"same": "the same bytes", "numbers": "the same but for rounding", "differs": "differs"} | {
+    "not judged": "other bytes, not judged", "missing": "is not written any more", "new": "is not there"
+}  # fmt: skip
+
+
+@command("tpjb rerun tpjb-identify-out/run.json", "tpjb rerun tpjb-compare-out --out again")
+def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
+    """Compute the same again and say what differs.
+
+    With the options and inputs that run.json names, into a temporary folder: tables and documents are compared number
+    by number, pictures and pages by their bytes. Exit code 0 where nothing beyond the tolerance differs, 3 where
+    something does, 2 where an input is gone or changed. With --out, rerun.json lists every file.
+    """
+    folder = record if record.is_dir() else record.parent
+    if not record.is_dir() and record.name != RECORD:
+        raise BadInputError(f"{record}: is no {RECORD}. Give that of an output folder, or the folder.")
+    entries = recorded(folder)
+    repeated = {name: entry for name, entry in entries.items() if name.split(" ")[0] in _REPEATABLE}
+    for name in set(entries) - set(repeated):
+        c.note(f"{name} is not repeated")
+    if not repeated:
+        raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
+    for name, entry in repeated.items():
+        _check_inputs(folder, name, entry)
+    from tpjb_ident.runtime.differences import compared
+
+    found = []
+    with tempfile.TemporaryDirectory(prefix="tpjb-rerun-") as scratch:
+        for number, (name, entry) in enumerate(repeated.items()):
+            again = Path(scratch) / str(number)
+            c.doing(f"{name} again")
+            _run_again(name, entry, folder, again)
+            for file in outputs_of(entry):
+                if reason := contradiction(folder / file):
+                    c.warn(f"{folder / file}: {reason}")
+                found.append((name, compared(folder, again, file, tolerance)))
+    rows = [[name, d.file, _WORDS[d.state], f"{d.size:.1e}" if d.size else "-"] for name, d in found]
+    c.show(f"{folder}: computed again", [*words("command", "file", "state"), Column("largest difference")], rows)
+    if c.out is not None:
+        files = [{"command": name, **vars(difference)} for name, difference in found]
+        with c.results():
+            c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
+    different = [f"{d.file} {_WORDS[d.state]} {d.where}".strip() for _, d in found if d.matters]
+    if different:
+        raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n" + "\n".join(different[:8]))
+    c.print(f"{len(found)} files: nothing differs by more than {tolerance:g}.")
+
+
+def _check_inputs(folder: Path, name: str, entry: dict[str, Any]) -> None:
+    for file in files_of(folder, name, entry, ()):
+        if file["role"] == "input" and file["state"] != "same":
+            raise BadInputError(
+                f"{folder}: input {file['file']} of {name} {STATES[file['state']]}. Bring it back to where it was."
+            )
+
+
+def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:
+    """Run the command of an entry as if it were typed again, its inputs where they are now."""
+    from typer.main import get_command
+
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(COMMANDS[name.split(" ")[0]])
+    program: Any = get_command(app)
+    typed = _typed(program.params, entry, folder)
+    try:
+        code = program.main([f"--out={out}", "--quiet", *typed], prog_name="tpjb", standalone_mode=False)
+    except typer.Exit as end:
+        code = end.exit_code
+    except Exception as error:  # what the parser says of options that this version does not have
+        raise BadInputError(f"{name}: cannot be repeated ({error}). Run it by hand.") from error
+    if code not in (None, 0, 3):
+        raise TpjbError(f"{name}: ended with exit code {code}, see above; nothing was compared.")
+
+
+def _typed(parameters: list[Any], entry: Mapping[str, Any], folder: Path) -> list[str]:
+    """Words of a command line from the options of an entry; files by their place."""
+    options, places = entry.get("options"), entry.get("inputs_at")
+    if not isinstance(options, dict) or not isinstance(places, dict):
+        raise BadInputError(f"{folder / RECORD}: names no options. It was written by an older version: run it by hand.")
+    flags, arguments = [], []
+    for parameter in parameters:
+        if parameter.name in _OURS:
+            continue
+        value = options.get(parameter.name)
+        if parameter.name in places:
+            value = str(folder / str(places[parameter.name]))
+        if value is None or value is False:
+            flags += [parameter.secondary_opts[0]] if value is False and parameter.secondary_opts else []
+        elif parameter.param_type_name == "argument":
+            arguments += [str(item) for item in (value if isinstance(value, list) else [value])]
+        elif value is True:
+            flags.append(parameter.opts[0])
+        else:
+            flags += [f"{parameter.opts[0]}={item}" for item in (value if isinstance(value, list) else [value])]
+    return [*flags, "--", *arguments]

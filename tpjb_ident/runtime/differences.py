@@ -1,0 +1,110 @@
+"""What differs between results and the same results computed again: numbers by size, not by text."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tpjb_ident.runtime.table_reader import read_table
+from tpjb_ident.schema import TABLES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Kinds of file whose numbers are compared; of others only the bytes are.
+_DOCUMENTS = {".json": json.loads, ".toml": tomllib.loads}
+#: Of what a document holds, that tells of its making.
+_ASIDE = ("finished", "versions")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a file differs from the one computed again."""
+
+    file: str
+    state: str  #: same | numbers | differs | not judged | missing | new
+    size: float = (
+        0.0  #: largest difference of two numbers: relative, or of the interval's half width where there is one
+    )
+    where: str = ""
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is more than rounding."""
+        return self.state in ("differs", "missing", "new")
+
+
+def compared(first: Path, second: Path, file: str, tolerance: float) -> Difference:
+    """Compare a file of one folder with that of another; numbers may differ by a relative `tolerance`."""
+    old, new = first / file, second / file
+    if not old.is_file() or not new.is_file():
+        return Difference(file, "missing" if old.is_file() else "new")
+    if old.read_bytes() == new.read_bytes():
+        return Difference(file, "same")
+    pairs = _pairs(old, new)
+    if pairs is None:
+        return Difference(file, "not judged")
+    size, where = 0.0, ""
+    for place, a, b, width in pairs:
+        off = _off(a, b, width)
+        if off > size:
+            size, where = off, f"{place}: {_shown(a)}, now {_shown(b)}"
+    return Difference(file, "differs" if size > tolerance else "numbers", size, where)
+
+
+def _shown(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
+
+
+def _off(a: object, b: object, width: float) -> float:
+    """Difference of two values over their size or, where that is larger, half the width of their interval."""
+    if not (isinstance(a, int | float) and isinstance(b, int | float)) or isinstance(a, bool) or isinstance(b, bool):
+        return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
+    if a == b or (math.isnan(a) and math.isnan(b)):
+        return 0.0
+    scale = max(abs(a), abs(b), width if math.isfinite(width) else 0.0)
+    off = abs(a - b) / scale
+    return off if math.isfinite(off) else math.inf
+
+
+_Pairs = Iterator[tuple[str, Any, Any, float]]
+
+
+def _pairs(old: Path, new: Path) -> _Pairs | None:
+    """Values of two files that belong together, with their place and half the width of their interval."""
+    if old.suffix == ".csv" and old.stem in TABLES:
+        return _cells(read_table(old), read_table(new))
+    parse = _DOCUMENTS.get(old.suffix)
+    if parse is None:
+        return None
+    return _entries(parse(old.read_text("utf-8")), parse(new.read_text("utf-8")), "")
+
+
+def _cells(old: pd.DataFrame, new: pd.DataFrame) -> _Pairs:
+    if list(old.columns) != list(new.columns) or len(old) != len(new):
+        yield "shape", f"{len(old)} rows of {len(old.columns)}", f"{len(new)} rows of {len(new.columns)}", 0.0
+        return
+    for name in old.columns:
+        base = next((name.removesuffix(end) for end in ("_lo", "_hi") if name.endswith(end)), name)
+        has_interval = f"{base}_lo" in old and f"{base}_hi" in old
+        halves = 0.5 * (old[f"{base}_hi"] - old[f"{base}_lo"]) if has_interval else [0.0] * len(old)
+        for row, (a, b, half) in enumerate(zip(old[name], new[name], halves, strict=True), start=1):
+            yield f"{name}, row {row}", a, b, half
+
+
+def _entries(old: Any, new: Any, place: str) -> _Pairs:
+    """Walk two documents side by side."""
+    if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
+        for key in old:
+            if key not in _ASIDE:
+                yield from _entries(old[key], new[key], f"{place}.{key}" if place else str(key))
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (a, b) in enumerate(zip(old, new, strict=True)):
+            yield from _entries(a, b, f"{place}[{index}]")
+    else:
+        yield place, old, new, 0.0
