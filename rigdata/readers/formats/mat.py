@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 import struct
@@ -89,7 +90,10 @@ def _load(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
     check_mat5(path)
-    return {name: value for name, value in loadmat(path, simplify_cells=True).items() if not name.startswith("__")}
+    # named from scipy 1.18 on, which warns where it is not given
+    sparse = {"spmatrix": False} if "spmatrix" in inspect.signature(loadmat).parameters else {}
+    variables = loadmat(path, simplify_cells=True, **sparse)
+    return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
 def _claimed(group: Any, depth: int) -> int:
