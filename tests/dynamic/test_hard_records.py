@@ -198,3 +198,37 @@ def test_plain_channels_are_not_filled():
         for name in ("FX", "FY"):
             data[name] = np.round(data[name] / step) * step if step else data[name]
         assert "slower-channels" not in phasors_of(data).conditions
+
+
+@pytest.mark.parametrize(("begin", "end"), [(1.3, 4.0), (0.0, 2.45), (0.9, 3.3)])
+def test_windows_without_drive_are_none(begin, end):
+    """A drive that starts late, or stops: its windows alone count, and the whole record is that stretch."""
+    result = phasors_of(record(level=((begin <= TIME) & (end > TIME)).astype(float)))
+    assert result.span[0] == pytest.approx(begin, abs=0.5)
+    assert result.span[1] == pytest.approx(end, abs=0.5)
+    driven = np.isfinite(result.z[:, 0, 0])
+    # what little of a window has no drive counts as bad samples of it
+    assert (result.start[driven] >= begin - 0.05).all()
+    assert (result.start[driven] + result.length <= end + 0.05).all()
+    assert error(result) < 2e-3
+    assert np.abs(result.record[0, :4] / np.array([Z[n] for n in ALL[:4]]) - 1).max() < 5e-3
+    assert not result.conditions
+
+
+def test_a_drive_that_is_switched_over_gives_its_longest_stretch():
+    """From one direction to the other after 2.2 s: both channels of a quantity change."""
+    data = record()
+    after = record(seed=2)
+    swapped = {"DX": "DY", "DY": "DX", "FX": "FY", "FY": "FX", "AX": "AY", "AY": "AX"}
+    for name in ALL:
+        data[name] = np.where(TIME < 2.2, data[name], after[swapped[name]])
+    result = phasors_of(data)
+    assert result.span == (0.0, pytest.approx(2.2, abs=0.3))
+    assert error(result) < 2e-3
+
+
+def test_a_channel_that_fails_for_a_while_is_no_change_of_the_drive():
+    data = record()
+    data["DX"] = data["DX"] + np.where(TIME > 2.0, 3e-6 * np.cos(2 * np.pi * 25 * TIME), 0.0)
+    assert phasors_of(data).span is None
+    assert phasors_of(record(level=1 + 0.3 * TIME / SECONDS)).span is None

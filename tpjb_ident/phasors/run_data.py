@@ -60,6 +60,7 @@ class RunPhasors:
     speeds: FloatArray  #: (n_windows,)
     conditions: tuple[Condition, ...] = ()
     shaft_phase: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (n_lines,) complex
+    span: tuple[float, float] | None = None  #: s: part of the record with one excitation; None: all of it
     device: tuple[str, ...] = ()  #: (n_channels,): clock terms exist between devices only
     #: (n_whole_lines, n_channels) complex, SI: phasors of the whole record's lines, those of the windows first
     record: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))

@@ -23,6 +23,7 @@ from tpjb_ident.phasors.near_lines import near_line
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed
+from tpjb_ident.phasors.stretches import longest_stretch
 from tpjb_ident.phasors.whole_record import WholeRecord, record_phasors, residual_beside, whole_records
 from tpjb_ident.phasors.windows import RecordTooShortError
 
@@ -62,17 +63,24 @@ def _continued(run: Run, inspection: _Inspection, settings: PhasorSettings) -> R
     first, mass = inspection.result, inspection.result.housing_mass
     lines = first.lines
     conditions = tuple(c for c in first.conditions if c not in lines.conditions and c != DRIFT)
-    result = extract(run, mass, settings, lines)
+    result = _stretch(run, mass, settings, lines, None)
     better = tuned(run, result, inspection.driven, lines.speed, settings)
     if better is not None:
         conditions = merged(conditions, better.conditions)
         quick = retuned(result, better.lines) if better.follow is None else None
-        result = quick or extract(run, mass, settings, better.lines, better.follow)
+        result = quick or _stretch(run, mass, settings, better.lines, better.follow)
     # the noise of a phasor of the whole record is less than that of its beginning
     share = np.sqrt(inspection.run.length / run.length)
     residual = tuple(share * bins for bins in first.residual)
     conditions = merged(conditions, result.lines.conditions)
     return replace(result, conditions=conditions, record=first.record, residual=residual)
+
+
+def _stretch(
+    run: Run, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: ShaftCourse | None
+) -> RunPhasors:
+    """Windows of the run's longest stretch of one excitation."""
+    return longest_stretch(extract(run, housing_mass, settings, lines, follow), run.sample_rate)
 
 
 class _Inspection:
@@ -106,7 +114,7 @@ class _Inspection:
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
         self.follow: ShaftCourse | None = follow
-        self.result = extract(self.run, self.mass, self.settings, lines, follow)
+        self.result = _stretch(self.run, self.mass, self.settings, lines, follow)
         self.records = whole_records(self.run, self.result)
 
     def _add_unexpected(self, speed: float) -> None:

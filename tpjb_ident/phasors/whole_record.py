@@ -6,7 +6,7 @@ noise is in the cells around a line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -62,13 +62,19 @@ def hann_amplitude(spectrum: ComplexArray) -> FloatArray:
 
 
 def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:
-    """Fit every device's record in one, with its lines where the phases of its windows show them."""
+    """Fit every device's record (its stretch of one excitation) in one, with its lines where the windows show them."""
     records = []
     for reader in device_readers(run):
         names = [c.name for c in reader.channels]
         places = [k for k, c in enumerate(result.channels) if c.name in names]
         frequencies = exact_frequencies(result, places, reader.rate)
-        records.append(fitted_whole(reader.read(0, reader.length), reader.rate, result.lines, frequencies, places))
+        first, stop = 0, reader.length
+        if result.span is not None:
+            first, stop = np.minimum(reader.first_samples(np.array(result.span)), reader.length).tolist()
+        samples = reader.read(first, stop)
+        if samples.time is None and first:
+            samples = replace(samples, time=np.arange(first, stop) / reader.rate)
+        records.append(fitted_whole(samples, reader.rate, result.lines, frequencies, places))
     return tuple(records)
 
 

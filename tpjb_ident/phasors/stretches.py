@@ -1,0 +1,100 @@
+"""Stretches of one excitation: where the drive starts late, stops, or is switched over, windows are no repeats.
+
+Windows of another excitation, of none, or across the change say nothing of the phasor that the run's longest stretch
+has. A change of the drive shows in forces and displacements alike; what shows in one of them is a fault of channels.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.phasors.line_fit import usual_scale
+from tpjb_ident.phasors.run_data import RunPhasors
+
+#: Windows of a stretch, at least.
+_LEAST = 3
+#: Change of the phasors over the larger of two levels, in forces and in displacements,
+_CHANGE = 0.25
+#: that leaves at most this share of the windows' scatter about their mean.
+_LEFT = 0.1
+#: A window whose line is below this many deviations of its noise, or this share of the run's, has no drive.
+_DEVIATIONS, _QUIET = 3.0, 0.1
+#: A window so far from its stretch's level lies across a change.
+_ACROSS = 0.05
+
+
+def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
+    """The run with the windows of its longest stretch alone; those of others give no phasor."""
+    driven = len(result.lines.excitation)
+    noise = usual_scale(result.scale) * 2 / np.sqrt(result.length * rate)
+    live = np.isfinite(noise) & np.array([c.quantity != "acceleration" for c in result.channels])
+    z = result.z[:, :driven, live] / np.maximum(noise[live], np.finfo(float).tiny)
+    quantity = np.array([c.quantity for c, is_live in zip(result.channels, live) if is_live])
+    good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
+    if len(good) < 2 * _LEAST or len(set(quantity)) < 2:
+        return result
+    windows = z[good]
+    groups = [windows[:, :, quantity == q].reshape(len(good), -1) for q in ("displacement", "force")]
+    cuts = sorted(_cuts(groups, 0, len(good)))
+    level = np.sqrt(np.mean(np.abs(windows) ** 2, axis=(1, 2)))
+    idle = (level < _DEVIATIONS) | (level < _QUIET * np.quantile(level, 0.9))
+    if not cuts and not (idle.any() and np.median(level) > _DEVIATIONS):
+        return result
+    keep = _kept(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
+    if not keep.any():
+        return result
+    others = np.ones(len(result.start), dtype=bool)
+    others[good[keep]] = False
+    others &= np.isfinite(result.z).any(axis=(1, 2))
+    first, last = good[keep][[0, -1]]
+    span = float(result.start[first]), float(result.start[last] + result.length)
+    return replace(result, z=np.where(others[:, None, None], np.nan, result.z), span=span)
+
+
+def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
+    """Windows at which the level of both groups changes between first and stop: halves, and halves of these."""
+    if stop - first < 2 * _LEAST:
+        return []
+    parts = [group[first:stop] for group in groups]
+    joined = np.concatenate(parts, axis=1)
+    total = _scatter(joined)
+    places = range(_LEAST, stop - first - _LEAST + 1)
+    left = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
+    best = places[int(np.argmin(left))]
+    levels = [(part[:best].mean(axis=0), part[best:].mean(axis=0)) for part in parts]
+    largest = [max(np.linalg.norm(before), np.linalg.norm(after)) for before, after in levels]
+    changes = [np.linalg.norm(after - before) for before, after in levels]
+    if min(left) > _LEFT * total or any(change < _CHANGE * size for change, size in zip(changes, largest)):
+        return []
+    cut = first + best
+    return [*_cuts(groups, first, cut), cut, *_cuts(groups, cut, stop)]
+
+
+def _scatter(windows: ComplexArray) -> float:
+    """Sum of squares about the median of some windows (n, m), one of them, the farthest, left out."""
+    middle = np.median(windows.real, axis=0) + 1j * np.median(windows.imag, axis=0)
+    squares = np.sum(np.abs(windows - middle) ** 2, axis=1)
+    return float(squares.sum() - squares.max())
+
+
+def _kept(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
+    """Windows (n,) of the longest driven stretch that do not lie across a change; `windows` (n, m)."""
+    keep = np.zeros(len(windows), dtype=bool)
+    for first, stop in itertools.pairwise(edges):
+        part = np.zeros(len(windows), dtype=bool)
+        part[first:stop] = ~idle[first:stop]
+        if part.sum() > keep.sum():
+            keep = part
+    if not keep.any():
+        return keep
+    places = np.flatnonzero(keep)
+    middle = np.median(windows[places].real, axis=0) + 1j * np.median(windows[places].imag, axis=0)
+    distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
+    for end, inner in ((places[0], places[1:4]), (places[-1], places[-4:-1])):
+        if distance[end] > max(_ACROSS * np.linalg.norm(middle), 3 * np.max(distance[inner], initial=0.0)):
+            keep[end] = False
+    return keep
