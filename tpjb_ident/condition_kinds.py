@@ -39,8 +39,8 @@ ERRORS = {
     "manifest, or filter all channels alike.",
     "baseline-missing": "The campaign measured the rig without its bearing, but not at this frequency: the rig's own "
     "stiffness is still inside. Measure it there too.",
-    "film-not-linear": "The film was shaken so hard that it answers at twice the excitation frequency: K and C of "
-    "small motion cannot be had from this. Excite less.",
+    "film-not-linear": "The film was shaken so hard, by excitation or shaft, that it answers at other frequencies: "
+    "K and C of small motion cannot be had from this. Excite less, or balance the shaft.",
     "records-contradicted": "Many records contradict the manifest, or what a film can do: swapped or inverted "
     "channels, loads, clipping. `tpjb check` lists it all.",
     "runs-disagree": "The runs of the point do not belong to one dynamic stiffness: what it leaves of their forces is "

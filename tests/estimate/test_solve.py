@@ -48,6 +48,31 @@ def test_a_channel_that_is_missing_in_one_run_costs_nothing_but_its_row(sensor):
     assert np.median(deviations(part)[0] / deviations(whole)[0]) < 1.3
 
 
+def test_a_run_that_says_nothing_at_all_costs_itself_only():
+    rig, blocks, truth = made(EXACT)
+    present = blocks.present.copy()
+    present[5] = False
+    solution = solved(rig, replace(blocks, present=present, z=blocks.z * present), truth)
+    assert np.abs(solution.h / truth - 1).max() < 1e-9
+    present[4:7] = False
+    solution = solved(rig, replace(blocks, present=present, z=blocks.z * present), truth)
+    assert np.isnan(solution.h[1]).all()
+    assert np.abs(solution.h[[0, 2]] / truth[[0, 2]] - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("sensor", [1, 3, 5])
+def test_a_channel_that_is_dead_in_all_runs_ends_in_no_crash(sensor):
+    """Without a probe the windows give no start; a cell or an accelerometer the housing's equations stand in for."""
+    rig, blocks, truth = made(Case())
+    present = blocks.present & (np.arange(6) != sensor)
+    start = np.full_like(truth, np.nan) if sensor == 1 else truth
+    solution = solved(rig, replace(blocks, present=present, z=blocks.z * present), start)
+    if sensor == 1:
+        assert np.isnan(solution.h).all()
+    else:
+        assert np.abs(away(solution, truth)).max() < 5
+
+
 def test_without_a_start_a_point_has_no_answer_and_the_others_theirs():
     rig, blocks, truth = made(EXACT)
     unknown = truth.copy()

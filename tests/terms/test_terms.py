@@ -231,8 +231,10 @@ def test_several_amplitudes_give_the_stiffness_at_none(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_one_amplitude_does_not_tell_stands_in_the_interval(seed):
+    """Runs of other directions move otherwise; that is the film's direction, and no evidence on amplitude."""
     rig, blocks, truth = made(Case(bent=0.04, bent_told=0.05), seed)
     solution = solved(rig, blocks, truth)
+    assert not of(solution, "amplitude").estimated.any()
     assert held(solution, truth)
     blind = solved(rig, blocks, truth, without=(Amplitude,))
     assert not held(blind, truth)

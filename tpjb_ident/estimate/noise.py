@@ -53,10 +53,12 @@ def housing_noise(rig: Rig, blocks: Blocks, motion: ComplexArray, misfit: Comple
     if rig.mount == "unknown" or not np.any(size > 0) or len(rig.of("acceleration")) < 2:
         return usual
     rows = rig.of("acceleration")
-    share = np.sum(np.abs(misfit) ** 2, axis=1) / 2 / np.maximum(size, 1e-300) ** 2
-    records = np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real / len(rows) / np.maximum(size, 1e-300) ** 2
-    excess = np.median(np.maximum(share - records, 0.0)) / np.log(2)
-    n = len(blocks)
+    moving = size > 0
+    share = np.sum(np.abs(misfit) ** 2, axis=1) / 2
+    records = np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real / len(rows)
+    beyond = np.maximum(share - records, 0.0)[moving] / size[moving] ** 2
+    excess = np.median(beyond) / np.log(2)
+    n = len(beyond)
     return float(np.sqrt((_HOUSING_BLOCKS * usual**2 + n * excess) / (_HOUSING_BLOCKS + n)))
 
 

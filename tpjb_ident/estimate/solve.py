@@ -32,6 +32,8 @@ from tpjb_ident.estimate.term import Fitted, Term
 _STEPS, _CONVERGED = 18, 1e-9
 #: Steps in which weights and scatter follow.
 _SCATTER_STEPS = 12
+#: Weight of an unknown beside a block's best told one below which nothing is told of it.
+_UNTOLD = 1e-14
 #: Blocks whose arrays are held at a time.
 _CHUNK = 4096
 
@@ -78,9 +80,10 @@ class Solver:
         self.precision = 1 / np.array([p.deviation for p in self.parameters]) ** 2
         self.always = np.array([t.always_estimated for t in self.terms for _ in t.parameters], dtype=bool)
         self.theta = self.mean.copy()
-        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)))
-        self.h = np.where(self.solvable[:, None, None], start, 1.0)
+        runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
+        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & (runs > 1))
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
+        self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))
         self.u = np.zeros((len(blocks), UNKNOWNS), complex)
         self.scatter = Scatter.none(len(blocks.points), len(blocks))
         self.moved = False
@@ -180,7 +183,7 @@ class Solver:
         z = np.concatenate([blocks.z, np.zeros((len(blocks), HOUSING_ROWS))], axis=1) - state.shift
         z[:, : blocks.z.shape[1]] *= blocks.present
         white = np.linalg.solve(L, z[:, :, None])
-        state.u = np.linalg.solve(R[:, :UNKNOWNS], Q1 @ white)[:, :, 0]
+        state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
         forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
         others = [term.columns(blocks, state) for term in self.terms]
@@ -294,6 +297,13 @@ class _Rows:
     force: FloatArray  #: (n, 2): chi-square of the force equations, and what a scatter of variance one adds to it
     counted: FloatArray  #: (n,): equations that say something
     block_rows: int  #: of r: the others are those of the clocks
+
+
+def _regular(R: ComplexArray) -> ComplexArray:
+    """R (n, 4, 4) with ones on its diagonal where a block's readings tell nothing of an unknown."""
+    size = np.abs(np.einsum("nii->ni", R))
+    untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
+    return np.asarray(R + untold[:, :, None] * np.eye(UNKNOWNS), dtype=complex)
 
 
 def _along_force(patterns: ComplexArray, remainder: ComplexArray) -> FloatArray:

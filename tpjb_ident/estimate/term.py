@@ -15,6 +15,9 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State
 
+#: Largest logarithm of a factor.
+_LARGEST = 5.0
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -115,7 +118,9 @@ class Factor(Term):
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Multiply the state's factor."""
-        state.factor *= np.exp(self.exponent(blocks) @ value)
+        logarithm = self.exponent(blocks) @ value
+        # a start far off may ask for anything; a gain beyond e^5 is no reading any more
+        state.factor *= np.exp(np.clip(logarithm.real, -_LARGEST, _LARGEST) + 1j * logarithm.imag)
 
 
 class Additive(Term):

@@ -148,19 +148,25 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 
     What points share is the noise's density: that of a window goes with one over its length [s].
     """
-    told = [(p.means, length) for p, length in zip(means, lengths) if p.means is not None and p.means.spare > 0]
-    total = sum(w.spare for w, _ in told)
-    m = told[0][0].noise.shape[0] if told else 1
+    told: list[tuple[float, ComplexArray]] = []
+    for p, length in zip(means, lengths):
+        if p.means is not None and p.means.spare > 0:
+            told.append((p.means.spare, np.asarray(length * p.means.noise, complex)))
+    if sum(spare for spare, _ in told) < _FREEDOM:
+        # too few windows in all the campaign: what the lines leave of the records tells the noise
+        told += [(p.residual[1], p.residual[0]) for p in means if p.residual[1] > 0]
+    total = sum(spare for spare, _ in told)
+    m = told[0][1].shape[0] if told else 1
     density = np.zeros((m, m), complex)
-    for w, length in told:
-        density += w.spare * length * w.noise / max(total, 1.0)
+    for spare, noise in told:
+        density += spare * noise / max(total, 1.0)
     noises: list[ComplexArray] = []
     freedoms: list[float] = []
     for p, length in zip(means, lengths):
         spare = 0.0 if p.means is None else p.means.spare
         more = min(max(_FREEDOM - spare, 0.0), total - spare)
-        pool = density / max(length, 1e-9)
-        own = pool if p.means is None else p.means.noise
+        pool: ComplexArray = np.asarray(density / max(length, 1e-9), dtype=np.complex128)
+        own: ComplexArray = pool if p.means is None else p.means.noise
         freedom = max(spare + more, 1.0)
         noise = (spare * own + more * pool) / freedom
         # the inverse of a covariance of few degrees of freedom is too large on average

@@ -96,7 +96,9 @@ def solve_campaign(
         blocks = campaign_blocks(sources, means, misses, bent, temperatures)
         if count == 0:
             rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
-            sensors = with_start(with_found_devices(sensors, blocks), START / rate)
+            devices = with_found_devices(sensors, blocks)
+            # devices that the manifest states are taken at their times; one that was found started when nobody knows
+            sensors = sensors if devices == sensors else with_start(devices, START / rate)
         mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), common)
         rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:

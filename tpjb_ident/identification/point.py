@@ -23,7 +23,14 @@ from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.campaign_solution import CampaignSolution
 from tpjb_ident.identification.methods import Figures, all_methods, point_figures
-from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
+from tpjb_ident.identification.point_means import (
+    MeansTask,
+    PointMeans,
+    channel_windows,
+    clock_turns,
+    vectors,
+    window_times,
+)
 
 #: Terms whose uncertainty scatters with the runs; that of all others is common to the campaign.
 RUN_TERMS = ("load miss", "load direction")
@@ -166,19 +173,20 @@ def _freedom(solved: CampaignSolution, p: int) -> FloatArray:
     return mixed_dof(total, (1 - share) * total, noise_dof, np.full(8, max(spare, 1.0)))
 
 
-def _status(condition: float, weights: FloatArray, runs: int, means: object) -> tuple[Condition, ...]:
+def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans) -> tuple[Condition, ...]:
     found = []
     if condition > _MAX_CONDITION:
         text = f"condition number {condition:.3g} of the displacement directions > 30"
         found.append(Condition("ill-conditioned", text))
-    rejected = float((weights < REJECTED_WEIGHT).mean()) if len(weights) else 0.0
+    counted = weights[means.usable] if len(weights) == len(means.usable) else weights
+    rejected = float((counted < REJECTED_WEIGHT).mean()) if len(counted) else 0.0
     if rejected > _MAX_REJECTED:
         text = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
         found.append(Condition("many-windows-rejected", text))
     if runs == 2:
         text = "two directions only: the interval cannot see what runs differ by, only their repeats"
         found.append(Condition("no-spare-direction", text))
-    wandering = getattr(getattr(means, "means", None), "wandering", 0)
+    wandering = 0 if means.means is None else means.means.wandering
     if wandering:
         text = f"drive phase wanders in {wandering} of {runs} directions; their windows were turned to one phase"
         found.append(Condition("drive-not-locked", text))

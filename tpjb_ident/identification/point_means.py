@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from rigdata.vector import directions
@@ -44,6 +44,8 @@ class PointMeans:
     load_error: FloatArray  #: (g,), N: standard error of the mean load's size
     condition: float
     attenuation: FloatArray = field(repr=False)  #: (2,)
+    residual: tuple[ComplexArray, float] = field(repr=False)  #: density of the noise (m, m) and its degrees of freedom
+    usable: BoolArray = field(repr=False)  #: (n,): windows with a drive and a phasor of every channel of their run
     status: tuple[Condition, ...] = ()
     shaft: ComplexArray = field(default_factory=lambda: np.empty(0, complex))  #: (g,): NaN where it is not on the line
     shaft_conditions: tuple[Condition, ...] = ()
@@ -74,7 +76,28 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     condition = displacement_condition(table.D, weights[table.valid])
     attenuation = np.full(2, np.nan) if means is None else _attenuation(means, task)
     shaft, conditions = _shaft(data, means, task)
-    return PointMeans(start, means, channels, loads, errors, condition, attenuation, status, shaft, conditions)
+    residual = _residual_density(data, task)
+    usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
+    more = (status, shaft, conditions)
+    return PointMeans(start, means, channels, loads, errors, condition, attenuation, residual, usable, *more)
+
+
+def _residual_density(data: PointData, task: MeansTask) -> tuple[ComplexArray, float]:
+    """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, and its freedom."""
+    m = len(task.sensors)
+    total: ComplexArray = np.zeros((m, m), complex)
+    freedom = 0.0
+    for run, line in zip(data.runs, data.lines):
+        if line >= len(run.residual) or not len(run.residual[line]):
+            continue
+        places = {channel.name: k for k, channel in enumerate(run.channels)}
+        if any(sensor.name not in places for sensor in task.sensors):
+            continue
+        bins = run.residual[line][:, [places[sensor.name] for sensor in task.sensors]]
+        bins = bins[np.isfinite(bins).all(axis=1)]
+        total += len(run.start) * run.length * (bins.T @ bins.conj())
+        freedom += len(bins)
+    return np.asarray(total / max(freedom, 1.0), complex), freedom
 
 
 def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, tuple[Condition, ...]]:
@@ -223,7 +246,9 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
     # a run as a whole is no outlier of the windows: the scatter of runs, or the weight of its block, takes it
     good[(share < _ACCEPTED)[table.direction]] = 1.0
     weights[table.valid] = good
-    return weights, fit.coefficients * table.h_scale, fit.conditions
+    # few windows have no robust start; their runs are judged beside those of the other points all the same
+    conditions = tuple(c for c in fit.conditions if c != "no-robust-start")
+    return weights, fit.coefficients * table.h_scale, conditions
 
 
 def _loads(data: PointData) -> tuple[FloatArray, FloatArray]:

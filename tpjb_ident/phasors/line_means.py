@@ -1,14 +1,17 @@
-"""Means of single lines over a run: second harmonics and mains, kept when the windows' phasors are put away."""
+"""Single lines of a run: what the film makes of the motion, and mains; kept when the windows' phasors are put away."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.phasors.run_data import RunPhasors
+from rigdata.vector import inverse_directions
+from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
 
+#: Lines nearer than this are one [Hz].
+_SAME_LINE = 1e-3
 #: Sum of the windows' phasors over that of their sizes below which the drive wanders.
 _COHERENT = 0.9
 #: Windows farther than this from the middle one, in median distances, do not count.
@@ -16,44 +19,62 @@ _FAR = 4.0
 
 
 @dataclass(frozen=True)
-class LineMean:
-    """One line of a run."""
+class FilmLine:
+    """What a run holds at a line that a film which is not linear makes of the motion."""
 
+    ratio: float  #: its frequency over that of the excitation
     displacement: ComplexArray  #: (2,) complex, m
-    force: ComplexArray  #: (2,) complex, N
-    displacement_error: float
-    force_error: float
-    shared: bool = False
+    force: ComplexArray  #: (2,) complex, N: oil force
 
 
-def second_harmonics(run: RunPhasors) -> tuple[tuple[LineMean, LineMean] | None, ...]:
-    """Every excitation line of a run with its second harmonic; None where it is not fitted, or the shaft's."""
-    lines = (run.lines.excitation + run.lines.nuisance)[: run.displacement.phasors.shape[1]]
-    pairs: list[tuple[LineMean, LineMean] | None] = []
+@dataclass(frozen=True)
+class FilmLines:
+    """One excitation line of a run, and the lines beside it by name: "2f", "3f", "2X-f"; those that stand alone."""
+
+    force: float  #: N: size of the oil force at the excitation
+    lines: dict[str, FilmLine]
+    displacement_noise: float  #: m^2: mean square of the residual around the excitation, X and Y together
+    force_noise: float  #: N^2
+
+
+def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
+    """Every excitation line of a run with what the film makes of it; None where the whole record was not fitted."""
+    if not len(run.record) or len(run.residual) < len(run.lines.excitation):
+        return tuple(None for _ in run.lines.excitation)
+    result = []
     for i, driven in enumerate(run.lines.excitation):
-        doubled = [k for k, line in enumerate(lines) if abs(line.frequency - 2 * driven.frequency) < 1e-3]
-        # mains on it adds little; what turns with the shaft does not count as the film's
-        named = doubled and not lines[doubled[0]].name.endswith("X")
-        mains = bool(named) and lines[doubled[0]].name.startswith("mains")
-        pair = (_mean(run, i), replace(_mean(run, doubled[0]), shared=mains)) if named else None
-        pairs.append(pair if pair is not None and np.isfinite(pair[0].force).all() else None)
-    return tuple(pairs)
+        wanted = {"2f": 2 * driven.frequency, "3f": 3 * driven.frequency}
+        if run.lines.speed > 0:
+            wanted["2X-f"] = abs(2 * run.lines.speed - driven.frequency)
+        lines = {}
+        for name, frequency in wanted.items():
+            place = _alone(run, frequency, name)
+            if place is not None:
+                d, f = _plane(run, run.record[place])
+                lines[name] = FilmLine(frequency / driven.frequency, d, f)
+        bins = [_plane(run, row) for row in run.residual[i]]
+        noise = [float(np.nanmean([np.sum(np.abs(pair[k]) ** 2) for pair in bins])) if bins else 0.0 for k in (0, 1)]
+        result.append(FilmLines(float(np.linalg.norm(_plane(run, run.record[i])[1])), lines, *noise))
+    return tuple(result)
 
 
-def _mean(run: RunPhasors, line: int) -> LineMean:
-    d, f = run.displacement.phasors[:, line], run.oil_force(line)
-    good = np.isfinite(d).all(axis=1) & np.isfinite(f).all(axis=1)
-    if not good.any():
-        none = np.full(2, np.nan + 0j)
-        return LineMean(none, none, np.nan, np.nan)
-    d, f = d[good], f[good]
-    return LineMean(complex_median(d), complex_median(f), _error(d), _error(f))
+def _alone(run: RunPhasors, frequency: float, name: str) -> int | None:
+    """Place of a line of the whole record that nothing else shares; None where there is none."""
+    own = "2X-f" if name == "2X-f" else "harmonic"
+    places = [k for k, line in enumerate(run.lines.whole) if abs(line.frequency - frequency) < _SAME_LINE]
+    named = [k for k in places if run.lines.whole[k].name.startswith(own)]
+    return named[0] if named and len(places) == 1 and named[0] < len(run.record) else None
 
 
-def _error(z: ComplexArray) -> float:
-    parts = np.concatenate([z.real, z.imag], axis=1)
-    scale = 1.4826 * np.median(np.abs(parts - np.median(parts, axis=0)), axis=0)
-    return float(1.25 * scale.max() / np.sqrt(len(z)))
+def _plane(run: RunPhasors, phasors: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Displacement and oil force, X and Y, of the channels' phasors (n_channels,)."""
+    plane = {}
+    for quantity in QUANTITIES:
+        places = [k for k in run.pick(quantity) if np.isfinite(phasors[k])]
+        axes = tuple(float(run.channels[k].axis or 0.0) for k in places)
+        plane[quantity] = inverse_directions(axes) @ phasors[places] if len(places) > 1 else np.full(2, np.nan + 0j)
+    inertia = run.housing_mass * plane["acceleration"]
+    return plane["displacement"], plane["force"] + np.where(np.isfinite(inertia), inertia, 0.0)
 
 
 def mains_line(run: RunPhasors) -> ComplexArray | None:

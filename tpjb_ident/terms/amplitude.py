@@ -19,6 +19,10 @@ from tpjb_ident.estimate.term import Additive, Fitted, Parameter
 ZERO_AMPLITUDE = "zero amplitude"
 #: A change is no larger than what the harmonics let expect; as a standard deviation it is this part of it.
 _AS_DEVIATION = 1 / 1.6
+#: Runs of one direction must differ in amplitude by this factor to tell G: directions differ by more than their size.
+_SEVERAL = 1.3
+#: Cosine between the motions of two runs from which they have one direction.
+_ALIKE = 0.98
 #: Numbers of G at a point.
 _NUMBERS = 8
 
@@ -35,6 +39,7 @@ class Amplitude(Additive):
         self._mean = np.array(
             [np.mean(square[blocks.point == p]) if np.any(blocks.point == p) else 1.0 for p in points]
         )
+        self._several = np.array([_several(blocks.z[blocks.point == p][:, rig.of("displacement")]) for p in points])
         self._points = [p for p in points if blocks.bent[p] > 0]
         parameters = []
         for p in self._points:
@@ -60,7 +65,7 @@ class Amplitude(Additive):
         """a^2 G d in the cells."""
         columns = self.no_columns(blocks)
         d = state.u[:, :2]
-        square = np.sum(np.abs(d) ** 2, axis=1) / self._mean[blocks.point]
+        square = self._square(blocks, d)
         for i, p in enumerate(self._points):
             mine = np.flatnonzero(blocks.point == p)
             if not len(mine):
@@ -75,7 +80,7 @@ class Amplitude(Additive):
     def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
         """a^2 G of every run."""
         change = np.zeros((len(blocks), 2, 2), complex)
-        square = np.sum(np.abs(state.u[:, :2]) ** 2, axis=1) / self._mean[blocks.point]
+        square = self._square(blocks, state.u[:, :2])
         for i, p in enumerate(self._points):
             mine = blocks.point == p
             numbers = value[_NUMBERS * i : _NUMBERS * (i + 1)]
@@ -83,3 +88,16 @@ class Amplitude(Additive):
             damping = (numbers[4:] * np.abs(state.h[p].imag).ravel()).reshape(2, 2)
             change[mine] = square[mine, None, None] * (stiffness + 1j * damping)
         return change
+
+    def _square(self, blocks: Blocks, d: ComplexArray) -> FloatArray:
+        """a^2 of every run (n,); one where a point has one amplitude."""
+        square = np.sum(np.abs(d) ** 2, axis=1) / self._mean[blocks.point]
+        return np.where(self._several[blocks.point], square, 1.0)
+
+
+def _several(z: ComplexArray) -> bool:
+    """Whether runs of one direction differ in amplitude; motions (g, probes)."""
+    overlap = np.abs(z @ z.conj().T)
+    size = np.sqrt(np.diag(overlap))
+    alike = overlap > _ALIKE * np.outer(size, size)
+    return bool(np.any(alike & (size[:, None] > _SEVERAL * size)))

@@ -22,7 +22,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.point_data import finite_mean
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore
-from tpjb_ident.phasors.line_means import LineMean, mains_force, mains_line, second_harmonics
+from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_force, mains_line
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Bytes of phasors that stay in memory.
@@ -42,7 +42,7 @@ class RunDigest:
     mean_load: FloatArray  #: (2,), N
     mains: ComplexArray | None  #: (2,) complex, m: displacement at the mains line, where it stands apart
     temperatures: dict[int, float]
-    harmonics: tuple[tuple[LineMean, LineMean] | None, ...] = ()
+    harmonics: tuple[FilmLines | None, ...] = ()
     sample_rate: float = 0.0
     mains_force: ComplexArray | None = None  #: (2,) complex, N: oil force at the mains line, where it stands apart
     window: float = 1.0  #: s: length of its windows
@@ -60,7 +60,7 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
         finite_mean(phasors.cell_force.mean),
         mains_line(phasors),
         result.temperatures,
-        second_harmonics(phasors),
+        film_lines(phasors),
         sample_rate,
         mains_force(phasors),
         phasors.length,
