@@ -95,7 +95,7 @@ ONE_RUN = {
     ),
     "channel missing": (Fault("missing_channel", RUN, "X1A"), "error", "dataset X1A", "missing"),
     "thermometer missing": (Fault("missing_channel", RUN, "T1"), "warning", "dataset T1", "missing"),
-    "short channel": (Fault("short_channel", RUN, "X1A"), "error", "dataset X1A", "the others 2000"),
+    "short channel": (Fault("short_channel", RUN, "X1A"), "error", "dataset X1A", "the others have 2000"),
     "group missing": (Fault("missing_file", RUN), "error", "", "group is missing"),
     "no samples": (Fault("empty_file", RUN), "error", "time", "only 0 samples"),
 }

@@ -28,6 +28,8 @@ from tpjb_ident.phasors.windows import RecordTooShortError
 _BLOCK = 2**19
 _FITTED = 2**16
 _DECIMATED = 4000
+#: Share of the set point by which an excitation may be off.
+OFF_SET_POINT = 0.02
 #: Samples that tell the quantiles of a channel, and whether it has noise.
 _SPREAD = 8192
 
@@ -215,11 +217,18 @@ def _lines(
     run: Run, channels: Sequence[Channel], values: FloatArray, phasors: RunPhasors | None, line: int
 ) -> RecordLines | None:
     if phasors is not None:
-        return excitation_line(phasors, line, channels)
+        lines = excitation_line(phasors, line, channels)
+        return lines if _near_set_point(run, phasors, line) else replace(lines, phasor=np.zeros_like(lines.phasor))
     if run.kind == "locus" or (run.kind == "dynamic" and run.excitation_kind != "sine"):
         speed = run.point.shaft_speed_hz
         return steady_level(values, run.sample_rate, [speed, 2 * speed, 50.0])
     return None
+
+
+def _near_set_point(run: Run, phasors: RunPhasors, line: int) -> bool:
+    """Whether a run is excited where it is said to be: a generator is not off by hertz."""
+    stated = run.point.excitation_hz
+    return abs(phasors.lines.excitation[line].frequency - stated) <= OFF_SET_POINT * max(stated, 1e-9)
 
 
 def _spread(values: FloatArray) -> FloatArray:
@@ -240,7 +249,8 @@ def _other_line(
         return math.nan
     column = values[:, max(cells, key=lambda i: _range(values[:, i]))]
     speed = run.point.shaft_speed_hz
-    driven = [] if phasors is None else [excited.frequency for excited in phasors.lines.excitation]
+    places = range(len(phasors.lines.excitation)) if phasors is not None else ()
+    driven = [phasors.lines.excitation[k].frequency for k in places if phasors and _near_set_point(run, phasors, k)]
     return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz, *driven])
 
 

@@ -74,7 +74,8 @@ class Scatter:
             return Scatter(self.variance, weights, self.pooled, self.spare, self.own, self.own_spare)
         points = len(blocks.points)
         used = weights > 0.05
-        kept = np.asarray(weights / _expected(fit.rows), dtype=float)
+        # where too few good runs remain all count in full, and nothing has to be made up for
+        kept = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
         chi = totals(blocks.point, kept * fit.force, points)
         rows = FORCE_ROWS * totals(blocks.point, np.asarray(used), points)
         information = totals(blocks.point, kept * fit.information, points)

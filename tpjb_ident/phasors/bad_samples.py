@@ -13,6 +13,8 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW
 
+#: A residual is no smaller than this share of the largest: what stands still has none, and is not divided by.
+_ROUNDING = 1e-100
 #: A sample is bad beyond this many robust standard deviations of the fit's residual.
 BAD_LIMIT = 5.5
 #: A window this many times noisier than its run's median is looked at again.
@@ -91,7 +93,7 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: float) -> tuple[FloatArray
     weights, size = np.ones(len(y)), np.full(len(y), np.inf)
     for _ in range(_LAD_ROUNDS):
         previous, size = size, np.abs(y - full @ _quick_solution(full, y, weights))
-        middle = max(float(np.median(size)), np.finfo(float).tiny)
+        middle = max(float(np.median(size)), _ROUNDING * float(size.max(initial=0.0)), np.finfo(float).tiny)
         if np.abs(size - previous).max() <= _SETTLED * middle:
             break  # nothing moves any more that could make a verdict
         weights = 1 / np.maximum(size / middle, 0.1)
@@ -99,7 +101,7 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: float) -> tuple[FloatArray
     for _ in range(_ROUNDS):
         size = np.abs(y - full @ _quick_solution(full, y, weights))
         scale = min(1.4826 * float(np.median(size)), SCALE_LIMIT * usual)
-        excess = size / max(scale * BAD_LIMIT, np.finfo(float).tiny)
+        excess = size / max(scale * BAD_LIMIT, _ROUNDING * float(size.max(initial=0.0)), np.finfo(float).tiny)
         previous, weights = weights, np.maximum(1 - excess**2, 0.0) ** 2
         if weights.mean() < 1 - _MAX_LOST or np.abs(weights - previous).max() < 1e-3:
             break

@@ -23,8 +23,6 @@ from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero
 
-#: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
-UNKNOWN_EXPONENT = 0.6
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
 #: The same for its direction [rad].
