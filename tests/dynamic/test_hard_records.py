@@ -232,3 +232,12 @@ def test_a_channel_that_fails_for_a_while_is_no_change_of_the_drive():
     data["DX"] = data["DX"] + np.where(TIME > 2.0, 3e-6 * np.cos(2 * np.pi * 25 * TIME), 0.0)
     assert phasors_of(data).span is None
     assert phasors_of(record(level=1 + 0.3 * TIME / SECONDS)).span is None
+
+
+def test_lines_that_drift_make_no_channel_slower():
+    turns = 22.0 * TIME + 0.5 * 0.15 * (TIME - 2.0) ** 2
+    data = record()
+    for name in ("DX", "DY", "FX", "FY"):
+        size = TURNING[name[0]]
+        data[name] = data[name] + size * (np.cos(2 * np.pi * turns) + 0.5 * np.cos(4 * np.pi * turns))
+    assert "slower-channels" not in phasors_of(data).conditions

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude
@@ -25,6 +25,8 @@ _SHARE = 1e-4
 _AGREE = 0.15
 #: which is one of these: held, straight lines, cubic splines.
 _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
+#: An image so near to a line of the record [1 / record length] may be what a drift leaves of that.
+_NEAR = 8.0
 #: Rates that divide the export's rate to this share do so exactly.
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
@@ -66,15 +68,16 @@ class SlowerChannel:
 
 def filled_channels(records: tuple[WholeRecord, ...], result: RunPhasors) -> dict[str, SlowerChannel]:
     """Channels that were sampled slower than they were written, by name."""
-    slower = {}
+    slower: dict[str, SlowerChannel] = {}
     for record in records:
         amplitude = hann_amplitude(record.spectrum)
         for column, place in enumerate(record.places):
-            strongest = int(np.nanargmax(np.abs(np.nan_to_num(record.z[:, column]))))
-            line = record.lines.whole[strongest].frequency, float(np.abs(record.z[strongest, column]))
-            found = _images_of(line, amplitude[:, column], record)
-            if found is not None:
-                slower[result.channels[place].name] = found
+            sizes = np.abs(np.nan_to_num(record.z[:, column]))
+            for strong in np.argsort(-sizes)[:2]:
+                line = record.lines.whole[strong].frequency, float(sizes[strong])
+                found = _images_of(line, amplitude[:, column], record)
+                if found is not None:
+                    slower.setdefault(result.channels[place].name, found)
     return slower
 
 
@@ -87,12 +90,12 @@ def _images_of(line: tuple[float, float], amplitude: FloatArray, record: WholeRe
     inside = amplitude[1:-1]
     top = (inside > least) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
     peaks = np.flatnonzero(top) + 1
-    peaks = peaks[peaks > 1.2 * frequency * record.duration]
+    peaks = peaks[(peaks > 1.2 * frequency * record.duration) & _is_free(peaks, record)]
     for low in peaks[np.argsort(-amplitude[peaks])][:8]:
         rate = low / record.duration + frequency
         mirror = record.rate - (rate + frequency) if rate + frequency > record.rate / 2 else rate + frequency
         around = np.round(mirror * record.duration).astype(int) + np.arange(-1, 2)
-        if around.min() < 1 or around.max() >= len(amplitude) - 1:
+        if around.min() < 1 or around.max() >= len(amplitude) - 1 or not _is_free(around, record).all():
             continue
         high = int(around[np.argmax(amplitude[around])])
         orders = [
@@ -107,6 +110,12 @@ def _images_of(line: tuple[float, float], amplitude: FloatArray, record: WholeRe
             exact = record.rate / round(ratio) if abs(ratio - round(ratio)) < _EVEN * ratio else exact
             return SlowerChannel(exact, record.rate, order)
     return None
+
+
+def _is_free(bins: IntArray, record: WholeRecord) -> BoolArray:
+    """Whether bins (n,) are away from all lines of the record, (n,)."""
+    lines = np.array([line.frequency for line in record.lines.whole]) * record.duration
+    return np.asarray(np.abs(bins[:, None] - lines).min(axis=1) > _NEAR)
 
 
 def _peak_offset(amplitude: FloatArray, k: int) -> float:

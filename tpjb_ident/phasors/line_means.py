@@ -8,12 +8,15 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from rigdata.vector import inverse_directions
+from tpjb_ident.phasors.line_fit import usual_scale
 from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
 
 #: Lines nearer than this are one [Hz].
 _SAME_LINE = 1e-3
 #: Sum of the windows' phasors over that of their sizes below which the drive wanders.
 _COHERENT = 0.9
+#: Part of a run that is its beginning [s].
+_EARLY = 2.0
 #: Windows farther than this from the middle one, in median distances, do not count.
 _FAR = 4.0
 
@@ -113,14 +116,17 @@ def complex_median(z: ComplexArray) -> ComplexArray:
 
 
 def channel_phasors(run: RunPhasors, line: int) -> ComplexArray:
-    """Typical phasor of every channel at one line over a run, (n_channels,); NaN where a channel has none.
+    """Typical phasor of every channel at one line in a run's beginning, (n_channels,); NaN where a channel has none.
 
-    Where the drive wanders, the windows are turned to one phase first, by the pattern that all of them show.
+    Later on clocks that differ would have turned it. Where the drive wanders, the windows are turned to one phase
+    first, by the pattern that all of them show.
     """
-    z = run.z[:, line]
+    present = np.flatnonzero(np.isfinite(run.z[:, line]).any(axis=1))
+    early = [k for k in present if run.start[k] + run.length <= run.start[present[0]] + _EARLY]
+    z = run.z[early if len(early) > 3 else present[:4], line]
     good = np.isfinite(z).all(axis=1)
     if good.sum() > 2:
-        weighted = z[good] / np.maximum(np.median(run.scale[good], axis=0), np.finfo(float).tiny)
+        weighted = z[good] / np.maximum(usual_scale(run.scale), np.finfo(float).tiny)
         course = np.linalg.svd(weighted, full_matrices=False)[0][:, 0]
         if abs(course.sum()) < _COHERENT * np.abs(course).sum():
             z = z[good] * np.exp(-1j * np.angle(course))[:, None]

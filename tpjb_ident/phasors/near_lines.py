@@ -1,7 +1,7 @@
 """A line within the resolution of a window beside the excitation: a second machine, the mains, a beat of two drives.
 
 Windows see a beat, which looks like a drive that wanders, or like clocks that differ. The whole record tells a line
-from that down to one resolution cell: beside the excitation and its slow growth, one more line explains what is left.
+from that down to one resolution cell: beside the excitation and its slow change, one more line explains what is left.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tpjb_ident.phasors.whole_record import WholeRecord
 #: Parts of the record whose phasors at the excitation are looked at.
 _PARTS = 64
 #: Distances from the excitation at which a line is looked for [1 / record length],
-_NEAREST, _FARTHEST, _STEP = 0.8, 4.5, 0.1
+_NEAREST, _FARTHEST, _STEP = 1.0, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
 _CLEAR = 25.0
 #: and share of what is left besides it that there may be: sidebands of a drive that changes come in pairs.
@@ -57,7 +57,7 @@ def _part_phasors(record: WholeRecord, frequency: float) -> tuple[ComplexArray, 
 def _best(parts: ComplexArray) -> tuple[float, float, float]:
     """Power that is left beside the line that explains most, its distance [1 / record length], its power."""
     time = (np.arange(_PARTS) + 0.5) / _PARTS
-    steady = np.linalg.qr(np.stack([np.ones(_PARTS), time - 0.5], axis=1) + 0j)[0]
+    steady = np.linalg.qr(np.vander(time - 0.5, 3) + 0j)[0]
     unsteady = parts - steady @ (steady.conj().T @ parts)
     total = float(np.sum(np.abs(unsteady) ** 2))
 
