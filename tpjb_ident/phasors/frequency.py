@@ -146,7 +146,7 @@ def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> Flo
 
 def _phasor_noise(result: RunPhasors, rate: float) -> float:
     """Standard error of a component of a window's displacement phasor."""
-    return _typical(result.displacement.noise) / np.sqrt(result.length * rate)
+    return float(np.median(usual_scale(result.displacement.noise))) / np.sqrt(result.length * rate)
 
 
 def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
@@ -185,8 +185,3 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
         [steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]
     )
     return speeds, noise / size / (2 * np.pi * float(np.median(np.diff(t))))
-
-
-def _typical(noise: FloatArray) -> float:
-    finite = noise[np.isfinite(noise)]
-    return float(np.median(finite)) if len(finite) else 0.0

@@ -82,12 +82,6 @@ class RunPhasors:
         """X and Y of the accelerometers; None where there are none."""
         return self._vector("acceleration") if self.pick("acceleration") else None
 
-    @property
-    def blocks(self) -> dict[str, PhasorBlock]:
-        """What was measured, by quantity."""
-        table = {"displacement": self.displacement, "force": self.cell_force, "acceleration": self.acceleration}
-        return {quantity: block for quantity, block in table.items() if block is not None}
-
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of a quantity."""
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
@@ -107,10 +101,6 @@ class RunPhasors:
             means[rows] = mean[rows][:, members] @ inverse.T
             noise[rows] = np.sqrt(scale[rows][:, members] ** 2 @ (inverse**2).T)
         return PhasorBlock(phasors, means, noise, self.lost[:, places].max(axis=1, initial=0.0))
-
-    def with_phasors(self, z: ComplexArray) -> RunPhasors:
-        """The run with other phasors (n_windows, n_lines, n_channels)."""
-        return replace(self, z=z)
 
     def changed(self, change: Callable[[str, ComplexArray], ComplexArray]) -> RunPhasors:
         """The run with other phasors, changed quantity by quantity (n_windows, n_lines, n_channels of the quantity)."""

@@ -71,7 +71,7 @@ def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:
 def _slim(phasors: RunPhasors) -> RunPhasors:
     """The run without the phasors of nuisance lines: estimates need those of the excitation alone."""
     n = len(phasors.lines.excitation)
-    return phasors.with_phasors(phasors.z[:, :n].copy())
+    return replace(phasors, z=phasors.z[:, :n].copy())
 
 
 def _bytes(phasors: RunPhasors) -> int:
