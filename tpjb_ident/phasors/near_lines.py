@@ -33,9 +33,11 @@ def near_line(records: tuple[WholeRecord, ...], result: RunPhasors, driven: int)
     parts, size = [], []
     for record in records:
         phasors, noise = _part_phasors(record, frequency)
-        live = record.used > 0
+        live = (record.used > 0.5) & (noise > np.finfo(float).tiny)
         parts.append(phasors[:, live] / noise[live])
         size.append(np.abs(result.z[:, driven, np.array(record.places)[live]]) / noise[live])
+    if not sum(part.shape[1] for part in parts):
+        return None
     left, shift, power = _best(np.concatenate(parts, axis=1))
     amplitude = np.nanmedian(np.linalg.norm(np.concatenate(size, axis=1), axis=1))
     channels = sum(len(record.places) for record in records)
