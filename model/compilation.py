@@ -22,28 +22,34 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 #: Files with compiled functions, relative to the package; a test holds the list complete.
 KERNELS = (
     "compilation.py",
+    "film/attitudes.py",
     "film/cavitation.py",
     "film/cavitation_matrix.py",
     "film/cross_energy.py",
     "film/cross_film.py",
     "film/cross_march.py",
+    "film/edge_flows.py",
     "film/energy.py",
     "film/following_heat.py",
     "film/matrix.py",
     "film/oil_state.py",
+    "film/resting.py",
     "film/reynolds.py",
     "film/slopes.py",
     "film/turbulence.py",
     "statics/compiled/anderson.py",
     "statics/compiled/bending.py",
-    "statics/compiled/carrying.py",
+    "statics/compiled/case.py",
     "statics/compiled/constants.py",
     "statics/compiled/elimination.py",
-    "statics/compiled/first_position.py",
+    "statics/compiled/heat.py",
     "statics/compiled/iteration.py",
     "statics/compiled/laws.py",
+    "statics/compiled/place.py",
     "statics/compiled/stack.py",
+    "statics/compiled/start.py",
     "statics/compiled/step.py",
+    "tilt_hold.py",
 )
 #: Sums may be reordered, but NaN and infinity keep their meaning.
 _OPTIONS: dict[str, Any] = {
@@ -154,11 +160,20 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
     if not hasattr(store, "_source_stamp"):  # a cache that is built otherwise: compile in every process, trust nothing
         return _without_cache(numba, function)
     store._source_stamp = stamp()
+    store._load_index = functools.partial(_readable_index, store._load_index)
     if all(hasattr(dispatcher._cache, name) for name in _LOADING):  # a numba that loads otherwise: its own way
         dispatcher._cache.__class__ = _cache_type()
     else:
         _register_inner_loops()
     return dispatcher
+
+
+def _readable_index(load: Callable[[], dict[Any, Any]]) -> dict[Any, Any]:
+    """Machine code on disk by signature; none where an older version's names something that has gone."""
+    try:
+        return load()
+    except (ImportError, AttributeError):
+        return {}
 
 
 def _without_cache(numba: Any, function: Callable[..., Any]) -> Any:

@@ -21,7 +21,7 @@ from model.setup import Setup
 from model.statics.axial_tilt import axial_tilt_of
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
-from model.statics.tilt_hold import friction_limits, tilt_hold
+from model.tilt_hold import friction_limits, tilt_hold
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 

@@ -71,7 +71,7 @@ class Setup:
     starvation : float
         Every film starts after this fraction of the arc.
     rolling : float
-        Factor on the rotational stiffness of pivots that roll, see `model.statics.tilt_hold`.
+        Factor on the rotational stiffness of pivots that roll, see `model.tilt_hold`.
     friction : float
         Coefficient of friction of pivots that slide.
     vibration : float

@@ -171,6 +171,7 @@ _MAX_STEPS = 4000
 _PATIENCE = 8
 
 
+@compiled
 def solve_film_jfo(
     grid: FilmGrid,
     work: FilmWork,
@@ -189,6 +190,7 @@ def solve_film_jfo(
     return FilmForces(force, stiffness, damping, forces.min_film, steps)
 
 
+@compiled
 def solve_flooded_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:

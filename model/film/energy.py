@@ -32,7 +32,7 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
-    _dissipation(grid, work, running.speed, sources[0], loss)
+    dissipate(grid, work, running.speed, sources[0], loss)
     for i in range(rows):
         for j in range(columns):
             less = running.oil[1] * loss[i, j]
@@ -159,12 +159,12 @@ def heat_by_drag(
 def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
     """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
     out, less = np.empty(work.pressure.shape), np.empty(work.pressure.shape)
-    _dissipation(grid, work, speed, out, less)
+    dissipate(grid, work, speed, out, less)
     return out
 
 
 @inner
-def _dissipation(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
+def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
     """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]

@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.bearing import Oil
+from model.compilation import compiled
 from model.film.mesh import FilmGrid
+from model.film.oil_state import Running
 
 
 class RestingFilm(NamedTuple):
-    """What an idle pad's film does."""
+    """What an idle pad's film does; NaN where the journal touches it."""
 
     power: float
     flow: float
@@ -29,23 +30,31 @@ class RestingFilm(NamedTuple):
     reynolds: float
 
 
+@compiled
 def resting_film(
-    grid: FilmGrid, wedge: tuple[float, float], surface_speed: float, oil: Oil, inlet: float, retained: float
-) -> RestingFilm:
-    """Film of an idle pad."""
-    thickness = wedge[0] - wedge[1] * grid.cos
-    if not thickness.min() > 0.0:
-        return RestingFilm(math.nan, math.nan, math.nan, math.nan)
-    share = np.minimum(1.0, thickness[0] / thickness)
-    density = float(oil.density(inlet))
-    slope = 2.0 * retained * surface_speed / (density * oil.specific_heat * thickness**2)
-    along = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1])) * grid.dx])
-    entering, exponent = float(oil.viscosity(inlet)), oil.viscosity_exponent
-    rise = entering * along if exponent == 0.0 else np.log1p(exponent * entering * along) / exponent
-    viscosity = oil.viscosity(inlet + rise)
-    length = float(grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)  # the grid may hold one half
-    shear = viscosity * surface_speed**2 / thickness * share
-    power = float((0.5 * (shear[1:] + shear[:-1])).sum()) * grid.dx * length
-    flow = 0.5 * density * surface_speed * float(thickness[0]) * length
-    reynolds = float((oil.density(inlet + rise) * surface_speed * thickness / viscosity).max())
-    return RestingFilm(power, flow, inlet + float(rise[-1]), reynolds)
+    grid: FilmGrid, wedge: tuple[float, float], running: Running, inlet: float
+) -> tuple[float, float, float, float]:
+    """Film of an idle pad for (Cp, a), as a `RestingFilm`; infinite heat capacity: as cold as its inlet."""
+    oil, speed = running.oil, running.speed
+    density, entering = oil[2] * (1.0 + oil[3] * (40.0 - inlet)), oil[0] * np.exp(oil[1] * (40.0 - inlet))
+    # the grid may hold one half
+    length = (grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)
+    leading = wedge[0] - wedge[1] * grid.cos[0]
+    along, rise, power, reynolds = 0.0, 0.0, 0.0, 0.0
+    heating_before, shear_before = 0.0, 0.0
+    for i in range(len(grid.cos)):
+        thickness = wedge[0] - wedge[1] * grid.cos[i]
+        if not thickness > 0.0:
+            return math.nan, math.nan, math.nan, math.nan
+        heating = 2.0 * speed / (density * running.heat[0] * thickness**2)
+        if i > 0:
+            along += 0.5 * (heating + heating_before) * grid.dx
+        rise = entering * along if oil[1] == 0.0 else np.log1p(oil[1] * entering * along) / oil[1]
+        viscosity = entering * np.exp(-oil[1] * rise)
+        shear = viscosity * speed**2 / thickness * min(1.0, leading / thickness)
+        if i > 0:
+            power += 0.5 * (shear + shear_before) * grid.dx * length
+        lighter = oil[2] * (1.0 + oil[3] * (40.0 - inlet - rise))
+        reynolds = max(reynolds, lighter * speed * thickness / viscosity)
+        heating_before, shear_before = heating, shear
+    return power, 0.5 * density * speed * leading * length, inlet + rise, reynolds

@@ -16,9 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.bearing import Bearing, Pad
-from model.film.mesh import FilmGrid, FilmWork
-from model.film.reynolds import FilmForces, conductances
-from model.film.slopes import shape_slopes
+from model.film.mesh import FilmGrid
 from model.pad.mesh import PadGeometry
 from rigdata.arrays import FloatArray
 
@@ -42,15 +40,6 @@ class PadDeformation:
     weights: FloatArray  #: (2, unknowns): Radial and tangential force by that pressure [m^2].
 
 
-class SolvedFilm(NamedTuple):
-    """A film whose pressure is solved."""
-
-    grid: FilmGrid
-    work: FilmWork
-    wedge: tuple[float, float, float]
-    forces: FilmForces
-
-
 class AxialTilt(NamedTuple):
     """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
 
@@ -60,18 +49,6 @@ class AxialTilt(NamedTuple):
     weights: FloatArray
     stiffness: float
     moment: float
-
-
-@dataclass(frozen=True)
-class BendingStep:
-    """One pad's part of a Newton step."""
-
-    forces: FilmForces
-    mismatch: FloatArray  #: (nt + 1, nz + 1): Wanted less present deformation, without the shapes [m].
-    amplitude: FloatArray  #: (m,): Change of the shapes' amplitudes at rest ...
-    by_approach: FloatArray  #: (m, 2): ... and per (a, b).
-    share: float
-    axial_tilt: FloatArray  #: (3,): Its change at rest, and per (a, b) [rad, rad/m]; empty if it is not free.
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:
@@ -124,73 +101,7 @@ def _softest_shapes(compliance: FloatArray, area: FloatArray) -> FloatArray:
     return np.asarray(basis[:, :SHAPES] / root[:, None])
 
 
-def wanted_shapes(
-    bodies: list[PadDeformation], pressures: list[FloatArray], rises: list[FloatArray], factor: float
-) -> list[FloatArray]:
-    """Deformation that every film asks of its pad, Eq. (6)-(8) [m]; pads of one shape are done in one product.
-
-    `pressures, rises` (nt + 1, nz + 1) [Pa].
-    """
-    wanted: list[FloatArray] = [np.empty(0)] * len(bodies)
-    for body in {id(b): b for b in bodies}.values():
-        alike = [k for k, b in enumerate(bodies) if b is body]
-        pressure = np.column_stack([pressures[k].ravel() for k in alike])
-        rise = np.column_stack([rises[k].ravel() for k in alike])
-        shape = factor * (body.compliance @ pressure + body.expansion @ (body.to_coarse @ rise))
-        for column, k in enumerate(alike):
-            wanted[k] = shape[:, column].reshape(pressures[k].shape)
-    return wanted
-
-
-def bending_step(
-    body: PadDeformation | None, film: SolvedFilm, change: FloatArray, factor: float, axial: AxialTilt | None = None
-) -> BendingStep:
-    """Close the loop of pressure, deformation and axial tilt for one pad: `change` (nt + 1, nz + 1) [m]."""
-    grid, work, wedge, forces = film
-    least = forces.min_film
-    if body is None:
-        assert axial is not None
-        shapes, response, asked = np.empty((*change.shape, 0)), np.empty((0, len(work.unknown))), np.empty(0)
-        held, weights, mismatch, share = np.empty((0, 0)), force_weights(grid), change, 0.0
-    else:
-        shapes, response, asked = body.shapes, factor * body.response, body.amplitudes @ change.ravel()
-        held, weights, mismatch = _UNIT, body.weights, change - body.shapes @ asked
-        share = float(np.abs(change).max()) / least
-    bending = len(asked)
-    if axial is not None:
-        shapes = np.concatenate([shapes, axial.shape[:, :, None]], axis=2)
-        response, asked = np.vstack([response, axial.weights]), np.append(asked, axial.moment)
-        held = np.diag(np.append(np.ones(bending), axial.stiffness))
-    slopes = shape_slopes(grid, work, conductances(grid, work, *wedge), shapes)
-    rhs = np.empty((len(asked), 3))
-    rhs[:, 0] = asked
-    rhs[:, 1:] = response @ work.slopes[:, :2]
-    answer = np.asarray(np.linalg.solve(held - response @ slopes, rhs), dtype=float)
-    felt = (weights @ slopes) @ answer
-    axial_step = answer[bending:].ravel()
-    if axial is not None:
-        share = max(share, abs(float(axial_step[0])) * float(np.abs(axial.shape).max()) / least)
-    return BendingStep(
-        forces=forces._replace(force=forces.force + felt[:, 0], stiffness=forces.stiffness + felt[:, 1:]),
-        mismatch=mismatch,
-        amplitude=answer[:bending, 0],
-        by_approach=answer[:bending, 1:],
-        share=share,
-        axial_tilt=axial_step,
-    )
-
-
-_UNIT = np.eye(SHAPES)
-
-
 def force_weights(grid: FilmGrid) -> FloatArray:
     """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2]."""
     inner = grid.area[1:-1, grid.first : -1]
     return np.stack([(c[1:-1, None] * inner).ravel() for c in (grid.cos, grid.sin)])
-
-
-def change_of_shape(body: PadDeformation | None, step: BendingStep, da: float, db: float) -> FloatArray:
-    """Change of the deformation that belongs to a move (da, db) of the film [m]: gives (nt + 1, nz + 1) [m]."""
-    if body is None:
-        return step.mismatch
-    return step.mismatch + body.shapes @ (step.amplitude + step.by_approach @ np.array([da, db]))

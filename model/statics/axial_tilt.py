@@ -11,7 +11,7 @@ about the pivot,
 
     integral of p z cos(alpha) dA,
 
-is what flexure, rolling or friction of the pivot (`model.statics.tilt_hold`, alike about all axes of a sphere) hold.
+is what flexure, rolling or friction of the pivot (`model.tilt_hold`, alike about all axes of a sphere) hold.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ import numpy as np
 
 from model.film.mesh import FilmGrid
 from model.film.reynolds import FilmForces
-from model.pad.bending import AxialTilt, change_of_shape
+from model.pad.bending import AxialTilt
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
-from model.statics.tilt_hold import tilt_hold
+from model.tilt_hold import tilt_hold
 from rigdata.arrays import FloatArray
 
 
@@ -50,18 +50,3 @@ def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: Fil
     moment = float((grid.area * shape * pressure).sum()) - hold.moment
     lever = grid.area * (shape - hold.arm * grid.cos[:, None])
     return AxialTilt(shape, lever[1:-1, grid.first : -1].ravel(), hold.stiffness, moment)
-
-
-def shape_change(setup: Setup, film: PadFilm, da: float, db: float) -> tuple[FloatArray, float]:
-    """Change of a film's shape that belongs to a move (da, db) of it, and that of the pad's axial tilt in it.
-
-    Gives change (nt + 1, nz + 1) [m].
-    """
-    assert film.step is not None
-    change = change_of_shape(film.deformation if setup.flexible_pads else None, film.step, da, db)
-    if not setup.pads_follow:
-        return change, 0.0
-    axial = float(film.step.axial_tilt @ (1.0, da, db))
-    if setup.friction and film.axial_tilt * (film.axial_tilt + axial) < 0.0:
-        axial = -film.axial_tilt  # friction turns round there
-    return change + axial * axial_shape(film.grid), axial

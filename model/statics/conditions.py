@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from model.setup import Setup
-from model.statics.compiled.constants import MAX_LOAD_CHANGES
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
@@ -36,7 +35,13 @@ SINGULAR = Condition("singular", "error", "a Newton step has no solution")
 UNSUPPORTED = Condition(
     "no pads against the load", "error", "no set of pivots can balance the load, wherever the journal goes"
 )
+_LEFT = "carrying, they would push the journal off, or friction holds them off"
 _STICK_AND_SLIP = "friction holds them where their film loses its load, and without load there is no friction"
+NOT_HELD = Condition(
+    "nothing holds the journal across its load",
+    "warning",
+    "all pads that carry push along one line: kxx or kyy is zero",
+)
 FLOW_BACK = Condition(
     "flow back at a leading edge", "warning", "a pressure peak pushes oil back; the heat balance there is limited"
 )
@@ -67,7 +72,35 @@ def left_unloaded(pads: Sequence[int]) -> Condition:
     """Pads that were left idle on the way, although they could carry, numbers from 1."""
     return Condition(
         f"pads {_listed(pads)} cannot keep their load", "warning",
-        "carrying, they would push the journal off, or friction holds them off", tuple(pads),
+        _LEFT, tuple(pads),
+    )  # fmt: skip
+
+
+def left(status: Sequence[Condition]) -> bool:
+    """Whether pads were left idle that could carry."""
+    return any(c.detail == _LEFT for c in status)
+
+
+def even(pads: Sequence[int]) -> Condition:
+    """Pads whose film is even and without load, numbers from 1."""
+    return Condition(
+        f"pads {_listed(pads)} stand concentric", "note", "without load, their films take part in the dynamics",
+        tuple(pads),
+    )  # fmt: skip
+
+
+def on_edge(pads: Sequence[int]) -> Condition:
+    """Pads so near their fold that the mesh decides whether they carry, numbers from 1."""
+    return Condition(
+        f"pads {_listed(pads)} on the edge of carrying", "note", "a finer mesh may let them carry or idle", tuple(pads)
+    )
+
+
+def another(pads: Sequence[int]) -> Condition:
+    """Another equilibrium, with other pads idle, numbers from 1."""
+    return Condition(
+        "another equilibrium exists", "note", f"in it pads {_listed(pads)} idle; this one leaves the last pads idle",
+        tuple(pads),
     )  # fmt: skip
 
 
@@ -77,13 +110,6 @@ def undecided(pads: Sequence[int]) -> Condition:
         f"pads {_listed(pads)} can neither carry nor idle", "error",
         "idle they take up load at once, carrying they push the journal off", tuple(pads),
     )  # fmt: skip
-
-
-def _alternating(pads: Sequence[int]) -> Condition:
-    """Pads that went on taking up and shedding their load, numbers from 1."""
-    return Condition(
-        f"pads {_listed(pads)} take up and shed their load", "error", "the iteration finds no rest", tuple(pads)
-    )
 
 
 def stick_and_slip(pads: Sequence[int]) -> Condition:
@@ -97,12 +123,6 @@ def stick_and_slip(pads: Sequence[int]) -> Condition:
 def held_off(status: Sequence[Condition]) -> tuple[int, ...]:
     """Pads of `stick_and_slip` in a status."""
     return tuple(pad for c in status if c.detail == _STICK_AND_SLIP for pad in c.pads)
-
-
-def never_at_rest(films: Sequence[PadFilm]) -> tuple[Condition, ...]:
-    """Names the pads that went on taking up and shedding their load, if any did."""
-    pads = [f.number for f in films if f.load_changes >= MAX_LOAD_CHANGES]
-    return (_alternating(pads),) if pads else ()
 
 
 def _listed(pads: Sequence[int]) -> str:

@@ -25,8 +25,9 @@ from model.film.cross_march import conduct, face_temperature, march_cross, stati
 from model.pad.bending import PadDeformation
 from model.setup import Setup
 from model.statics.compiled.constants import BOUNDLESS
-from model.statics.heat_paths import FilmAnswer, balance_heat
+from model.statics.compiled.heat import balance_heat
 from model.statics.pad_film import PadFilm
+from model.statics.pad_flow import outlet_temperature, through_flow
 from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
@@ -43,7 +44,8 @@ class CrossAnswer:
 
     fields: FloatArray  #: (nt + 1, n, 3): Of the cells [degC].
     faces: FloatArray  #: (3, nt + 1, nz + 1): Of the pad's face [degC].
-    outer: FilmAnswer
+    outlet: FloatArray  #: (3,): Flow-weighted at the trailing edge [degC].
+    taken: FloatArray  #: (3,): By the journal [W].
 
 
 def settle_cross_temperatures(
@@ -66,7 +68,10 @@ def settle_cross_temperatures(
         answer, share = _answer(setup, film, surface_speed, (start, around), operator)
         answers.append(answer)
         back = max(back, share)
-    inlets, journal = balance_heat(setup, order, [a.outer if a is not None else None for a in answers])
+    inlets, journal = balance_heat(
+        np.arange(len(order)), _outer(order, answers), np.array([a is not None for a in answers]),
+        float(setup.inlet_temperature), float(setup.mixing),
+    )  # fmt: skip
     change = 0.0
     for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
         hotter = inlet - film.inlet
@@ -82,9 +87,23 @@ def settle_cross_temperatures(
         share = _limited_share(film.temperature_change, limits)
         film.cross.temperature[:] += share * asked
         film.cross.face[:] += share * face
-        film.outlet = float(np.dot(part.outer.outlet, weights))
+        film.outlet = float(np.dot(part.outlet, weights))
         change = float(np.maximum(change, film.temperature_change))
     return change, back, journal
+
+
+def _outer(
+    order: Sequence[PadFilm], answers: Sequence[CrossAnswer | None]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What films pass on, as `balance_heat` takes it; an idle pad passes its inlet on, somewhat warmer."""
+    flows = np.array([through_flow(f) for f in order])
+    outlets, taken = np.zeros((2, len(order), 3))
+    for k, (film, part) in enumerate(zip(order, answers, strict=True)):
+        if part is None:
+            outlets[k] = outlet_temperature(film) - film.inlet, 1.0, 0.0
+        else:
+            outlets[k], taken[k] = part.outlet, part.taken
+    return flows, outlets, taken
 
 
 def _limited_share(change: float, limits: tuple[float, float]) -> float:
@@ -154,4 +173,4 @@ def _answer(
         kept[0] += more if math.isfinite(more) else 0.0
     weight = operator.carried / operator.carried.sum()
     outlet = weight.ravel() @ fields[-1]
-    return CrossAnswer(fields, faces, FilmAnswer(outlet, kept)), back
+    return CrossAnswer(fields, faces, outlet, kept), back

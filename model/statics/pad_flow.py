@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.bearing import Oil
+from model.film.edge_flows import edge_flows
 from model.film.mesh import FilmWork
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import BoolArray, FloatArray
@@ -38,35 +39,21 @@ def pad_flow(film: PadFilm, oil: Oil) -> PadFlow:
 
 
 def through_flow(film: PadFilm) -> tuple[float, float]:
-    """What passes the leading edge and the trailing edge [kg/s].
-
-    What enters and does not leave over the sides leaves at the trailing edge, in streaks where the film is ruptured:
-    by balance, because the rupture line of a mesh moves by whole nodes and what is found behind it jumps.
-    """
+    """What passes the leading edge and the trailing edge [kg/s]; see `edge_flows`."""
     if film.resting is not None:
         return film.resting.flow, film.resting.flow
     if film.forces is None:
         return math.nan, math.nan
-    entering = _both(film) * float(film.work.flow_x[0].sum())
-    return entering, entering - side_flow(film)
+    entering, sides = edge_flows(film.grid, film.work)
+    return entering, entering - sides
 
 
 def side_flow(film: PadFilm) -> float:
     """What leaves over both sides [kg/s]."""
     if film.forces is None:
         return 0.0 if film.resting is not None else math.nan
-    entering, leaving, across = film.work.flow_x[0], film.work.flow_x[-1], film.work.flow_z
-    inner, edges = slice(film.grid.first, -1), [-1] if film.grid.first == 0 else [0, -1]
-    over = float(across[:, -1].sum()) - (float(across[:, 0].sum()) if film.grid.first == 1 else 0.0)
-    # the half cells at the edges have no pressure: they run as full at the trailing edge as the lines beside them
-    full = float(leaving[inner].sum())
-    filled = min(1.0, max(0.0, (float(entering[inner].sum()) - over) / full)) if full > 0.0 else 1.0
-    return _both(film) * (over + float((entering[edges] - filled * leaving[edges]).sum()))
-
-
-def _both(film: PadFilm) -> float:
-    """Two where the mesh holds one half of a symmetric film."""
-    return 2.0 if film.grid.first == 0 else 1.0
+    sides: float = edge_flows(film.grid, film.work)[1]
+    return sides
 
 
 def _side_temperature(film: PadFilm) -> float:
@@ -82,14 +69,8 @@ def outlet_temperature(film: PadFilm) -> float:
         return film.inlet
     if film.cross is not None:
         return film.outlet
-    return flow_weighted(film, film.work.temperature[None])[0]
-
-
-def flow_weighted(film: PadFilm, fields: FloatArray) -> list[float]:
-    """Mean of every field at the trailing edge, weighted by the flow of a full film there."""
     flow = film.work.flow_x[-1]
-    values: list[float] = (fields[:, -1] @ flow / float(flow.sum())).tolist()
-    return values
+    return float(film.work.temperature[-1] @ flow / flow.sum())
 
 
 def _ruptured(work: FilmWork) -> BoolArray:

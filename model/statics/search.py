@@ -1,209 +1,404 @@
-"""The state of a search for an equilibrium: journal, pads and films, how it starts, and all of it as one vector."""
+"""One search for an equilibrium: from a set-up to the arrays that compiled loops iterate on, and back to its films."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from model.film.cross_film import CrossOperator
-from model.film.energy import heat_by_drag
-from model.film.mesh import FilmWork
+from model.conditions import has_answer
+from model.film.attitudes import attitudes
+from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
+from model.film.oil_state import Running, set_viscosity
+from model.film.resting import RestingFilm
+from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
+from model.pad.bending import SHAPES
 from model.setup import Setup
+from model.statics import conditions
 from model.statics.axial_tilt import aligned_tilt, axial_shape
-from model.statics.carrying import find_branch, set_loaded
-from model.statics.compiled.constants import FIRST_HEATING, HEATING_STEP, MICROMETRE
-from model.statics.compiled.first_position import first_position
-from model.statics.equilibrium import Equilibrium, mean_temperature
-from model.statics.heat_paths import couples_heat
-from model.statics.pad_film import PadFilm, pad_films
-from rigdata.arrays import FloatArray
+from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, MASS_CONSERVING, TURBULENT, Case
+from model.statics.compiled.constants import HEATING_STEP
+from model.statics.compiled.iteration import (
+    ASKS_HEAT,
+    ASKS_LAWS,
+    ASKS_OIL,
+    BOUNDLESS_HEAT,
+    FILM_LOST,
+    HEAT,
+    ITERATION,
+    RELAXED,
+    RESIDUAL,
+    SETTLED,
+    SINGULAR,
+    Memory,
+    fresh_memory,
+    iterate,
+    vector_size,
+)
+from model.statics.compiled.laws import OTHER, ask_laws, encoded
+from model.statics.compiled.place import place
+from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
+from model.statics.compiled.start import first_position, pivot_curve, row_at, warm_film
+from model.statics.cross_heat import settle_cross_temperatures
+from model.statics.equilibrium import Equilibrium
+from model.statics.heat_paths import couples_heat, stacked_conduction
+from model.statics.pad_film import oil_constants, pad_films
+from model.tilt_hold import hold_numbers
+from rigdata.arrays import BoolArray, FloatArray
+from rigdata.problem import Condition
 
-#: A change of the clearance by more than this share asks for the table of a pad's loaded attitudes anew.
-_NEW_TABLE = 1e-3
+#: What turns films into what `Case.rupture` says.
+_RUPTURES = {"swift-stieber": None, "jfo": MASS_CONSERVING, "turbulent": TURBULENT}
+_FAILURES = {
+    FILM_LOST: conditions.FILM_LOST, BOUNDLESS_HEAT: conditions.BOUNDLESS_HEAT, SINGULAR: conditions.SINGULAR,
+}  # fmt: skip
+#: A pad that tilts by this share of the largest tilt in the last step swings, too.
+_SWINGING = 0.3
+#: Share of the clearance that tells a place from a fold.
+_EVEN = 1e-6
+#: Rows of a pad's loaded attitudes at most.
+_ROWS = 64
 
 
-@dataclass
 class Search:
-    """What an iteration carries along."""
+    """A journal, pads and films at one operating point; `heat` is the share of the heat that the films keep."""
 
-    setup: Setup
-    load: FloatArray  #: (2,), N
-    speed: float
-    films: list[PadFilm] = field(init=False)
-    position: FloatArray = field(default_factory=lambda: np.zeros(2))  #: (2,): Journal [m].
-    limited: float = 0.0
-    journal: float = math.nan
-    relaxation: float = 1.0
-    warm: bool = False
-    heat: float = 1.0
-    warmth: float = field(init=False)
-    warming: float = 0.0
-    held: set[int] = field(default_factory=set)
-    works: FilmWork = field(init=False)
-    shifts: FloatArray = field(init=False)  #: (n, unknowns): Their changes of pressure.
-
-    def __post_init__(self) -> None:
-        self.lay_out()
+    def __init__(self, setup: Setup, load: FloatArray, speed: float, heat: float = 1.0) -> None:
+        self.setup, self.load, self.speed, self.heat = setup, load, speed, heat
+        self.films, self.works, shifts = pad_films(_as_started(setup))
+        for film in self.films:
+            film.kept *= heat
+        self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
+        self.rises: list[tuple[int, FloatArray]] = []
+        self.warm = False
+        self.case = self._case()
+        self.shapes = self._shapes()
+        self.pads = self._pads()
+        self.state = self._state(shifts)
+        self.operator = None
+        if self.films[0].cross is not None:
+            self.operator = CrossOperator.place(*self.films[0].cross.temperature.shape)
 
     @property
     def surface_speed(self) -> float:
         """Of the journal [m/s]."""
         return self.speed * self.setup.bearing.journal_radius
 
-    @cached_property
-    def heat_balances(self) -> CrossOperator:
-        """Room for the balances of one film with temperatures across after the other."""
-        cross = self.films[0].cross
-        assert cross is not None
-        return CrossOperator.place(*cross.temperature.shape)
+    def _case(self) -> Case:
+        setup, kept = self.setup, (1.0 - self.setup.heat_loss) * self.heat
+        oil, growth = setup.bearing.oil, setup.growth
+        thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
+        if thermal == ALONE and couples_heat(setup):
+            thermal = ACROSS if setup.thermal == "thd" else COUPLED
+        heat = (oil.specific_heat, oil.conductivity)
+        if thermal == ALONE:  # what a share of the heat does, all of it does to oil that takes up more per kelvin
+            heat = (oil.specific_heat / kept, oil.conductivity / kept)
+        if thermal == ISOTHERMAL:
+            heat = (math.inf, oil.conductivity)
+        return Case(
+            load=np.array(self.load, dtype=float),
+            running=Running(float(self.surface_speed), oil_constants(oil), heat),
+            hold=hold_numbers(setup),
+            accuracy=float(setup.accuracy),
+            thermal=thermal,
+            rupture=_RUPTURES[self.films[0].rupture],
+            supply=float(setup.inlet_temperature),
+            kept=float(kept),
+            mixing=float(setup.mixing),
+            journal=bool(setup.options.isothermal_journal),
+            closing=0.0 if growth is None else float(growth.closing(setup.bearing)),
+            axial=setup.pads_follow,
+            asks_laws=bool((encoded(setup.pivots)[0][:, 0] == OTHER).any()),
+        )
 
-    @property
-    def carrying(self) -> list[PadFilm]:
-        """Films that were solved and are not lost."""
-        return [f for f in self.films if f.forces is not None and f.forces.steps > 0]
+    def _shapes(self) -> Shapes:
+        setup, films = self.setup, self.films
+        bodies: tuple[Any, ...] = tuple(f.deformation for f in films if f.deformation is not None)
+        grid = films[0].grid
+        conducting = bodies if self.case.thermal == COUPLED and setup.options.conduction else ()
+        bending: BodyStack = stacked_bodies(
+            bodies if setup.flexible_pads else (), (grid.first, len(grid.z)), setup.bending_factor, self.case.supply
+        )
+        return Shapes(stacked_grids(tuple(f.grid for f in films)), bending, stacked_conduction(conducting))
 
-    def lay_out(self) -> None:
-        """Make all films anew, their clearances those of a journal as warm as the supply."""
-        setup, growth = self.setup, self.setup.growth
-        self.warmth = setup.inlet_temperature
-        if growth is not None:
-            setup = setup.change(bearing=grown(setup.bearing, growth, self.warmth, self.warmth))
-        self.films, self.works, self.shifts = pad_films(setup)
-        for film in self.films:
-            film.kept *= self.heat
-            if setup.pads_follow and not (setup.rotational_stiffness or setup.rolling or setup.friction):
-                film.axial_tilt = aligned_tilt(setup, film.pad.pivot_angle)  # nothing holds it: that is nearly there
-                film.work.extra[:] += film.axial_tilt * axial_shape(film.grid)
-        self.warm = False
+    def _pads(self) -> PadStack:
+        films, count = self.films, len(self.films)
+        frame = np.array([(f.normal, f.tangent) for f in films])
+        numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance) for f in films]
+        preload, radius, clearance = np.array(numbers, dtype=float).T.copy()
+        angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
+        laws, curves = encoded(self.setup.pivots)
+        return PadStack(
+            frame, preload, radius, clearance, np.argsort(angles, kind="stable"), laws, curves,
+            np.zeros((count, 4, _ROWS)), np.zeros(count, dtype=np.int64),
+        )  # fmt: skip
 
-    def warm_up(self) -> float:
-        """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
-        growth = self.setup.growth
-        if growth is None:
-            return 0.0
-        felt = self.journal if math.isfinite(self.journal) else mean_temperature(self.films)
-        asked = felt - self.warmth
-        self.warming = self.relaxation * math.copysign(min(abs(asked), HEATING_STEP), asked)
-        for film in self.films:
-            film.closing = growth.closing(self.setup.bearing) * self.warming
-        return abs(asked)
+    def _state(self, shifts: FloatArray) -> PadState:
+        n, works, across = len(self.films), self.works, self.case.thermal == ACROSS
+        bends = self.setup.flexible_pads or self.case.axial
+        shape = works.extra.shape
+        faces, warmth = works.temperature, works.temperature.reshape(n, -1)
+        if across:
+            faces = np.full(shape, self.case.supply)
+            assert self.films[0].cross is not None
+            warmth = np.full((n, self.films[0].cross.temperature.size), self.case.supply)
+            for film, face, warm in zip(self.films, faces, warmth, strict=True):
+                assert film.cross is not None
+                cells = warm.reshape(film.cross.temperature.shape)
+                film.cross = film.cross._replace(temperature=cells, face=face)
+        bent = np.zeros(shape if bends else (n, 0, 0))
+        axial = np.zeros(n)
+        if self.case.axial:
+            if not any(self.case.hold):  # nothing holds it: that is nearly there
+                axial[:] = [aligned_tilt(self.setup, f.pad.pivot_angle) for f in self.films]
+            for film, tilt in zip(self.films, axial.tolist(), strict=True):
+                film.work.extra[:] += tilt * axial_shape(film.grid)
+        return PadState(
+            position=np.zeros(2),
+            tilt=np.zeros(n),
+            deflection=np.zeros(n),
+            axial=axial,
+            idle=np.zeros(n, dtype=np.bool_),
+            solved=np.zeros(n, dtype=np.bool_),
+            rescues=np.zeros(n, dtype=np.int64),
+            inlet=np.full(n, self.case.supply),
+            resting=np.full((n, 4), math.nan),
+            wedge=np.zeros((n, 2)),
+            force=np.zeros((n, 2)),
+            corrected=np.zeros((n, 2)),
+            stiffness=np.zeros((n, 2, 2)),
+            damping=np.zeros((n, 2, 2)),
+            least=np.zeros(n),
+            steps=np.zeros(n, dtype=np.int64),
+            heating=np.full(n, math.inf),
+            shift=shifts,
+            felt=np.zeros((n, 2)),
+            felt_stiffness=np.zeros((n, 2, 2)),
+            bent=bent,
+            mismatch=np.zeros_like(bent),
+            amplitude=np.zeros((n, SHAPES, 3)),
+            axial_step=np.zeros((n, 3)),
+            moves=np.zeros((n, 2)),
+            faces=faces,
+            warmth=warmth,
+            figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
+        )
 
-    def grow(self, share: float) -> None:
-        """Let the journal grow by a share of what `warm_up` said."""
-        if self.warming:
-            self._set_warmth(self.warmth + share * self.warming)
-
-    def _set_warmth(self, warmth: float) -> None:
-        """Give the clearances that belong to a journal of this temperature [degC]."""
-        growth = self.setup.growth
-        assert growth is not None
-        taken = growth.closing(self.setup.bearing) * (warmth - self.warmth)
-        self.warmth, self.warming = warmth, 0.0
-        for film in self.films:
-            pad = film.pad
-            film.pad = replace(
-                pad,
-                pad_clearance=pad.pad_clearance - taken,
-                assembled_clearance=pad.assembled_clearance - taken,
+    def know_attitudes(self) -> None:
+        """Find the curve of every pad's loaded attitudes, if they are not known."""
+        if self.rises:
+            return
+        load = max(float(np.hypot(*self.load)), 1.0)
+        case, nothing = self.case, np.empty(0)
+        running = case.running
+        if case.thermal in (COUPLED, ACROSS):
+            specific, conductivity = running.heat
+            kept = max(case.kept, 1e-9)
+            running = running._replace(heat=(specific / kept, conductivity / kept))
+        radius, length = self.setup.bearing.journal_radius, self.setup.bearing.length
+        oil = self.setup.bearing.oil
+        viscosity = float(oil.viscosity(case.supply))
+        for m, film in enumerate(self.films):
+            clearance = float(self.pads.clearance[m])
+            curve = attitudes(film.grid, clearance, running, case.supply, load)
+            unit = viscosity * self.surface_speed * radius**2 * length / clearance**2
+            law, gives = self.setup.pivots[m], nothing
+            if self.pads.laws[m, 0] == OTHER:
+                gives = np.array([law.deflection(max(w, 0.0)) for w in (curve.load * unit).tolist()])
+            self.pads.rows[m] = pivot_curve(
+                curve[:3], (clearance, unit), self.pads.laws[m], self.pads.curves[m], gives, self.pads.attitudes[m]
             )
-            film.closing = 0.0
-            if film.branch is not None and abs(taken) > _NEW_TABLE * pad.pad_clearance:
-                film.branch = None
+            self.rises.append((len(curve.load) - int(self.pads.rows[m]), curve.rise))
+
+    def stand(self) -> None:
+        """Put journal and pads where the curves carry the load, and films as warm as they are there."""
+        self.know_attitudes()
+        pads, state = self.pads, self.state
+        numbers = np.column_stack([pads.frame[:, 0], pads.preload, pads.clearance])
+        state.position[:], loaded, self.other = first_position(self.case.load, numbers, pads.attitudes, pads.rows)
+        state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
+        for m in np.flatnonzero(loaded).tolist():
+            self.load_pad(m)
+
+    def load_pad(self, m: int) -> None:
+        """Put a pad on its loaded attitude for the journal's position, its film as warm as it is there."""
+        self.know_attitudes()
+        pads, film = self.pads, self.films[m]
+        place(pads, self.works, self.state, m)
+        if self.case.thermal == ISOTHERMAL:
+            return
+        low, rises = self.rises[m]
+        reach = film.preload_distance + float(film.normal @ self.state.position)
+        row, share = row_at(pads.attitudes[m, 0], int(pads.rows[m]), reach)
+        temperature = film.work.temperature
+        warm_film(rises, (low + row, share), self.state.inlet[m], film.grid.first == 1, temperature)
+        if film.cross is not None:
+            film.cross.temperature[:] = temperature[:, :, None]
+            film.cross.face[:] = temperature
+
+    def margins(self) -> FloatArray:
+        """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
+        self.know_attitudes()
+        pads = self.pads
+        reach = pads.preload + pads.frame[:, 0] @ self.state.position
+        folds = np.where(pads.rows >= 2, pads.attitudes[:, 0, 0], math.inf)
+        return np.asarray((reach - folds) / pads.clearance)
+
+    def let_idle(self, numbers: list[int]) -> None:
+        """Let pads (from 0) carry nothing."""
+        self.state.idle[numbers] = True
+        self.state.tilt[numbers] = self.state.deflection[numbers] = 0.0
+
+    def even_films(self) -> list[int]:
+        """Numbers of idle pads that stand at a fold without load, concentric: their films count, as they are there.
+
+        Neither loaded nor loose, such a film has no pressure, and answers a small motion like one that is full.
+        """
+        pads, even = self.pads, []
+        for m in np.flatnonzero(self.state.idle & (np.abs(self.margins()) < _EVEN)).tolist():
+            film = self.films[m]
+            if pads.attitudes[m, 3, 0] == 0.0 and self.case.rupture is None and self.case.thermal == ISOTHERMAL:
+                film.work.ruptured[:] = False
+                wedge = (float(pads.clearance[m]), float(pads.attitudes[m, 1, 0]), 0.0)
+                set_viscosity(film.work, self.case.running.oil)
+                film.forces = solve_film(film.grid, film.work, wedge, self.surface_speed, False)
+                even.append(film.number)
+        return even
+
+    def not_held(self) -> bool:
+        """Whether nothing holds the journal across its load: all pads with films push along one line."""
+        normals = np.array([f.normal for f in self.films if f.forces is not None])
+        return len(normals) > 0 and self.case.hold.flexure == 0.0 and np.linalg.matrix_rank(normals, tol=1e-6) < 2
 
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state; False if it has none or its mesh does not fit."""
         if len(start.films) != len(self.films) or not start.converged:
             return False
-        coupled = couples_heat(self.setup)
-        for film, other in zip(self.films, start.films, strict=True):
-            if film.work.pressure.shape != other.work.pressure.shape:
-                return False
-            film.tilt, film.deflection, film.idle = other.tilt, other.deflection, other.idle
+        coupled, state = couples_heat(self.setup), self.state
+        if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
+            return False
+        for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
+            state.tilt[m], state.deflection[m], state.idle[m] = other.tilt, other.deflection, other.idle
             film.work.temperature[:] = other.work.temperature
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
-                film.inlet = other.inlet
-            for state, known in zip(film.heat_state, other.heat_state, strict=False):
-                state[:] = known
+                state.inlet[m] = other.inlet
+            for own, known in zip(film.heat_state, other.heat_state, strict=False):
+                own[:] = known
             film.work.ruptured[:] = other.work.ruptured
             film.work.pressure[:] = other.work.pressure
             if self.setup.flexible_pads:
-                film.bent[:] = other.bent
+                state.bent[m] = other.bent
                 film.work.extra[:] += other.bent
-            if self.setup.pads_follow:
-                film.work.extra[:] += (other.axial_tilt - film.axial_tilt) * axial_shape(film.grid)
-                film.axial_tilt = other.axial_tilt
-        self.position, self.warm = start.position.copy(), True
+            if self.case.axial:
+                film.work.extra[:] += (other.axial_tilt - state.axial[m]) * axial_shape(film.grid)
+                state.axial[m] = other.axial_tilt
+        state.position[:], self.warm = start.position, True
         if coupled:
-            self.journal = start.journal_temperature
+            state.figures[JOURNAL] = start.journal_temperature
         if self.setup.growth is not None:
-            self._set_warmth(start.mean_journal_temperature)
+            hotter = start.mean_journal_temperature - state.figures[GROWN]
+            state.figures[GROWN] += hotter
+            self.pads.clearance[:] -= self.case.closing * hotter
         return True
 
-    def start_cold(self) -> None:
-        """See `model.statics.compiled.iteration.start_cold`."""
-        for film in self.films:
-            for state in (film.work.temperature, *film.heat_state):
-                state[:] = film.inlet
-        isothermal, oil = self.setup.thermal == "isothermal", self.setup.bearing.oil
-        self._balance_films(0.0 if isothermal else FIRST_HEATING)
-        if isothermal or self.setup.thermal == "thd":
-            return
-        for film in self.films:
-            if not film.idle:
-                wedge = (film.pad.pad_clearance, *film.approach(self.position))
-                heat_by_drag(film.grid, film.work, wedge, film.running(self.surface_speed, oil), film.inlet)
-        self._balance_films(0.0)
+    def run(self) -> Equilibrium:
+        """Iterate from where the search stands."""
+        size = vector_size(self.state, self.case)
+        memory = fresh_memory(size, self.warm or self.case.thermal == ACROSS)
+        code = ASKS_OIL
+        while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS):
+            code = iterate(self.shapes, self.pads, self.works, self.state, self.case, memory)
+            if code == ASKS_OIL:
+                for m, film in enumerate(self.films):
+                    if not self.state.idle[m] and film.cross is not None:
+                        set_cross_viscosity(film.cross, film.work, self.case.running.oil)
+            elif code == ASKS_HEAT:
+                memory.trail[HEAT] = self._heat_across(memory)
+            elif code == ASKS_LAWS:
+                ask_laws(self.setup.pivots, self.pads.laws, self.state.felt[:, 0])
+        self._take_over()
+        return self._ended(code, memory)
 
-    def _balance_films(self, hotter: float) -> None:
-        """Put journal and pads where tabulated films, as warm as these or `hotter` [K] than that, carry the load."""
-        branches = []
-        for film in self.films:
-            film.branch = find_branch(self.setup, film, self.surface_speed, hotter)
-            branches.append(film.branch)
-        normals = np.array([f.normal for f in self.films])
-        distances = np.array([f.preload_distance for f in self.films])
-        self.position = first_position(self.load, normals, distances, branches)
-        for film in self.films:
-            set_loaded(film, self.position)
+    def _heat_across(self, memory: Memory) -> float:
+        """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
+        self._take_over()
+        state, limits = self.state, (float(memory.trail[RELAXED]), HEATING_STEP)
+        assert self.operator is not None
+        change, state.figures[BACKFLOW], state.figures[JOURNAL] = settle_cross_temperatures(
+            self.setup, self.films, self.surface_speed, float(state.figures[JOURNAL]), limits, self.operator
+        )
+        for m, film in enumerate(self.films):
+            state.inlet[m], state.heating[m] = film.inlet, film.temperature_change
+            if state.solved[m] and film.cross is not None:
+                more = cross_pressure_change(
+                    film.grid, film.work, film.cross, self.surface_speed, self.case.running.oil, state.shift[m]
+                )
+                state.corrected[m] = state.force[m] + more
+        return change
 
-    def vector(self) -> FloatArray:
-        """Journal, pads and film temperatures as one vector, in micrometres and kelvins."""
-        parts = [self.position / MICROMETRE, np.array([self.warmth])]
-        for film in self.films:
-            parts.append(np.array([film.tilt * film.pivot_radius, film.deflection]) / MICROMETRE)
-            if self.setup.pads_follow:
-                parts.append(np.array([film.axial_tilt * film.pivot_radius / MICROMETRE]))
-            parts += [state.ravel() * (0.0 if film.idle else 1.0) for state in film.heat_state]
+    def _take_over(self) -> None:
+        """Leave the films where the arrays stand."""
+        state, grown_by = self.state, self.setup.growth is not None
+        for m, film in enumerate(self.films):
+            film.tilt, film.deflection = float(state.tilt[m]), float(state.deflection[m])
+            film.idle, film.axial_tilt = bool(state.idle[m]), float(state.axial[m])
+            film.temperature_change, film.inlet = float(state.heating[m]), float(state.inlet[m])
+            film.forces = film.resting = None
             if self.setup.flexible_pads:
-                parts.append(film.bent.ravel() / MICROMETRE)
-        return np.concatenate(parts)
+                film.bent = state.bent[m]
+            if state.solved[m]:
+                forces = state.force[m], state.stiffness[m], state.damping[m]
+                film.forces = FilmForces(*forces, float(state.least[m]), int(state.steps[m]))
+            else:
+                film.resting = RestingFilm(*state.resting[m].tolist())
+            if grown_by:
+                less = film.pad.pad_clearance - float(self.pads.clearance[m])
+                film.pad = replace(
+                    film.pad,
+                    pad_clearance=film.pad.pad_clearance - less,
+                    assembled_clearance=film.pad.assembled_clearance - less,
+                )
 
-    def set_vector(self, state: FloatArray) -> None:
-        """Undo `vector`: `state` (n,)."""
-        self.position = state[:2] * MICROMETRE
-        if self.setup.growth is not None:
-            self._set_warmth(float(state[2]))
-        at = 3
-        for film in self.films:
-            film.tilt = float(state[at]) * MICROMETRE / film.pivot_radius
-            film.deflection = float(state[at + 1]) * MICROMETRE
-            at += 2
-            if self.setup.pads_follow:
-                axial = float(state[at]) * MICROMETRE / film.pivot_radius
-                film.work.extra[:] += (axial - film.axial_tilt) * axial_shape(film.grid)
-                film.axial_tilt = axial
-                at += 1
-            for part in film.heat_state:
-                if not film.idle:
-                    part.ravel()[:] = state[at : at + part.size]
-                at += part.size
-            size = film.bent.size
-            if self.setup.flexible_pads:
-                bent = state[at : at + size].reshape(film.bent.shape) * MICROMETRE
-                film.work.extra[:] += bent - film.bent
-                film.bent[:] = bent
-                at += size
+    def _ended(self, code: int, memory: Memory) -> Equilibrium:
+        """The state as an answer."""
+        films, figures = self.films, self.state.figures
+        names: list[Condition] = []
+        if code != SETTLED:
+            names = [_FAILURES[code]] if code in _FAILURES else self._restless()
+            names.append(conditions.NOT_CONVERGED)
+        if not has_answer(names) and conditions.unsupported(self.setup, self.load):
+            names.insert(0, conditions.UNSUPPORTED)
+        overloaded = conditions.overloaded_pads(films)
+        if overloaded and has_answer(names):
+            names.append(conditions.overloaded(overloaded))
+        idle = [f.number for f in films if f.idle]
+        if idle:
+            names.append(conditions.idle(idle))
+        if figures[BACKFLOW] > 0.0:
+            names.append(conditions.FLOW_BACK)
+        names += conditions.regimes(self.setup, films, self.surface_speed)
+        trail = memory.trail
+        return Equilibrium(
+            self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
+            float(figures[JOURNAL]), tuple(names), self.surface_speed,
+        )  # fmt: skip
+
+    def _restless(self) -> list[Condition]:
+        """Names the pads with friction that the last step moved most."""
+        if not self.setup.friction:
+            return []
+        tilts = np.abs(self.state.moves[:, 0])
+        swinging = tilts >= _SWINGING * float(tilts.max())
+        return [conditions.stick_and_slip([k + 1 for k in np.flatnonzero(swinging).tolist()])]
+
+
+def _as_started(setup: Setup) -> Setup:
+    """The set-up with the clearances of a journal as warm as the supply."""
+    supply, growth = setup.inlet_temperature, setup.growth
+    if growth is None:
+        return setup
+    return setup.change(bearing=grown(setup.bearing, growth, supply, supply))

@@ -1,104 +1,166 @@
-"""Find a static equilibrium, Eq. (1): from a neighbour, from tabulated films, or by raising the load."""
+"""Find a static equilibrium, Eq. (1): from a neighbour, from the curves of its pads, or by raising load or heat."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from model.setup import Setup
 from model.statics import conditions
-from model.statics.at_once import able, iterate_at_once
-from model.statics.carrying import let_idle
-from model.statics.compiled.constants import MAX_LOAD_CHANGES
 from model.statics.conditions import HOTTEST_FILM, runaway
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
-from model.statics.newton_iteration import iterate
 from model.statics.search import Search
 from rigdata.arrays import FloatArray
+from rigdata.problem import Condition
 
 #: First share of the load or the heat, where the whole of it finds no equilibrium at once, and the least step on.
 _FIRST_SHARE, _LEAST_STEP = 0.25, 0.02
+#: Share of the clearance within which the curve of a pad may be wrong about its fold, because its mesh is coarse; and
+#: because pads bend or drink hot oil. Within it the film is tried: this costs time, and decides nothing.
+_NEAR, _NEAR_SOFT = 0.02, 0.1
+#: Share of the clearance from a fold within which the mesh decides whether a pad carries.
+_EDGE = 3e-4
 
 
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
     """Find where the journal stands: `load` (2,) [N]."""
-    search = Search(setup, np.asarray(load, float), speed)
-    if start is not None and search.start_from(start):
-        result = _iterated(search, cold=False)
-        if result.converged:
-            return result
-        search.lay_out()
-    result = _iterated(search, cold=True)
+    load = np.asarray(load, float)
+    if start is not None:
+        search = Search(setup, load, speed)
+        if search.start_from(start):
+            result = _settled(search, search.run())
+            # where pads are left idle that could carry, another start may leave others
+            if result.converged and not conditions.left(result.status):
+                return result
+    search = Search(setup, load, speed)
+    search.stand()
+    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
+    result = _settled(search, search.run())
+    if not result.converged and near:  # they may find no rest where they carry
+        search = Search(setup, load, speed)
+        search.stand()
+        search.let_idle(near)
+        other = _settled(search, search.run())
+        result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and couples_heat(setup):
-        result = _raise_heat(search, result)
-    if not result.converged:
-        result = _raise_load(search, result)
+        result = _raise_heat(setup, load, speed, result)
+    for what in ("load", "speed"):
+        if not result.converged:
+            result = _raise(setup, load, speed, what)[0] or result
     if not result.converged and setup.friction:
-        search.lay_out()
-        result = _let_held_idle(search, _iterated(search, cold=True))
+        result = _let_held_idle(setup, load, speed, result)
     return result
 
 
-def _iterated(search: Search, cold: bool) -> Equilibrium:
-    """Iterate from where a search stands, or from a cold start; in one compiled call where that is possible."""
-    if able(search.setup):
-        return iterate_at_once(search, cold)
-    if cold:
-        search.start_cold()
-    return iterate(search)
+def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozenset()) -> Equilibrium:
+    """An equilibrium with the most pads loaded: idle ones near or above their folds are put on their films and tried.
+
+    `held` are pads (from 0) that friction holds off.
+    """
+    if not result.converged or not any(f.idle for f in result.films):
+        return result
+    refused = set(held)
+    above = search.margins()
+    near = _NEAR_SOFT if search.setup.flexible_pads or couples_heat(search.setup) else _NEAR
+    while True:
+        doubtful = [m for m, f in enumerate(result.films) if f.idle and above[m] > -near and m not in refused]
+        if not doubtful:
+            break
+        pad = max(doubtful, key=lambda m: float(above[m]))
+        trial = Search(search.setup, search.load, search.speed, search.heat)
+        trial.start_from(result)
+        trial.load_pad(pad)
+        other = trial.run()
+        fewer = sum(f.idle for f in other.films) < sum(f.idle for f in result.films)
+        refused.add(pad)
+        if other.converged and not other.films[pad].idle and (fewer or not _left_above(trial, other, near)):
+            search, result, above = trial, other, trial.margins()
+    return _named(search, result, near, held)
 
 
-def _let_held_idle(search: Search, failed: Equilibrium) -> Equilibrium:
+def _left_above(search: Search, result: Equilibrium, near: float) -> list[int]:
+    """Pads (from 0) that idle clearly above their folds."""
+    above = search.margins()
+    return [m for m, f in enumerate(result.films) if f.idle and above[m] > near]
+
+
+def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int]) -> Equilibrium:
+    """An equilibrium with what is to be said of its idle pads.
+
+    One that would carry where it idles, and carrying pushes the journal off, is left idle where its film opens both
+    ways; where it does not, nothing keeps it idle either.
+    """
+    names: list[Condition] = []
+    even = search.even_films()
+    unloaded = _left_above(search, result, near)
+    films = result.films
+    off = [m for m in unloaded if m in held or films[m].rigid_approach(result.position) <= 0.0]
+    restless = [m + 1 for m in unloaded if m not in off]
+    off = sorted({*off, *(m for m in held if films[m].idle)})
+    if restless:
+        names = [conditions.undecided(restless), conditions.NOT_CONVERGED]
+    elif off:
+        names = [conditions.left_unloaded([m + 1 for m in off])]
+    if even and not restless:
+        names.append(conditions.even(even))
+    edge = [m + 1 for m, above in enumerate(search.margins()) if abs(above) < _EDGE and m + 1 not in even]
+    if edge:
+        names.append(conditions.on_edge(edge))
+    if search.other.any() and not restless:
+        names.append(conditions.another([m + 1 for m in np.flatnonzero(~search.other).tolist()]))
+    across = search.not_held()
+    if across:
+        names.append(conditions.NOT_HELD)
+    return replace(result, status=(*names, *result.status)) if names else result
+
+
+def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
     """Let pads idle that friction holds where their film loses its load: they have no other rest."""
-    result = failed
+    search = Search(setup, load, speed)
+    search.stand()
+    result, held = search.run(), frozenset[int]()
     for _ in search.films:
-        held = [f for f in search.films if f.number in conditions.held_off(result.status) and not f.idle]
-        if not held:
+        swinging = [k - 1 for k in conditions.held_off(result.status) if not search.state.idle[k - 1]]
+        if not swinging:
             return failed
-        for film in held:
-            let_idle(film)
-            film.load_changes = MAX_LOAD_CHANGES
-        search.held |= {f.number for f in held}
-        result = iterate(search)
+        held |= frozenset(swinging)
+        search.let_idle(swinging)
+        result = search.run()
         if result.converged:
-            return result
+            return _settled(search, result, held)
     return failed
 
 
-def _raise_load(search: Search, failed: Equilibrium) -> Equilibrium:
-    """Raise the load in steps, each started from the one before: hot, thin films are far from the isothermal guess."""
-    load = search.load.copy()
-    found, _ = _raise(search, lambda share: setattr(search, "load", share * load))
-    return found or failed
-
-
-def _raise_heat(search: Search, failed: Equilibrium) -> Equilibrium:
+def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
     """Raise the heat in steps: where it goes round, with journal and clearances, cold films are no start for hot ones.
 
     Names a bearing that is lost on the way because it grows hotter and closer for ever: above some share of its heat.
     """
-    found, reached = _raise(search, lambda share: setattr(search, "heat", share))
+    found, reached = _raise(setup, load, speed, "heat")
     hottest = max(float(f.work.temperature.max()) for f in failed.films)
     if found is not None or not reached or hottest < HOTTEST_FILM:
         return found or failed
     return replace(failed, status=(runaway(reached), *failed.status))
 
 
-def _raise(search: Search, put: Callable[[float], None]) -> tuple[Equilibrium | None, float]:
-    """Raise what `put` sets a share of from `_FIRST_SHARE` to 1; the equilibrium there, and the share reached."""
+def _raise(setup: Setup, load: FloatArray, speed: float, what: str) -> tuple[Equilibrium | None, float]:
+    """Raise load, heat or speed from `_FIRST_SHARE` to 1, each step started from the one before.
+
+    The equilibrium at the end, and the share reached.
+    """
     reached, step = 0.0, _FIRST_SHARE
     last: Equilibrium | None = None
     while reached < 1.0 and step > _LEAST_STEP:
         share = min(1.0, reached + step)
-        put(share)
-        search.lay_out()
-        result = _iterated(search, cold=last is None or not search.start_from(last))
+        shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, what: share}
+        search = Search(setup, shares["load"] * load, shares["speed"] * speed, shares["heat"])
+        if last is None or not search.start_from(last):
+            search.stand()
+        result = _settled(search, search.run())
         if result.converged:
             last, reached = result, share
         else:
             step *= 0.5
-    put(1.0)
     return (last if reached == 1.0 else None), reached

@@ -13,8 +13,8 @@ from model.pivots import pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Setup
-from model.statics import at_once, newton_iteration, solve
-from model.statics.compiled.iteration import SINGULAR
+from model.statics import search
+from model.statics.compiled.iteration import RESIDUAL, SINGULAR
 from model.statics.conditions import overloaded_pads, unsupported
 
 SPEED, DOWN = 2 * math.pi * 22.0, -math.pi / 2
@@ -111,15 +111,12 @@ def test_limits_of_a_pad_are_told_apart(rocker):
 
 
 def test_singular_steps_are_named(rocker, monkeypatch):
-    # no bearing is known that gets there: the guard is held by a step made of nothing
-    def nothing(*_: object) -> tuple[float, np.ndarray, np.ndarray]:
-        return 1.0, np.full(2, math.nan), np.zeros((5, 2))
+    # no bearing is known that gets there: the guard is held by a search that says so
+    def singular(*arrays: object) -> int:
+        arrays[-1].trail[RESIDUAL] = math.inf
+        return SINGULAR
 
-    with monkeypatch.context() as stepwise:
-        stepwise.setattr(solve, "able", lambda setup: False)
-        stepwise.setattr(newton_iteration, "newton_step", nothing)
-        assert "singular" in run(rocker).status
-    monkeypatch.setattr(at_once, "iterate", lambda *_: (SINGULAR, 3, math.inf, 0.0, 0.0))
+    monkeypatch.setattr(search, "iterate", singular)
     p = run(rocker)
     assert "singular" in p.status
     assert not p.converged

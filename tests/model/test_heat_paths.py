@@ -15,7 +15,6 @@ from model.growth import Growth, grown
 from model.options import Options
 from model.predict import predict
 from model.prediction import Prediction
-from model.statics.heat_paths import minimal_residual
 from tests.rigs.bearings import changed_pads
 
 SPEED = 2 * math.pi * 22
@@ -97,12 +96,20 @@ def test_isothermal_films_exchange_nothing(rocker):
     np.testing.assert_array_equal(a.h, b.h)
 
 
-def test_krylov_steps_solve_a_known_system():
-    rng = np.random.default_rng(3)
-    matrix = np.eye(30) + 0.3 * rng.standard_normal((30, 30)) / math.sqrt(30)
-    right = rng.standard_normal(30)
-    x = minimal_residual(lambda v: matrix @ v, right, 1e-4)
-    assert np.linalg.norm(matrix @ x - right) < 1e-4 * np.linalg.norm(right)
+def test_what_pads_conduct_is_what_films_lose(rocker):
+    # the temperatures at rest fulfil the energy equation with the heat that the face's own temperature drives in
+    p = run(rocker, Options(conduction=True))
+    oil, surface = rocker.oil, SPEED * rocker.journal_radius
+    for film in p.equilibrium.films:
+        pad, work, grid = film.deformation, film.work, film.grid
+        rise = (work.temperature - p.setup.inlet_temperature).ravel()
+        heat = (pad.flux @ (pad.to_coarse @ rise)).reshape(work.temperature.shape) * grid.dx * grid.height
+        assert np.abs(heat).sum() > 1.0  # W: not nothing
+        work.gained[:] = -heat
+        fresh = np.empty_like(work.temperature)
+        running = Running(surface, (oil.viscosity_40, 0.0, 0.0, 0.0), (oil.specific_heat, oil.conductivity))
+        solve_energy(grid, work, film.inlet, running, fresh)
+        np.testing.assert_allclose(fresh, work.temperature, atol=1e-3)
 
 
 class TestGrowth:

@@ -18,7 +18,7 @@ from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
-from model.statics.tilt_hold import friction_limits, rolling_radius, tilt_hold
+from model.tilt_hold import friction_limits, rolling_radius, tilt_hold
 from tests.rigs.bearings import changed_pads
 from tests.rigs.random_bearings import draw
 from tests.studies.random_bearings import fault, rolling

@@ -12,7 +12,11 @@ from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes
 from model.pad.bending import PadDeformation
+from model.statics.compiled.case import Case
+from model.statics.compiled.elimination import solve
+from model.statics.compiled.heat import Conduction
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
+from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray, IntArray
 
 
@@ -39,6 +43,7 @@ class Shapes(NamedTuple):
 
     grids: GridStack
     bodies: BodyStack
+    conduction: Conduction
 
 
 def stacked_bodies(
@@ -83,43 +88,54 @@ _RIGID = BodyStack(
 
 
 @inner
-def bend_pads(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState) -> float:
-    """Close the loop of pressure and deformation for every pad that carries."""
-    grids, bodies = shapes
+def bend_pads(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> float:
+    """Close the loop of pressure, deformation and tilt along the shaft for every pad that carries.
+
+    Returns the largest change asked for, as a share of the thinnest film.
+    """
+    grids, bodies = shapes.grids, shapes.bodies
+    count = len(state.tilt)
+    asked = np.zeros((count, state.bent[0].size))
+    if len(bodies.which) > 0:
+        _ask_bodies(bodies, works, state, asked)
+    share, across, change = 0.0, state.bent.shape[2], np.empty(state.bent.shape[1:])
+    for m in range(count):
+        if not state.solved[m]:
+            continue
+        largest = 0.0
+        for q in range(asked.shape[1]):
+            i, j = q // across, q % across
+            change[i, j] = asked[m, q] - state.bent[m, i, j]
+            if not largest >= abs(change[i, j]) and largest == largest:  # a NaN is not to be lost
+                largest = abs(change[i, j])
+        film = (grid_of(grids, m), work_of(works, m))
+        tilted = _close_loop(film, pads, state, bodies, case, m, change)
+        share = max(share, max(largest, tilted) / state.least[m])
+    return share
+
+
+@inner
+def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: FloatArray) -> None:
+    """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     count = len(state.tilt)
     unknowns, coarse, across = works.unknown.shape[1], bodies.to_coarse.shape[1], state.bent.shape[2]
     rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
-    bends = np.zeros(count, dtype=np.bool_)
     for m in range(count):
-        bends[m] = state.solved[m] and state.steps[m] > 0
-        if bends[m]:
+        if state.solved[m]:
             for q in range(rise.shape[1]):
-                rise[m, q] = works.temperature[m, q // across, q % across] - bodies.supply
+                rise[m, q] = state.faces[m, q // across, q % across] - bodies.supply
             for q in range(unknowns):
                 given[m, q] = works.unknown[m, q] + state.shift[m, q]
-    asked, change = np.empty((count, state.bent[0].size)), np.empty(state.bent.shape[1:])
     same = np.empty(count, dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
         some = 0
         for m in range(count):
-            if bends[m] and bodies.which[m] == k:
+            if state.solved[m] and bodies.which[m] == k:
                 same[some] = m
                 some += 1
-        _times(bodies.to_coarse[k], rise, same[:some], given[:, unknowns:])
-        _times(bodies.answer[k], given, same[:some], asked)
-    share = 0.0
-    for m in range(count):
-        if bends[m]:
-            largest = 0.0
-            for q in range(asked.shape[1]):
-                i, j = q // across, q % across
-                change[i, j] = asked[m, q] - state.bent[m, i, j]
-                if not largest >= abs(change[i, j]) and largest == largest:  # a NaN is not to be lost
-                    largest = abs(change[i, j])
-            share = max(share, largest / state.least[m])
-            film = (grid_of(grids, m), work_of(works, m))
-            _close_loop(film, pads, state, bodies, m, change)
-    return share
+        if some > 0:
+            _times(bodies.to_coarse[k], rise, same[:some], given[:, unknowns:])
+            _times(bodies.answer[k], given, same[:some], asked)
 
 
 @inner
@@ -146,25 +162,38 @@ def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArra
 
 @inner
 def _close_loop(
-    film: tuple[FilmGrid, FilmWork], pads: PadStack, state: PadState, bodies: BodyStack, m: int, change: FloatArray
-) -> None:
-    """One pad's part of a Newton step, see `model.pad.bending.bending_step`."""
+    film: tuple[FilmGrid, FilmWork],
+    pads: PadStack,
+    state: PadState,
+    bodies: BodyStack,
+    case: Case,
+    m: int,
+    change: FloatArray,
+) -> float:
+    """One pad's part of a Newton step, see `model.pad.bending`; how far a tilt along the shaft moves the ends [m]."""
     grid, work = film
-    k = bodies.which[m]
-    shapes, amplitudes, response = bodies.shapes[k], bodies.amplitudes[k], bodies.response[k]
-    a, b = state.wedge[m, 0], state.wedge[m, 1]
-    slopes = shape_slopes(grid, work, conductances(grid, work, pads.clearance[m], a, b), shapes)
-    count, unknowns = response.shape
+    body = bodies.which[m] if len(bodies.which) > 0 else -1
+    bending = bodies.shapes.shape[3] if body >= 0 else 0
+    count, unknowns = bending + (1 if case.axial else 0), len(work.unknown)
+    shapes = np.empty((change.shape[0], change.shape[1], count))
+    response, weights = np.empty((count, unknowns)), np.empty((2, unknowns))
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
-    felt = np.zeros((2, count))
-    for r in range(count):
-        matrix[r, r] = 1.0
-        q = 0
+    if body >= 0:
+        shapes[:, :, :bending], response[:bending], weights[:] = bodies.shapes[body], bodies.response[body], 0.0
+        for r in range(bending):
+            matrix[r, r] = 1.0
+            for q in range(change.size):
+                right[r, 0] += bodies.amplitudes[body, r, q] * change[q // change.shape[1], q % change.shape[1]]
+    if case.axial:
+        right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, state, case, m, response[bending])
         for i in range(change.shape[0]):
             for j in range(change.shape[1]):
-                right[r, 0] += amplitudes[r, q] * change[i, j]
-                q += 1
-    own = right[:, 0].copy()
+                shapes[i, j, bending] = grid.cos[i] * grid.z[j]
+    asked = right[:, 0].copy()
+    _force_weights(grid, change.shape, weights)
+    a, b = state.wedge[m, 0], state.wedge[m, 1]
+    slopes = shape_slopes(grid, work, conductances(grid, work, pads.clearance[m], a, b), shapes)
+    felt = np.zeros((2, count))
     for q in range(unknowns):
         for r in range(count):
             value = response[r, q]
@@ -173,57 +202,76 @@ def _close_loop(
             for s in range(count):
                 matrix[r, s] -= value * slopes[q, s]
         for s in range(count):
-            felt[0, s] += bodies.weights[k, 0, q] * slopes[q, s]
-            felt[1, s] += bodies.weights[k, 1, q] * slopes[q, s]
-    _solve(matrix, right)
+            felt[0, s] += weights[0, q] * slopes[q, s]
+            felt[1, s] += weights[1, q] * slopes[q, s]
+    solve(matrix, right)
     for r in range(count):
-        state.amplitude[m, r] = right[r]
         for axis in range(2):
             state.felt[m, axis] += felt[axis, r] * right[r, 0]
             state.felt_stiffness[m, axis, 0] += felt[axis, r] * right[r, 1]
             state.felt_stiffness[m, axis, 1] += felt[axis, r] * right[r, 2]
+    for r in range(bending):
+        state.amplitude[m, r] = right[r]
     for i in range(change.shape[0]):
         for j in range(change.shape[1]):
             total = change[i, j]
-            for r in range(count):
-                total -= shapes[i, j, r] * own[r]
+            for r in range(bending):
+                total -= shapes[i, j, r] * asked[r]
             state.mismatch[m, i, j] = total
+    if not case.axial:
+        return 0.0
+    state.axial_step[m] = right[bending]
+    return abs(right[bending, 0]) * np.max(np.abs(shapes[:, :, bending]))
 
 
 @inner
-def _solve(matrix: FloatArray, right: FloatArray) -> None:
-    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
-    n = len(matrix)
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if best != k:
-            for j in range(n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            for j in range(right.shape[1]):
-                right[k, j], right[best, j] = right[best, j], right[k, j]
-        for i in range(k + 1, n):
-            factor = matrix[i, k] / matrix[k, k]
-            for j in range(k, n):
-                matrix[i, j] -= factor * matrix[k, j]
-            for j in range(right.shape[1]):
-                right[i, j] -= factor * right[k, j]
-    for k in range(n - 1, -1, -1):
-        for j in range(right.shape[1]):
-            total = right[k, j]
-            for i in range(k + 1, n):
-                total -= matrix[k, i] * right[i, j]
-            right[k, j] = total / matrix[k, k]
+def _force_weights(grid: FilmGrid, shape: tuple[int, int], weights: FloatArray) -> None:
+    """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2]."""
+    width = shape[1] - 1 - grid.first
+    for i in range(1, shape[0] - 1):
+        for j in range(grid.first, shape[1] - 1):
+            q = (i - 1) * width + j - grid.first
+            weights[0, q], weights[1, q] = grid.cos[i] * grid.area[i, j], grid.sin[i] * grid.area[i, j]
 
 
 @inner
-def change_shape(state: PadState, bodies: BodyStack, m: int, da: float, db: float) -> None:
-    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film."""
-    out, shapes = state.mismatch[m], bodies.shapes[bodies.which[m]]
-    for r in range(shapes.shape[2]):
-        amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db
-        for i in range(out.shape[0]):
-            for j in range(out.shape[1]):
-                out[i, j] += amount * shapes[i, j, r]
+def _axial_moment(
+    grid: FilmGrid, work: FilmWork, state: PadState, case: Case, m: int, lever: FloatArray
+) -> tuple[float, float]:
+    """Moment along the shaft that nothing balances, what holds that tilt, and the moment by the unknown pressures.
+
+    `lever` (unknowns,) [m^3] is less what grows with the pad's load.
+    """
+    moment, stiffness, arm, _ = held_moment(case.hold, state.axial[m], state.corrected[m, 0])
+    total = -moment
+    rows, columns = work.pressure.shape
+    for i in range(rows):
+        for j in range(columns):
+            total += grid.area[i, j] * grid.cos[i] * grid.z[j] * work.pressure[i, j]
+            if 0 < i < rows - 1 and grid.first <= j < columns - 1:
+                q = (i - 1) * (columns - 1 - grid.first) + j - grid.first
+                total += grid.area[i, j] * grid.cos[i] * grid.z[j] * state.shift[m, q]
+                lever[q] = grid.area[i, j] * grid.cos[i] * (grid.z[j] - arm)
+    return total, stiffness
+
+
+@inner
+def change_shape(state: PadState, bodies: BodyStack, case: Case, m: int, da: float, db: float) -> float:
+    """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film.
+
+    Returns the change of its tilt along the shaft [rad].
+    """
+    out = state.mismatch[m]
+    if len(bodies.which) > 0:
+        shapes = bodies.shapes[bodies.which[m]]
+        for r in range(shapes.shape[2]):
+            amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db
+            for i in range(out.shape[0]):
+                for j in range(out.shape[1]):
+                    out[i, j] += amount * shapes[i, j, r]
+    if not case.axial:
+        return 0.0
+    axial = state.axial_step[m, 0] + state.axial_step[m, 1] * da + state.axial_step[m, 2] * db
+    if case.hold.slip > 0.0 and state.axial[m] * (state.axial[m] + axial) < 0.0:
+        return -state.axial[m]  # friction turns round there
+    return axial

@@ -1,23 +1,7 @@
-"""Constants of the search for an equilibrium, compiled or not.
-
-Those of which pads carry were tried on random bearings: 300 as `tests/rigs/random_bearings.py` draws them (seed 7),
-and 300 or 900 with preloads down to zero, offsets to 0.62 and loads from 0.03 MPa (seed 8), where pads take up and shed
-their load all the time. What was found stands with each; what made no difference has gone.
-"""
+"""Constants of the search for an equilibrium."""
 
 from __future__ import annotations
 
-#: The tabulated edge of carrying may be wrong by this share of the pad clearance, because the film is not isothermal:
-#: within it the film decides. Taken as exact, 6 of 600 bearings find no equilibrium any more; with 0.1 one more does,
-#: and another one stands elsewhere.
-EDGE = 0.03
-#: And by so many times what the face of a pad that bends stands inward: its ends stand outward, and it carries sooner.
-CROWN = 4.0
-#: Within this share of it the table is made anew for the film's present temperature. Made once only, one bearing of
-#: 900 is lost; 0.03 and 0.3 do as well.
-NEAR_EDGE = 0.1
-#: How often a pad may take up and shed its load before it is left idle. With 3 one of 1200 is lost, 12 gains none.
-MAX_LOAD_CHANGES = 6
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
 #: Half and twice of it change nothing.
 LONGEST_STEP = 0.3
@@ -41,8 +25,6 @@ MICROMETRE = 1e-6
 #: Share of a change of temperature that is made far from the equilibrium: a much hotter film carries less and heats
 #: less, and undamped the two would swing.
 RELAXATION = 0.6
-#: How much hotter than the supply a film that makes heat is taken to be before it is solved [K].
-FIRST_HEATING = 3.0
 #: Largest change of a film temperature in one step [K]: a turbine oil (0.034 1/K) loses 40 % of its viscosity.
 HEATING_STEP = 15.0
 #: Weight of a temperature change against a share of the load [K]: film temperatures count as settled when one more step
@@ -51,6 +33,6 @@ HEATING_STEP = 15.0
 HEAT_PER_FORCE = 300.0
 #: With temperatures across the films it ends at so many times `Setup.accuracy`: less than 1e-3 K asked for in the last
 #: step. That leaves 2e-5 K and 6e-7 of K and C (rocker; two steps fewer), where a mesh twice as fine moves 0.1 K.
-ACROSS = 30.0
+ACROSS_ACCURACY = 30.0
 #: Kelvins beyond which a film is no film: squares would overflow.
 BOUNDLESS = 1e30

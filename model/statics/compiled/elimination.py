@@ -93,3 +93,31 @@ def _pad_moves(pads: PadEquations, m: int, moment: float, deflection: float) -> 
     m21, m22 = -compliance * k[0, 1] * arm, 1.0 + compliance * k[0, 0]
     determinant = m11 * m22 - m12 * m21
     return (moment * m22 - m12 * deflection) / determinant, (m11 * deflection - m21 * moment) / determinant
+
+
+@inner
+def solve(matrix: FloatArray, right: FloatArray) -> None:
+    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
+    n = len(matrix)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if best != k:
+            for j in range(n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            for j in range(right.shape[1]):
+                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] / matrix[k, k]
+            for j in range(k, n):
+                matrix[i, j] -= factor * matrix[k, j]
+            for j in range(right.shape[1]):
+                right[i, j] -= factor * right[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(right.shape[1]):
+            total = right[k, j]
+            for i in range(k + 1, n):
+                total -= matrix[k, i] * right[i, j]
+            right[k, j] = total / matrix[k, k]

@@ -1,31 +1,25 @@
-"""The Newton iteration of `model.statics.newton_iteration` in one compiled call, from a start to where it ends."""
+"""One Newton iteration for journal, tilts and pivot deflections, from a start to an equilibrium or a named failure.
+
+The films' own derivatives with respect to (a, b) are the Jacobian; temperature and pad deformation follow one step
+behind and contract by a factor of about ten per iteration. Where a step is known to Python only, the iteration says
+what it asks for, and is called again to go on.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import heat_by_drag
 from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
 from model.statics.compiled.bending import Shapes
-from model.statics.compiled.carrying import (
-    Case,
-    along,
-    edge,
-    find_branch,
-    leave_unstable,
-    margin,
-    reach,
-    rigid_approach,
-    set_loaded,
-    update_carrying,
-)
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
 from model.statics.compiled.constants import (
+    ACROSS_ACCURACY,
     BOUNDLESS,
-    FIRST_HEATING,
     HEAT_PER_FORCE,
     MAX_ITERATIONS,
     MICROMETRE,
@@ -35,156 +29,198 @@ from model.statics.compiled.constants import (
     PROGRESS,
     RELAXATION,
     SLOW,
+    SLOW_ACROSS,
 )
-from model.statics.compiled.first_position import balance
-from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
-from model.statics.compiled.step import move, newton, solve_films, solve_pressure
+from model.statics.compiled.heat import exchange_heat, heat_films
+from model.statics.compiled.place import is_stable, let_idle, rescue
+from model.statics.compiled.stack import BACKFLOW, GROWN, PadStack, PadState
+from model.statics.compiled.step import grow_and_bend, move, newton, solve_pressures
 from rigdata.arrays import FloatArray
 
-#: How an iteration ends.
-SETTLED, RESTARTING, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, _NOT_CONVERGED = range(6)
+#: How an iteration ends, or what it asks Python for: viscosities, temperatures for the pressures, the pivots' laws.
+SETTLED, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED, ASKS_OIL, ASKS_HEAT, ASKS_LAWS = range(8)
+
+#: Places in `Memory.trail`.
+_STAGE, ITERATION, RESIDUAL, HEAT, _BEST, _STALLED, _LEFT, _BEST_LEFT, RELAXED, _COUNT, _KEPT, TRAIL = range(12)
+#: `_STAGE`
+_BEGIN, _PRESSURE, _HEATING, _STEPPING = range(4)
 
 
-@inner
-def _start_cold(grids: GridStack, case: Case, pads: PadStack, works: FilmWork, state: PadState) -> None:
-    """Balance the load with the tabulated isothermal films, then put every pad on its loaded attitude.
+class Memory(NamedTuple):
+    """What an iteration remembers from step to step."""
 
-    Films that make heat are balanced twice: as hot as their oil gets where it is only dragged along is known then.
-    """
-    for m in range(len(state.tilt)):
-        works.temperature[m] = pads.inlet[m]
-    _balance_films(case, pads, works, state, 0.0 if case.isothermal else FIRST_HEATING)
-    if case.isothermal:
-        return
-    for m in range(len(state.tilt)):
-        if not state.idle[m]:
-            a = rigid_approach(pads, state, m) - state.deflection[m]
-            wedge = (pads.clearance[m], a, along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m])
-            heat_by_drag(grid_of(grids, m), work_of(works, m), wedge, case.running, pads.inlet[m])
-    _balance_films(case, pads, works, state, 0.0)
+    trail: FloatArray  #: (`TRAIL`,): Stage, count, residual, heat [K], and the course so far.
+    images: FloatArray  #: (`DEPTH` + 1, q): Last states, where they led to, the one that a step starts from.
+    residuals: FloatArray
+    before: FloatArray
 
 
-@inner
-def _balance_films(case: Case, pads: PadStack, works: FilmWork, state: PadState, hotter: float) -> None:
-    """Put journal and pads where tabulated films, as warm as these or `hotter` [K] than that, carry the load."""
-    n = len(state.tilt)
-    distances = np.empty((n, 3))
-    room = math.inf
-    for m in range(n):
-        find_branch(case, pads, works, state, m, hotter)
-        distances[m, 0], distances[m, 1] = pads.frame[m, 0, 0], pads.frame[m, 0, 1]
-        distances[m, 2] = pads.preload[m]
-        room = min(room, state.branch[m, 1, state.length[m] - 1] - pads.preload[m])
-    position = balance(case.load, distances, state.branch[:, 0], state.branch[:, 3], state.length, room)
-    state.position[0], state.position[1] = position[0], position[1]
-    for m in range(n):
-        set_loaded(pads, works, state, m)
+def fresh_memory(size: int, warm: bool) -> Memory:
+    """Of an iteration that has not begun, over a state of a size; a warm one does not relax its first step."""
+    trail = np.zeros(TRAIL)
+    trail[[RESIDUAL, HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
+    trail[RELAXED] = 1.0 if warm else RELAXATION
+    images = np.empty((2 * DEPTH + 3, size))
+    return Memory(trail, images[: DEPTH + 1], images[DEPTH + 1 : -1], images[-1])
 
 
 @compiled
-def iterate(
-    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, cold: bool
-) -> tuple[int, int, float, float, float]:
-    """Iterate from where the arrays stand, or from a cold start."""
-    if cold:
-        _start_cold(shapes.grids, case, pads, works, state)
-    best, residual, heat, stalled = math.inf, math.inf, math.inf, 0
-    left, best_left, limited, relaxation = math.inf, math.inf, 0.0, RELAXATION if cold else 1.0
-    mixes = not case.isothermal or len(shapes.bodies.which) > 0
-    count, size = 0, _size(works, state) if mixes else 0
-    images, residuals, before = np.empty((DEPTH + 1, size)), np.empty((DEPTH + 1, size)), np.empty(size)
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        if update_carrying(case, pads, works, state):
-            count = 0
-        kept = left > SLOW * best_left and mixes
-        if kept:
-            _write_vector(pads, works, state, before)
-        heat, limited = solve_films(shapes, pads, works, state, case, relaxation)
-        if not heat < BOUNDLESS:
-            return FILM_LOST if _lost(state) else BOUNDLESS_HEAT, iteration, math.inf, heat, limited
-        residual, shift, moves = newton(case, pads, state)
-        if not (math.isfinite(residual) and _finite(state.position, shift, moves)):
-            return SINGULAR, iteration, math.inf, heat, limited
-        best_left, left = min(best_left, left), max(residual, heat / HEAT_PER_FORCE)
-        near = residual < NEAR and heat < NEAR_HEAT
-        relaxation = 1.0 if near else RELAXATION
-        if residual < case.accuracy and heat < HEAT_PER_FORCE * case.accuracy:
-            if not leave_unstable(case, pads, works, state):
-                return _settled(shapes.grids, pads, works, state, case), iteration, residual, heat, limited
-            count = 0
+def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, memory: Memory) -> int:
+    """Iterate from where the arrays stand until the end, or until Python is asked for a step."""
+    trail = memory.trail
+    across, sharp = case.thermal == ACROSS, False
+    accuracy = case.accuracy * (ACROSS_ACCURACY if across else 1.0)
+    while True:
+        if trail[_STAGE] == _BEGIN:
+            if trail[ITERATION] >= MAX_ITERATIONS:
+                return NOT_CONVERGED
+            trail[ITERATION] += 1
+            trail[_STAGE] = _PRESSURE
+            if across:
+                return ASKS_OIL
+        if trail[_STAGE] == _PRESSURE:
+            if not sharp:
+                _begin(shapes, pads, state, case, memory)
+            found = solve_pressures(shapes, pads, works, state, case, sharp)
+            if sharp:  # derivatives once more, with the rupture line between the nodes; the pressure stays
+                return SETTLED
+            if not found:
+                trail[RESIDUAL], trail[HEAT] = math.inf, math.inf
+                return FILM_LOST  # what has no pressure has no flow that could carry heat
+            if across:
+                return ASKS_HEAT
+        if trail[_STAGE] == _HEATING:
+            heat = trail[HEAT]
+            if case.thermal == ALONE:
+                heat = heat_films(shapes.grids, works, state, case, trail[RELAXED])
+            elif case.thermal == COUPLED:
+                heat = exchange_heat(shapes.grids, shapes.conduction, pads, works, state, case, trail[RELAXED])
+            trail[HEAT] = grow_and_bend(shapes, pads, works, state, case, trail[RELAXED], heat)
+            if not trail[HEAT] < BOUNDLESS:
+                trail[RESIDUAL] = math.inf
+                return BOUNDLESS_HEAT
+            trail[_STAGE] = _STEPPING
+            if case.asks_laws:
+                return ASKS_LAWS
+        residual, shift = newton(case, pads, state)
+        trail[RESIDUAL], trail[_STAGE] = residual, _BEGIN
+        if not (math.isfinite(residual) and _finite(state, shift)):
+            trail[RESIDUAL] = math.inf
+            return SINGULAR
+        if residual < accuracy and trail[HEAT] < HEAT_PER_FORCE * accuracy:
+            if not _leave_unstable(case, pads, works, state):
+                sharp, trail[_STAGE] = True, _PRESSURE
+            trail[_COUNT] = 0
             continue
-        stalled = 0 if residual < PROGRESS * best else stalled + 1
-        best = min(best, residual)
-        whole = move(shapes, pads, works, state, (shift, moves), 0.5 if stalled > PATIENCE else 1.0)
-        if kept and whole and near and left > SLOW * best_left:
-            count = _remember(images, residuals, count)
-            _write_vector(pads, works, state, images[count - 1])
-            for q in range(size):
-                residuals[count - 1, q] = images[count - 1, q] - before[q]
-            _read_vector(pads, works, state, mixed(images, residuals, count))
-        else:
-            count = 0
-    return _NOT_CONVERGED, MAX_ITERATIONS, residual, heat, limited
+        _go_on(shapes, pads, works, state, case, memory, shift)
 
 
 @inner
-def _finite(position: FloatArray, shift: FloatArray, moves: FloatArray) -> bool:
-    finite = math.isfinite(position[0] + shift[0]) and math.isfinite(position[1] + shift[1])
-    for m in range(len(moves)):
-        finite = finite and math.isfinite(moves[m, 0]) and math.isfinite(moves[m, 1])
+def _begin(shapes: Shapes, pads: PadStack, state: PadState, case: Case, memory: Memory) -> None:
+    """Remember where a step starts from, if the last ones were slow."""
+    trail = memory.trail
+    state.figures[BACKFLOW] = 0.0
+    trail[_STAGE], trail[HEAT] = _HEATING, 0.0
+    slow = SLOW_ACROSS if case.thermal == ACROSS else SLOW
+    mixes = case.thermal != ISOTHERMAL or len(shapes.bodies.which) > 0
+    trail[_KEPT] = 1.0 if trail[_LEFT] > slow * trail[_BEST_LEFT] and mixes else 0.0
+    if trail[_KEPT] > 0.0:
+        _write_vector(pads, state, case, memory.before)
+
+
+@inner
+def _go_on(
+    shapes: Shapes,
+    pads: PadStack,
+    works: FilmWork,
+    state: PadState,
+    case: Case,
+    memory: Memory,
+    shift: FloatArray,
+) -> None:
+    """Move by a step, and where slow modes are left, to where the last few steps head."""
+    trail, across = memory.trail, case.thermal == ACROSS
+    residual, heat = trail[RESIDUAL], trail[HEAT]
+    trail[_BEST_LEFT] = min(trail[_BEST_LEFT], trail[_LEFT])
+    trail[_LEFT] = max(residual, heat / HEAT_PER_FORCE)
+    near = residual < NEAR and heat < NEAR_HEAT
+    # a film with temperatures across knows that it makes less heat when it is hotter: it does not swing
+    trail[RELAXED] = 1.0 if near or across else RELAXATION
+    trail[_STALLED] = 0.0 if residual < PROGRESS * trail[_BEST] else trail[_STALLED] + 1.0
+    trail[_BEST] = min(trail[_BEST], residual)
+    damping = 0.5 if trail[_STALLED] > PATIENCE else 1.0
+    whole = move(shapes, pads, works, state, case, shift, damping)
+    # steps that were cut short, or still far off, say nothing of the iteration's slow modes
+    slow = SLOW_ACROSS if across else SLOW
+    if trail[_KEPT] > 0.0 and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
+        count = _remember(memory)
+        _write_vector(pads, state, case, memory.images[count - 1])
+        for q in range(len(memory.before)):
+            memory.residuals[count - 1, q] = memory.images[count - 1, q] - memory.before[q]
+        _read_vector(shapes, pads, works, state, case, mixed(memory.images, memory.residuals, count))
+    else:
+        trail[_COUNT] = 0
+
+
+@inner
+def _finite(state: PadState, shift: FloatArray) -> bool:
+    finite = math.isfinite(state.position[0] + shift[0]) and math.isfinite(state.position[1] + shift[1])
+    for m in range(len(state.moves)):
+        finite = finite and math.isfinite(state.moves[m, 0]) and math.isfinite(state.moves[m, 1])
     return finite
 
 
 @inner
-def _remember(images: FloatArray, residuals: FloatArray, count: int) -> int:
+def _remember(memory: Memory) -> int:
     """Make room for one more; returns how many there are with it."""
+    count = int(memory.trail[_COUNT])
     if count == DEPTH + 1:
         for k in range(DEPTH):
-            images[k] = images[k + 1]
-            residuals[k] = residuals[k + 1]
+            memory.images[k] = memory.images[k + 1]
+            memory.residuals[k] = memory.residuals[k + 1]
         return count
+    memory.trail[_COUNT] = count + 1
     return count + 1
 
 
 @inner
-def _lost(state: PadState) -> bool:
-    lost = False
+def _leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
+    """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold."""
+    found = False
     for m in range(len(state.tilt)):
-        lost = lost or (not state.idle[m] and state.solved[m] and state.steps[m] < 0)
-    return lost
+        if not state.solved[m] or case.hold.flexure > 0.0 or is_stable(case, pads, state, m):
+            continue
+        found = True
+        if not rescue(pads, works, state, m):
+            let_idle(state, m)
+    return found
+
+
+def vector_size(state: PadState, case: Case) -> int:
+    """Length of the vector of journal, pads, temperatures and deformations."""
+    faces = state.faces.size if case.thermal == ACROSS else 0
+    return 3 + 3 * len(state.tilt) + state.warmth.size + faces + state.bent.size
 
 
 @inner
-def _settled(grids: GridStack, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> int:
-    """Derivatives once more, with the rupture line between the nodes, unless a pad can neither carry nor idle."""
-    for m in range(len(state.tilt)):
-        if state.idle[m] and margin(pads, state, m) > edge(pads, state, m) and reach(pads, state, m) > 0.0:
-            return RESTARTING
-    for m in range(len(state.tilt)):
-        if state.solved[m]:
-            solve_pressure((grid_of(grids, m), work_of(works, m)), pads, state, case, m, True)
-    return SETTLED
-
-
-@inner
-def _size(works: FilmWork, state: PadState) -> int:
-    return 2 + works.temperature.size + state.bent.size + 2 * len(state.tilt)
-
-
-@inner
-def _write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatArray) -> None:
-    """Journal, pads, film temperatures and deformations as one vector, in micrometres and kelvins."""
+def _write_vector(pads: PadStack, state: PadState, case: Case, out: FloatArray) -> None:
+    """Journal, pads, temperatures and deformations as one vector, in micrometres and kelvins."""
     out[0], out[1] = state.position[0] / MICROMETRE, state.position[1] / MICROMETRE
-    at = 2
+    out[2] = state.figures[GROWN]
+    at = 3
     for m in range(len(state.tilt)):
-        out[at] = state.tilt[m] * pads.pivot_radius[m] / MICROMETRE
-        out[at + 1] = state.deflection[m] / MICROMETRE
-        at += 2
-        warm = works.temperature[m]
-        for i in range(warm.shape[0]):
-            for j in range(warm.shape[1]):
-                out[at] = 0.0 if state.idle[m] else warm[i, j]
-                at += 1
+        unit = pads.pivot_radius[m] / MICROMETRE
+        out[at], out[at + 1] = state.tilt[m] * unit, state.deflection[m] / MICROMETRE
+        out[at + 2] = state.axial[m] * unit
+        at += 3
+        for q in range(state.warmth.shape[1]):
+            out[at + q] = 0.0 if state.idle[m] else state.warmth[m, q]
+        at += state.warmth.shape[1]
+        if case.thermal == ACROSS:
+            for i in range(state.faces.shape[1]):
+                for j in range(state.faces.shape[2]):
+                    out[at] = 0.0 if state.idle[m] else state.faces[m, i, j]
+                    at += 1
         for i in range(state.bent.shape[1]):
             for j in range(state.bent.shape[2]):
                 out[at] = state.bent[m, i, j] / MICROMETRE
@@ -192,24 +228,35 @@ def _write_vector(pads: PadStack, works: FilmWork, state: PadState, out: FloatAr
 
 
 @inner
-def _read_vector(pads: PadStack, works: FilmWork, state: PadState, vector: FloatArray) -> None:
+def _read_vector(
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, vector: FloatArray
+) -> None:
     """Undo `_write_vector`."""
     state.position[0], state.position[1] = vector[0] * MICROMETRE, vector[1] * MICROMETRE
-    at = 2
+    closing = case.closing * (vector[2] - state.figures[GROWN])
+    state.figures[GROWN] = vector[2]
+    at = 3
     for m in range(len(state.tilt)):
-        state.tilt[m] = vector[at] * MICROMETRE / pads.pivot_radius[m]
-        state.deflection[m] = vector[at + 1] * MICROMETRE
-        at += 2
-        warm = works.temperature[m]
-        for i in range(warm.shape[0]):
-            for j in range(warm.shape[1]):
-                if not state.idle[m]:
-                    warm[i, j] = vector[at]
-                at += 1
-        if state.bent.size > 0:
-            for i in range(state.bent.shape[1]):
-                for j in range(state.bent.shape[2]):
-                    change = vector[at] * MICROMETRE - state.bent[m, i, j]
-                    state.bent[m, i, j] += change
-                    works.extra[m, i, j] += change
+        unit = MICROMETRE / pads.pivot_radius[m]
+        pads.clearance[m] -= closing
+        state.tilt[m], state.deflection[m] = vector[at] * unit, vector[at + 1] * MICROMETRE
+        more = vector[at + 2] * unit - state.axial[m]
+        state.axial[m] += more
+        at += 3
+        if not state.idle[m]:
+            for q in range(state.warmth.shape[1]):
+                state.warmth[m, q] = vector[at + q]
+        at += state.warmth.shape[1]
+        if case.thermal == ACROSS:
+            for i in range(state.faces.shape[1]):
+                for j in range(state.faces.shape[2]):
+                    if not state.idle[m]:
+                        state.faces[m, i, j] = vector[at]
                     at += 1
+        cos, z = shapes.grids.cos[m], shapes.grids.z[m]
+        for i in range(state.bent.shape[1]):
+            for j in range(state.bent.shape[2]):
+                change = vector[at] * MICROMETRE - state.bent[m, i, j]
+                state.bent[m, i, j] += change
+                works.extra[m, i, j] += change + more * cos[i] * z[j]
+                at += 1

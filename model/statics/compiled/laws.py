@@ -14,26 +14,36 @@ from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, Scale
 from rigdata.arrays import FloatArray
 
 #: First number of a law's row: which formula; the others are its constants, the last the factor on the stiffness.
-_RIGID, _CONSTANT, _ROCKER, _SPHERICAL, _MEASURED = range(5)
+_RIGID, _CONSTANT, _ROCKER, _SPHERICAL, _MEASURED, OTHER = range(6)
 
 
-def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray] | None:
-    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m); None for a law unknown here."""
+def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray]:
+    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m).
+
+    The row of a law that is unknown here, `OTHER`, holds its deflection and compliance at the load it was asked for.
+    """
     try:
-        return _encoded(tuple(laws))
+        rows, curves = _encoded(tuple(laws))
     except TypeError:  # a law of somebody's own that has no hash
-        return None
+        rows, curves = _encoded.__wrapped__(tuple(laws))
+    return rows.copy(), curves
+
+
+def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> None:
+    """Ask the laws that are unknown here: `rows` (n, 4), `loads` (n,) [N]."""
+    for law, row, load in zip(laws, rows, loads.tolist(), strict=True):
+        if row[0] == OTHER:
+            # a Hertzian pivot has no stiffness at zero
+            row[1], row[2] = law.deflection(max(load, 0.0)), 1.0 / law.stiffness(max(load, 1e-6))
 
 
 @lru_cache(maxsize=256)
-def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray] | None:
+def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
     rows, curves = [], []
     for law in laws:
-        row = _row(law)
-        if row is None:
-            return None
-        rows.append(row[0])
-        curves.append(row[1])
+        row, curve = _row(law)
+        rows.append(row)
+        curves.append(curve)
     longest = max(c.shape[1] for c in curves)
     table = np.zeros((len(laws), 5, longest))
     for own, curve in zip(table, curves, strict=True):
@@ -41,9 +51,9 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray] | None
     return np.array(rows, dtype=float), table
 
 
-def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] | None:
+def _row(given: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray]:
     nothing = np.zeros((5, 1))
-    factor = 1.0
+    factor, law = 1.0, given
     while type(law) is ScaledPivot:
         factor *= law.stiffness_factor
         law = law.law
@@ -59,12 +69,14 @@ def _row(law: PivotLaw) -> tuple[tuple[float, float, float, float], FloatArray] 
         curve = np.zeros((5, len(law.load)))
         curve[0], curve[1:, :-1] = law.load, law.coefficients
         return (_MEASURED, len(law.load), 0.0, factor), curve
-    return None
+    return (OTHER, 0.0, 0.0, 1.0), nothing
 
 
 @inner
 def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Give of a pivot, delta(W) [m]: `law` (4,), `curve` (5, m)."""
+    if law[0] == OTHER:
+        return law[1]
     if not load > 0.0 or law[0] == _RIGID:
         return 0.0
     if law[0] == _CONSTANT:
@@ -85,6 +97,8 @@ def deflection(law: FloatArray, curve: FloatArray, load: float) -> float:
 @inner
 def compliance(law: FloatArray, curve: FloatArray, load: float) -> float:
     """Tangent d delta / dW [m/N]; zero for a rigid pivot."""
+    if law[0] == OTHER:
+        return law[2]
     if law[0] == _RIGID:
         return 0.0
     if law[0] == _CONSTANT:

@@ -29,33 +29,31 @@ class GridStack(NamedTuple):
 
 
 class PadStack(NamedTuple):
-    """What a search leaves as it is."""
+    """What a search is told of the pads; of it only clearances grow, and laws of somebody's own are asked anew."""
 
     frame: FloatArray  #: (n, 2, 2): Rows: unit vectors along the pivot (normal) and across it (tangent).
     preload: FloatArray  #: (n,): Cp - Cb, plus running changes [m].
     pivot_radius: FloatArray  #: (n,): R_P and Cp [m].
     clearance: FloatArray
-    inlet: FloatArray  #: (n,), degC
-    pivot: FloatArray  #: (n, 2): Station before the pivot, and the pivot's place between it and the next one.
+    order: IntArray  #: (n,) of int: The pads in the order in which oil passes them.
     laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
     curves: FloatArray  #: (n, 5, m): Measured ones.
-    #: (n, 3, r): Curvature, wedge and load of the loaded attitudes, see
-    #: `model.film.loaded_attitude.LoadedAttitude`.
-    attitudes: FloatArray
-    rows: IntArray  #: (n,) of int: How many of the r there are.
+    attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
+    rows: IntArray  #: (n,) of int: How many of the r there are; 0 where they were not asked for.
 
 
 class PadState(NamedTuple):
     """What a search changes besides the films' arrays."""
 
     position: FloatArray  #: (2,): Journal [m].
-    tilt: FloatArray  #: (n,): t [rad], eta [m].
+    tilt: FloatArray  #: (n,): t [rad], eta [m], tilt along the shaft [rad].
     deflection: FloatArray
+    axial: FloatArray
     idle: BoolArray  #: (n,) of bool: Carries nothing; has a pressure.
     solved: BoolArray
-    changes: IntArray  #: (n,) of int: How often the pad has taken up or shed its load.
-    branch: FloatArray  #: (n, 4, r): Rigid approach, approach, wedge and load, see `model.film.loaded_attitude.Branch`.
-    length: IntArray  #: (n,) of int: How many of the r there are; 0 before the first.
+    rescues: IntArray  #: (n,) of int: How often the pad was put back on its loaded attitude.
+    inlet: FloatArray  #: (n,): Of the oil that enters [degC].
+    resting: FloatArray  #: (n, 4): Films of idle pads, see `model.film.resting.RestingFilm`.
     wedge: FloatArray  #: (n, 2): (a, b) that the pressure was solved with [m].
     force: FloatArray  #: (n, 2): As the pressure was solved, and at the temperature found since [N].
     corrected: FloatArray
@@ -72,6 +70,16 @@ class PadState(NamedTuple):
     bent: FloatArray
     mismatch: FloatArray
     amplitude: FloatArray  #: (n, shapes, 3): Change of their amplitudes at rest, and per metre of a and b.
+    axial_step: FloatArray  #: (n, 3): The same of the tilt along the shaft [rad, rad/m].
+    moves: FloatArray  #: (n, 2): Last step's tilt and deflection.
+    faces: FloatArray  #: (n, nt + 1, nz + 1): Temperature of the pads' faces [degC].
+    warmth: FloatArray  #: (n, q): All temperatures that the iteration finds; whoever writes to them sets the films'.
+    figures: FloatArray  #: See `JOURNAL` and those after it.
+
+
+#: Places in `PadState.figures`: temperature of a journal that takes heat, of one that grows, and what that will change
+#: by in this step [degC]; share of the oil that runs back at a leading edge.
+JOURNAL, GROWN, GROWING, BACKFLOW = range(4)
 
 
 def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:

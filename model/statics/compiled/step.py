@@ -1,4 +1,4 @@
-"""One step of all films, and one Newton step of journal and pads, on the arrays of a compiled search."""
+"""One step of all films, and one Newton step of journal and pads, on the arrays of a search."""
 
 from __future__ import annotations
 
@@ -7,84 +7,116 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.energy import heat_step
+from model.film.cavitation import solve_flooded_film
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import least_share, set_viscosity
-from model.film.reynolds import solve_film
+from model.film.reynolds import FilmForces, solve_film
+from model.film.turbulence import solve_turbulent_film
 from model.statics.compiled.bending import Shapes, bend_pads, change_shape
-from model.statics.compiled.carrying import Case, along, hold_of, rigid_approach, set_loaded
+from model.statics.compiled.case import ACROSS, TURBULENT, Case, along, rigid_approach
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
+from model.statics.compiled.heat import rest_films
 from model.statics.compiled.laws import compliance, deflection
-from model.statics.compiled.stack import PadStack, PadState, grid_of, work_of
+from model.statics.compiled.place import let_idle, rescue
+from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadStack, PadState, grid_of, work_of
+from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
 
 
 @inner
-def solve_pressure(
-    film: tuple[FilmGrid, FilmWork], pads: PadStack, state: PadState, case: Case, m: int, sharp: bool
-) -> None:
-    """Pressure of one film at its present temperature."""
-    grid, work = film
-    if not sharp:
-        set_viscosity(work, case.running.oil)
-    a = rigid_approach(pads, state, m) - state.deflection[m]
-    b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
-    found = solve_film(grid, work, (pads.clearance[m], a, b), case.running.speed, sharp)
-    state.wedge[m, 0], state.wedge[m, 1] = a, b
-    state.solved[m] = True
-    state.stiffness[m], state.damping[m] = found.stiffness, found.damping
-    state.force[m], state.least[m], state.steps[m] = found.force, found.min_film, found.steps
-    if not sharp:
-        state.corrected[m] = found.force
+def _film(
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool, rupture: int | None
+) -> FilmForces:
+    """Pressure of one film; what is None when a search is compiled leaves the other films out of it."""
+    if rupture is None:
+        return solve_film(grid, work, wedge, speed, sharp)
+    if rupture == TURBULENT:
+        return solve_turbulent_film(grid, work, wedge, speed, sharp)
+    return solve_flooded_film(grid, work, wedge, speed, sharp)
 
 
 @inner
-def solve_films(
-    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float
-) -> tuple[float, float]:
-    """Solve every film that carries once: pressure, then temperature, then what the pads' deformation asks."""
+def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, sharp: bool) -> bool:
+    """Pressure of every film that carries, at its present temperature; False if one is lost.
+
+    A film without force is that of the unloaded attitude, in which nothing holds the pad: the loaded one counts.
+    """
     lost = False
     for m in range(len(state.tilt)):
-        if not state.idle[m]:
-            film = (grid_of(shapes.grids, m), work_of(works, m))
-            solve_pressure(film, pads, state, case, m, False)
-            if state.steps[m] > 0 and not state.force[m, 0] > 0.0 and case.hold[0] == 0.0:
-                set_loaded(pads, works, state, m)
-                if not state.idle[m]:
-                    solve_pressure(film, pads, state, case, m, False)
-                    state.idle[m] = not state.force[m, 0] > 0.0
+        grid, work = grid_of(shapes.grids, m), work_of(works, m)
+        while not state.idle[m]:
+            if not sharp and case.thermal != ACROSS:
+                set_viscosity(work, case.running.oil)
+            a = rigid_approach(pads, state, m) - state.deflection[m]
+            b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
+            found = _film(grid, work, (pads.clearance[m], a, b), case.running.speed, sharp, case.rupture)
+            state.wedge[m, 0], state.wedge[m, 1], state.solved[m] = a, b, True
+            state.least[m], state.steps[m] = found.min_film, found.steps
+            for i in range(2):
+                state.force[m, i] = found.force[i]
+                if not sharp:
+                    state.corrected[m, i] = found.force[i]
+                for j in range(2):
+                    state.stiffness[m, i, j], state.damping[m, i, j] = found.stiffness[i, j], found.damping[i, j]
+            if sharp or found.steps < 0 or found.force[0] > 0.0 or case.hold.flexure > 0.0:
+                break
+            if not rescue(pads, works, state, m):
+                let_idle(state, m)
         if state.idle[m]:
             state.solved[m] = False
-            works.pressure[m] = 0.0
+            work.pressure[:] = 0.0
         elif state.steps[m] < 0:
             lost = True
-    if lost:
-        return math.inf, 0.0
-    change, limited = 0.0, 0.0
-    if not case.isothermal:
-        for m in range(len(state.tilt)):
-            if state.solved[m] and state.steps[m] > 0:
-                asked, cut, radial, tangential = heat_step(
-                    grid_of(shapes.grids, m), work_of(works, m), case.running,
-                    (pads.inlet[m], relaxation, HEATING_STEP), state.shift[m],
-                )  # fmt: skip
-                state.heating[m] = asked
-                state.corrected[m, 0] = state.force[m, 0] + radial
-                state.corrected[m, 1] = state.force[m, 1] + tangential
-                limited = max(limited, cut)
-                if not change >= asked:  # a NaN is not to be lost
-                    change = asked
-    for m in range(len(state.tilt)):
-        state.felt[m], state.felt_stiffness[m] = state.corrected[m], state.stiffness[m]
-    if len(shapes.bodies.which) > 0 and change < BOUNDLESS:
-        change = max(change, HEAT_PER_FORCE * bend_pads(shapes, pads, works, state))
-    return change, limited
+    rest_films(shapes.grids, pads, state, case)
+    return not lost
 
 
 @inner
-def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray, FloatArray]:
-    """Solve the linearised equilibrium once: gives shift (2,), moves (n, 2)."""
+def grow_and_bend(
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float, change: float
+) -> float:
+    """What a journal grows, what pads bend; returns the largest change asked for, from `change` on [K]."""
+    if case.closing > 0.0 and change < BOUNDLESS:
+        change = max(change, _warm_journal(shapes, works, state, relaxation))
+    for m in range(len(state.tilt)):
+        for i in range(2):
+            state.felt[m, i] = state.corrected[m, i]
+            for j in range(2):
+                state.felt_stiffness[m, i, j] = state.stiffness[m, i, j]
+    if (len(shapes.bodies.which) > 0 or case.axial) and change < BOUNDLESS:
+        # a deformation counts like a temperature change of the same weight in the film's resistance
+        change = max(change, HEAT_PER_FORCE * bend_pads(shapes, pads, works, state, case))
+    return change
+
+
+@inner
+def _warm_journal(shapes: Shapes, works: FilmWork, state: PadState, relaxation: float) -> float:
+    """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
+    felt = state.figures[JOURNAL]
+    if not math.isfinite(felt):
+        felt = mean_temperature(shapes, works, state)
+    asked = felt - state.figures[GROWN]
+    state.figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
+    return abs(asked)
+
+
+@inner
+def mean_temperature(shapes: Shapes, works: FilmWork, state: PadState) -> float:
+    """Mean of the films that carry, by area; of the oil where it enters if none does [degC]."""
+    area, total = 0.0, 0.0
+    for m in range(len(state.tilt)):
+        if not state.idle[m]:
+            for i in range(works.temperature.shape[1]):
+                for j in range(works.temperature.shape[2]):
+                    area += shapes.grids.area[m, i, j]
+                    total += shapes.grids.area[m, i, j] * works.temperature[m, i, j]
+    return total / area if area > 0.0 else state.inlet[0]
+
+
+@inner
+def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray]:
+    """Solve the linearised equilibrium once: residual, shift (2,) of the journal; moves of the pads in the state."""
     n = 0
     for m in range(len(state.tilt)):
         n += 1 if state.solved[m] else 0
@@ -92,65 +124,78 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
         np.empty((n, 2, 2)), np.empty((n, 2)), np.empty((n, 2, 2)), np.empty(n), np.empty(n), np.empty((n, 2)),
         np.empty(n), np.empty(n),
     )  # fmt: skip
+    closing = case.closing * state.figures[GROWING]
     k = 0
     for m in range(len(state.tilt)):
         if not state.solved[m]:
             continue
         radial, radius = state.felt[m, 0], pads.pivot_radius[m]
-        rows.frame[k], rows.force[k], rows.stiffness[k] = pads.frame[m], state.felt[m], state.felt_stiffness[m]
-        rows.pivot_radius[k] = radius
-        stiffness, arm = hold_of(case, state, m, radial)
-        rows.holding_force[k] = stiffness * state.tilt[m] / radius
+        rows.frame[k], rows.stiffness[k], rows.pivot_radius[k] = pads.frame[m], state.felt_stiffness[m], radius
+        # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
+        rows.force[k] = state.felt[m] + closing * state.felt_stiffness[m, :, 0]
+        moment, stiffness, arm, _ = held_moment(case.hold, state.tilt[m], radial)
+        rows.holding_force[k] = moment / radius
         rows.holding_slopes[k, 0], rows.holding_slopes[k, 1] = stiffness / radius, arm / radius
         given = deflection(pads.laws[m], pads.curves[m], max(radial, 0.0))
         rows.missing_deflection[k] = given - state.deflection[m]
         rows.pivot_compliance[k] = compliance(pads.laws[m], pads.curves[m], max(radial, 1e-6))
         k += 1
     residual, shift, moves = eliminate(case.load, rows)
-    every = np.zeros((len(state.tilt), 2))
+    state.moves[:] = 0.0
     k = 0
     for m in range(len(state.tilt)):
         if state.solved[m]:
-            every[m] = moves[k]
+            state.moves[m] = moves[k]
+            if case.hold.slip > 0.0 and state.tilt[m] * (state.tilt[m] + moves[k, 0]) < 0.0:
+                state.moves[m, 0] = -state.tilt[m]  # the friction turns round there
             k += 1
-    return residual, shift, every
+    return residual, shift
 
 
 @inner
 def move(
-    shapes: Shapes,
-    pads: PadStack,
-    works: FilmWork,
-    state: PadState,
-    step: tuple[FloatArray, FloatArray],
-    damping: float,
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, shift: FloatArray, damping: float
 ) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
-    (grids, bodies), (shift, moves) = shapes, step
-    least = math.inf
-    for m in range(len(state.tilt)):
-        least = min(least, pads.clearance[m])
-    longest = LONGEST_STEP * least / max(math.hypot(shift[0], shift[1]), 1e-30)
-    scale = min(damping, longest)
-    rigid, bending = np.empty((0, 0)), len(bodies.which) > 0
+    grids, bodies = shapes.grids, shapes.bodies
+    scale = min(damping, LONGEST_STEP * np.min(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
+    extra, bending = np.empty((0, 0)), len(bodies.which) > 0 or case.axial
+    closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
     for m in range(len(state.tilt)):
         if state.solved[m]:
-            da = pads.frame[m, 0, 0] * shift[0] + pads.frame[m, 0, 1] * shift[1] - moves[m, 1]
-            db = pads.frame[m, 1, 0] * shift[0] + pads.frame[m, 1, 1] * shift[1] + pads.pivot_radius[m] * moves[m, 0]
+            frame, moves = pads.frame[m], state.moves[m]
+            da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
+            db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pads.pivot_radius[m] * moves[0]
             if bending:
-                change_shape(state, bodies, m, da, db)
-            worst = least_share(grid_of(grids, m), work_of(works, m), da, db, state.mismatch[m] if bending else rigid)
+                axial[m] = change_shape(state, bodies, case, m, da, db)
+                extra = _extra(grid_of(grids, m), state, m, axial[m])
+            worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
             if worst * damping < SHRINK - 1.0:
                 scale = min(scale, (SHRINK - 1.0) / worst)
     state.position[0] += scale * shift[0]
     state.position[1] += scale * shift[1]
+    state.figures[GROWN] += scale * state.figures[GROWING]
     for m in range(len(state.tilt)):
-        state.tilt[m] += scale * moves[m, 0]
-        state.deflection[m] += scale * moves[m, 1]
+        pads.clearance[m] -= scale * closing
+        # a pad that friction stops where it does not tilt stops there, whatever the step's length
+        stops = state.moves[m, 0] == -state.tilt[m]
+        state.tilt[m] = 0.0 if stops else state.tilt[m] + scale * state.moves[m, 0]
+        state.deflection[m] += scale * state.moves[m, 1]
         if bending and state.solved[m]:
-            for i in range(state.bent.shape[1]):
-                for j in range(state.bent.shape[2]):
-                    change = scale * state.mismatch[m, i, j]
-                    state.bent[m, i, j] += change
-                    works.extra[m, i, j] += change
+            more = _extra(grid_of(grids, m), state, m, axial[m])
+            works.extra[m] += scale * more
+            state.bent[m] += scale * state.mismatch[m]
+            state.axial[m] += scale * axial[m]
+    state.figures[GROWING] = 0.0
     return scale == 1.0
+
+
+@inner
+def _extra(grid: FilmGrid, state: PadState, m: int, axial: float) -> FloatArray:
+    """Change of a film's shape besides its (a, b), (nt + 1, nz + 1) [m]."""
+    out = state.mismatch[m].copy()
+    if axial != 0.0:
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                out[i, j] += axial * grid.cos[i] * grid.z[j]
+    return out

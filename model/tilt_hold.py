@@ -14,10 +14,12 @@ R. D. Mindlin, ASME J. Appl. Mech. 16 (1949) 259; K. L. Johnson, Contact Mechani
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
+import numpy as np
+
 from model.bearing import Pivot
+from model.compilation import compiled
 from model.setup import Setup
 
 
@@ -30,24 +32,45 @@ class TiltHold(NamedTuple):
     slides: bool
 
 
-def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
-    """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
-    stiffness, arm = setup.rotational_stiffness, 0.0
-    if setup.rolling:
-        roll = setup.rolling * rolling_radius(setup.bearing.pivot)
-        stiffness += roll * max(load, 0.0)
-        arm = roll * tilt if load > 0.0 else 0.0
-    moment, slides = stiffness * tilt, False
-    if setup.friction and load > 0.0:
-        stick, slip = friction_limits(setup, load)
+class HoldNumbers(NamedTuple):
+    """What holds the tilt of every pad of a set-up."""
+
+    flexure: float  #: k_theta [N m/rad]
+    roll: float  #: k_theta per load [m/rad]
+    slip: float  #: M_f per load [m]
+    stick: float  #: k per cubic root of the load [N^(2/3) m/rad]
+
+
+@compiled
+def held_moment(hold: HoldNumbers, tilt: float, load: float) -> tuple[float, float, float, bool]:
+    """`TiltHold` at a tilt [rad] and pad load [N]."""
+    stiffness, arm, slides = hold.flexure, 0.0, False
+    if load > 0.0:
+        stiffness += hold.roll * load
+        arm = hold.roll * tilt
+    moment = stiffness * tilt
+    if hold.slip > 0.0 and load > 0.0:
+        stick, slip = hold.stick * load ** (1.0 / 3.0), hold.slip * load
         share = min(abs(tilt) * stick / (1.5 * slip), 1.0)
         held = 1.0 - (1.0 - share) ** 1.5
         slides = share == 1.0
-        moment += math.copysign(slip * held, tilt)
-        stiffness += stick * math.sqrt(1.0 - share)
+        moment += np.copysign(slip * held, tilt)
+        stiffness += stick * np.sqrt(1.0 - share)
         # with the load the limit grows, and by a third of it the contact's stiffness
-        arm += math.copysign(slip / load * (held - share * math.sqrt(1.0 - share)), tilt)
-    return TiltHold(moment, stiffness, arm, slides)
+        arm += np.copysign(slip / load * (held - share * np.sqrt(1.0 - share)), tilt)
+    return moment, stiffness, arm, slides
+
+
+def hold_numbers(setup: Setup) -> HoldNumbers:
+    """What holds the tilt of the pads."""
+    roll = setup.rolling * rolling_radius(setup.bearing.pivot) if setup.rolling else 0.0
+    stick, slip = friction_limits(setup, 1.0) if setup.friction else (0.0, 0.0)
+    return HoldNumbers(float(setup.rotational_stiffness), roll, slip, stick)
+
+
+def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
+    """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
+    return TiltHold(*held_moment(hold_numbers(setup), float(tilt), float(load)))
 
 
 def rolling_radius(pivot: Pivot) -> float:

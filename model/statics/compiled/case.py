@@ -1,0 +1,47 @@
+"""What one search is told, and where a pad stands in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from model.compilation import inner
+from model.film.oil_state import Running
+from model.statics.compiled.stack import PadStack, PadState
+from model.tilt_hold import HoldNumbers
+from rigdata.arrays import FloatArray
+
+#: `Case.thermal`: films as cold as their inlets, each for itself, all with pads, journal and grooves, and the same
+#: with temperatures across the films, which a step in Python finds.
+ISOTHERMAL, ALONE, COUPLED, ACROSS = range(4)
+#: `Case.rupture`
+MASS_CONSERVING, TURBULENT = range(2)
+
+
+class Case(NamedTuple):
+    """The numbers of one search."""
+
+    load: FloatArray  #: (2,), N
+    running: Running
+    hold: HoldNumbers
+    accuracy: float
+    thermal: int
+    rupture: int | None  #: None: Swift and Stieber's laminar film.
+    supply: float  #: Temperature of fresh oil [degC].
+    kept: float  #: Share of the dissipation that stays in the films; in `running.heat` where films are alone.
+    mixing: float  #: lambda
+    journal: bool  #: It takes up heat and gives it back.
+    closing: float  #: What a kelvin of the journal's takes from every clearance [m/K].
+    axial: bool  #: Pads tilt along the shaft.
+    asks_laws: bool  #: Some pivots have laws that only Python knows.
+
+
+@inner
+def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
+    """Approach of a film if its pivot were rigid [m]."""
+    return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
+
+
+@inner
+def along(pads: PadStack, state: PadState, m: int) -> float:
+    """Journal's place across the pivot line [m]."""
+    return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]

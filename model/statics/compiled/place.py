@@ -1,0 +1,89 @@
+"""Where a pad carries: putting it on its loaded attitude, letting it idle, and whether what holds it is stable."""
+
+from __future__ import annotations
+
+import math
+
+from model.compilation import compiled, inner
+from model.film.mesh import FilmWork
+from model.statics.compiled.case import Case, along, rigid_approach
+from model.statics.compiled.laws import compliance
+from model.statics.compiled.stack import PadStack, PadState
+from model.tilt_hold import held_moment
+from rigdata.arrays import FloatArray
+
+#: How often a search puts a pad back on its loaded attitude that has lost it on the way.
+_RESCUES = 12
+
+
+@inner
+def let_idle(state: PadState, m: int) -> None:
+    """Let a pad carry nothing."""
+    state.idle[m] = True
+    state.deflection[m] = 0.0
+    state.tilt[m] = 0.0
+
+
+@compiled
+def place(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
+    """Put a pad on its loaded attitude for the journal's position; at its fold where it has none there."""
+    table, count = pads.attitudes[m], pads.rows[m]
+    rigid = rigid_approach(pads, state, m)
+    at = max(rigid, table[0, 0])
+    a, b = interpolate(table[0], table[1], count, at), interpolate(table[0], table[2], count, at)
+    state.idle[m] = False
+    state.deflection[m] = at - a
+    state.tilt[m] = (b - along(pads, state, m)) / pads.pivot_radius[m]
+    works.ruptured[m] = False
+
+
+@inner
+def rescue(pads: PadStack, works: FilmWork, state: PadState, m: int) -> bool:
+    """Put a pad back on its loaded attitude, if it has one here and has not been put back too often."""
+    if pads.rows[m] < 2 or state.rescues[m] >= _RESCUES or margin(pads, state, m) < 0.0:
+        return False
+    state.rescues[m] += 1
+    place(pads, works, state, m)
+    return True
+
+
+@inner
+def margin(pads: PadStack, state: PadState, m: int) -> float:
+    """How far a pad is from the fold of its loaded attitudes, as a share of its clearance; negative beyond."""
+    return (rigid_approach(pads, state, m) - pads.attitudes[m, 0, 0]) / pads.clearance[m]
+
+
+@inner
+def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
+    """Straight between the first `count` points, constant beyond them."""
+    if at <= x[0]:
+        return y[0]
+    if at >= x[count - 1]:
+        return y[count - 1]
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x[middle] <= at:
+            low = middle
+        else:
+            high = middle
+    return y[low] + (y[high] - y[low]) / (x[high] - x[low]) * (at - x[low])
+
+
+@inner
+def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
+    """Whether film and pivot push a pad back from a small change of tilt and deflection.
+
+    The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
+    with what holds the tilt back added to the film's moment. An unloaded film leaves a wedge that opens, or a load
+    that is not told from none.
+    """
+    none = case.accuracy * math.hypot(case.load[0], case.load[1])
+    if case.hold.slip == 0.0 and (state.wedge[m, 1] <= 0.0 or state.force[m, 0] <= none):
+        return False
+    k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
+    give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
+    _, stiffness, arm, _ = held_moment(case.hold, state.tilt[m], load)
+    arm = arm / radius
+    turning = k[1, 1] + arm * k[0, 1] + stiffness / radius**2
+    return turning * (1.0 + give * k[0, 0]) > give * (k[1, 0] + arm * k[0, 0]) * k[0, 1]

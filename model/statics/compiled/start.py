@@ -1,0 +1,263 @@
+"""Where a search starts: the journal on the curves of its pads, and which of them carry there.
+
+For a set of loaded pads the journal's place is the minimum of a convex energy: the sum over the pads of the integral
+of W(r), less the work of the load. Beyond its fold every curve goes on, falling fast, so that the energy stays convex.
+A pad that stands clearly beyond its fold then idles. Of pads that stand so near beyond it that what goes on of their
+curve still pushes, those sets are tried that leave the most of them loaded; of alike sets the one that idles the last
+pads counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.compilation import compiled, inner
+from model.statics.compiled.laws import deflection
+from rigdata.arrays import BoolArray, FloatArray, IntArray
+
+#: Share of the clearance over which a curve falls to 1/e beyond its fold.
+_TAIL = 2e-3
+#: Share of the load that may be missing, and that a pad beyond its fold may push with and count as idle.
+_GOOD_ENOUGH, _NOTHING = 2e-4, 1e-4
+#: A film's own mesh moves a fold by about this share of the clearance: the search decides.
+_FOLD = 2e-3
+#: Pads near their folds whose sets are tried.
+_MOST_DOUBTFUL = 6
+
+
+@compiled
+def pivot_curve(
+    attitude: tuple[FloatArray, FloatArray, FloatArray],
+    scale: tuple[float, float],
+    law: FloatArray,
+    measured: FloatArray,
+    gives: FloatArray,
+    out: FloatArray,
+) -> int:
+    """A pad's loaded attitudes on its pivot, rising from the fold: r = a + delta(W), a, b [m], W [N]; how many.
+
+    `attitude` is (A, B, W), `scale` Cp and the unit of the load; `gives` (n,) what the pivot gives, empty where `law`
+    says it.
+    """
+    curvature, wedge, load = attitude
+    clearance, unit = scale
+    count = len(load)
+    if count < 3:
+        return 0
+    reach = np.empty(count)
+    for k in range(count):
+        give = gives[k] if len(gives) > 0 else deflection(law, measured, load[k] * unit)
+        reach[k] = clearance * curvature[k] / (1.0 + curvature[k]) + give
+    low = count - 1
+    while low > 0 and reach[low - 1] < reach[low]:
+        low -= 1
+    for k in range(low, count):
+        share = 1.0 / (1.0 + curvature[k])
+        out[0, k - low], out[1, k - low] = reach[k], clearance * curvature[k] * share
+        out[2, k - low], out[3, k - low] = clearance * wedge[k] * share, load[k] * unit
+    return count - low
+
+
+@compiled
+def first_position(
+    load: FloatArray, pads: FloatArray, tables: FloatArray, rows: IntArray
+) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Journal (2,) [m], which pads carry there, and which do in another equilibrium (none: there is no other).
+
+    `load` (2,) [N], `pads` (n, 4): normal, Cp - Cb and Cp [m].
+    """
+    n = len(pads)
+    loaded = rows >= 2
+    position = np.zeros(2)
+    _stand(load, pads, tables, rows, loaded, position)
+    doubtful, count = np.empty(n, dtype=np.int64), 0
+    size = math.hypot(load[0], load[1])
+    for m in range(n):
+        beyond = tables[m, 0, 0] - _reach(pads, m, position)
+        if loaded[m] and beyond > 0.0:
+            loaded[m] = False
+            if _pushes(pads, tables, rows, m, position)[0] > _NOTHING * size and count < _MOST_DOUBTFUL:
+                doubtful[count] = m
+                count += 1
+    other = np.zeros(n, dtype=np.bool_)
+    if count > 0:
+        position, loaded, other = _most_loaded(load, pads, tables, rows, (loaded, doubtful[:count], position))
+    return position, loaded, other
+
+
+@inner
+def _most_loaded(
+    load: FloatArray,
+    pads: FloatArray,
+    tables: FloatArray,
+    rows: IntArray,
+    found: tuple[BoolArray, IntArray, FloatArray],
+) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Of pads near their folds, those that carry: the set with the most of them in which all are above their folds."""
+    certain, doubtful, start = found
+    count = len(doubtful)
+    best, answer, chosen, other = -1, start.copy(), certain.copy(), np.zeros(len(certain), dtype=np.bool_)
+    for size in range(count, -1, -1):
+        for code in range(2**count):
+            # the first pads count highest, so that of alike sets that one comes first which idles the last pads
+            number = 2**count - 1 - code
+            if _bits(number) != size:
+                continue
+            mask, position = certain.copy(), start.copy()
+            for k in range(count):
+                mask[doubtful[k]] = number // 2 ** (count - 1 - k) % 2 == 1
+            good = _stand(load, pads, tables, rows, mask, position)
+            for m in range(len(mask)):
+                if mask[m] and _reach(pads, m, position) < tables[m, 0, 0] - _FOLD * pads[m, 3]:
+                    good = False
+            if good and best < 0:
+                best, answer, chosen = size, position, mask
+            elif good and best == size:
+                return answer, chosen, mask
+        if best >= 0:
+            return answer, chosen, other
+    return answer, chosen, other
+
+
+@inner
+def _bits(number: int) -> int:
+    count = 0
+    while number > 0:
+        count += number % 2
+        number //= 2
+    return count
+
+
+@inner
+def _reach(pads: FloatArray, m: int, position: FloatArray) -> float:
+    return pads[m, 2] + pads[m, 0] * position[0] + pads[m, 1] * position[1]
+
+
+@inner
+def _pushes(pads: FloatArray, tables: FloatArray, rows: IntArray, m: int, position: FloatArray) -> tuple[float, float]:
+    """Load of a pad's curve at a position [N], and its slope [N/m]."""
+    reach, table, count = _reach(pads, m, position), tables[m, 0], rows[m]
+    if reach < table[0]:
+        tail = _TAIL * pads[m, 3]
+        push = tables[m, 3, 0] * math.exp(max((reach - table[0]) / tail, -60.0))
+        return push, push / tail
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle] <= reach:
+            low = middle
+        else:
+            high = middle
+    slope = (tables[m, 3, high] - tables[m, 3, low]) / (table[high] - table[low])
+    return tables[m, 3, low] + slope * (reach - table[low]), slope
+
+
+@inner
+def _missing(
+    load: FloatArray,
+    pads: FloatArray,
+    tables: FloatArray,
+    rows: IntArray,
+    loaded: BoolArray,
+    position: FloatArray,
+    slopes: FloatArray,
+) -> tuple[float, float]:
+    """Part of the load that the loaded pads do not carry at a position; `slopes` (2, 2) are set."""
+    fx, fy = load[0], load[1]
+    slopes[:] = 0.0
+    for m in range(len(pads)):
+        if loaded[m]:
+            push, slope = _pushes(pads, tables, rows, m, position)
+            fx, fy = fx - pads[m, 0] * push, fy - pads[m, 1] * push
+            for i in range(2):
+                for j in range(2):
+                    slopes[i, j] += slope * pads[m, i] * pads[m, j]
+    return fx, fy
+
+
+@inner
+def _stand(
+    load: FloatArray, pads: FloatArray, tables: FloatArray, rows: IntArray, loaded: BoolArray, position: FloatArray
+) -> bool:
+    """Move the journal to where a set of pads carries the load, by Newton's steps down the energy; False if nowhere."""
+    room, stiff, largest = math.inf, 0.0, 0.0
+    for m in range(len(pads)):
+        if loaded[m]:
+            room = min(room, tables[m, 1, rows[m] - 1] - pads[m, 2])
+            stiff = max(stiff, tables[m, 3, rows[m] - 1] / pads[m, 3])
+    if math.isinf(room):
+        return False
+    room = max(room, 0.05 * np.min(pads[:, 3]))
+    size = math.hypot(load[0], load[1])
+    if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
+        position[0], position[1] = 0.4 * room * load[0] / size, 0.4 * room * load[1] / size
+    slopes, trial = np.empty((2, 2)), np.empty(2)
+    fx, fy = _missing(load, pads, tables, rows, loaded, position, slopes)
+    if size == 0.0:
+        for m in range(len(pads)):
+            if loaded[m]:
+                largest = max(largest, _pushes(pads, tables, rows, m, position)[0])
+        size = largest
+    for _ in range(60):
+        if math.hypot(fx, fy) < _GOOD_ENOUGH * size:
+            return True
+        soft = 1e-9 * stiff  # nothing carries in some direction: go where the load pushes
+        jxx, jyy, jxy = slopes[0, 0] + soft, slopes[1, 1] + soft, slopes[0, 1]
+        det = jxx * jyy - jxy * jxy
+        mx, my = (fx * jyy - jxy * fy) / det, (jxx * fy - jxy * fx) / det
+        share = min(1.0, 0.2 * room / max(math.hypot(mx, my), 1e-30))
+        mx, my = share * mx, share * my
+        for halving in range(12):
+            # along a step down a convex energy its slope rises: far enough is where it is past its zero, not far past
+            trial[0], trial[1] = position[0] + mx * 0.5**halving, position[1] + my * 0.5**halving
+            gx, gy = _missing(load, pads, tables, rows, loaded, trial, slopes)
+            if gx * mx + gy * my > -0.5 * (fx * mx + fy * my) or halving == 11:
+                break
+        position[0], position[1], fx, fy = trial[0], trial[1], gx, gy
+    return math.hypot(fx, fy) < 10.0 * _GOOD_ENOUGH * size
+
+
+@compiled
+def warm_film(rises: FloatArray, shares: tuple[int, float], inlet: float, whole: bool, temperature: FloatArray) -> None:
+    """Temperatures of a film on its loaded attitude, from those of a curve's rows: `rises` (rows, coarse mesh) [K].
+
+    Across, either mesh is graded alike; a whole film is symmetric.
+    """
+    row, part = shares
+    rows, columns = temperature.shape
+    coarse_rows, coarse_columns = rises.shape[1], rises.shape[2]
+    for i in range(rows):
+        x = i / (rows - 1) * (coarse_rows - 1)
+        p = min(int(x), coarse_rows - 2)
+        u = x - p
+        for j in range(columns):
+            y = j / (columns - 1)
+            if whole:
+                y = abs(2.0 * y - 1.0)
+            y *= coarse_columns - 1
+            q = min(int(y), coarse_columns - 2)
+            v = y - q
+            total = 0.0
+            for k in range(2):
+                field = rises[row + k]
+                value = (1.0 - u) * ((1.0 - v) * field[p, q] + v * field[p, q + 1])
+                value += u * ((1.0 - v) * field[p + 1, q] + v * field[p + 1, q + 1])
+                total += (part if k == 1 else 1.0 - part) * value
+            temperature[i, j] = inlet + total
+
+
+@compiled
+def row_at(table: FloatArray, count: int, reach: float) -> tuple[int, float]:
+    """Row of a curve below a reach, and how far on to the next one."""
+    if reach <= table[0]:
+        return 0, 0.0
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle] <= reach:
+            low = middle
+        else:
+            high = middle
+    return low, min((reach - table[low]) / (table[high] - table[low]), 1.0)

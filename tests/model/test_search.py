@@ -1,0 +1,65 @@
+"""Pivot laws and mixing as the compiled search has them, against the laws and against numpy; laws of one's own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from model.measured_pivot import MeasuredPivot
+from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, formula_pivot
+from model.predict import predict
+from model.statics.compiled.anderson import DEPTH, mixed
+from model.statics.compiled.laws import OTHER, ask_laws, compliance, deflection, encoded
+
+CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
+
+
+class Own(ConstantPivot):
+    """A law of somebody's own, which happens to be known otherwise."""
+
+
+def laws(bearing):
+    kirk = formula_pivot(bearing.pivot)
+    return [kirk, RigidPivot(), ConstantPivot(5e8), CURVE, ScaledPivot(ScaledPivot(CURVE, 2.0), 0.4)]
+
+
+@pytest.mark.parametrize("name", ["rocker", "spherical"])
+def test_laws_as_numbers_say_what_the_laws_say(request, name):
+    given = laws(request.getfixturevalue(name))
+    rows, curves = encoded(given)
+    for law, row, curve in zip(given, rows, curves, strict=True):
+        for load in (-5.0, 0.0, 1e-6, 3.0, 500.0, 5900.0, 6000.0, 9000.0, 1e7):
+            assert deflection(row, curve, load) == pytest.approx(law.deflection(max(load, 0.0)), rel=1e-13, abs=1e-30)
+            if load > 0.0:
+                assert compliance(row, curve, load) == pytest.approx(1.0 / law.stiffness(load), rel=1e-13)
+
+
+def test_a_law_of_ones_own_is_asked_step_by_step(rocker):
+    rows, _ = encoded([Own(5e8), ConstantPivot(5e8)])
+    assert rows[0, 0] == OTHER != rows[1, 0]
+    ask_laws([Own(5e8), ConstantPivot(5e8)], rows, np.array([3000.0, 10.0]))
+    np.testing.assert_allclose(rows[0, 1:3], [3000.0 / 5e8, 1.0 / 5e8])
+    assert encoded([Own(5e8)])[0][0, 1] == 0.0  # what was asked stays where it was asked for
+    for thermal in ("isothermal", "adiabatic", "tehd"):
+        own = predict(rocker, 5000.0, -1.3, 2 * math.pi * 22, pivots=[Own(5e8)] * 5, thermal=thermal)
+        known = predict(rocker, 5000.0, -1.3, 2 * math.pi * 22, pivots=5e8, thermal=thermal)
+        np.testing.assert_allclose(own.h, known.h, rtol=1e-6, atol=1e-6 * np.abs(known.h).max())
+
+
+def anderson(states: np.ndarray, images: np.ndarray) -> np.ndarray:
+    """Type II mixing by numpy: the image whose residual, mixed with the earlier ones, is least."""
+    residuals = images - states
+    changes = (residuals[-1] - residuals[:-1]).T
+    mix = np.linalg.lstsq(changes, residuals[-1], rcond=None)[0]
+    return images[-1] - mix @ (images[-1] - images[:-1])
+
+
+def test_mixing_is_andersons():
+    rng = np.random.default_rng(4)
+    states, images = rng.normal(size=(2, DEPTH + 1, 30))
+    for count in range(2, DEPTH + 2):
+        expected = anderson(states[:count], images[:count])
+        np.testing.assert_allclose(mixed(images, images - states, count), expected, rtol=1e-6)
+    np.testing.assert_array_equal(mixed(images, images - states, 1), images[0])
