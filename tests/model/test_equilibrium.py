@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.bearing import Bearing
+from model.bearing import Bearing, Oil, Pad, Pivot
 from model.pivots import ConstantPivot
 from model.predict import predict
 from model.prediction import Prediction
@@ -174,3 +174,21 @@ def test_sixty_random_bearings():
     assert outcome.wrong == []
     assert outcome.asymmetry < 1e-6
     assert outcome.converged + sum(outcome.statuses.values()) == 60
+
+
+def test_a_hot_ring_without_preload_carries_on_all_pads():
+    # heated, central pivots carry beyond zero: an independent program finds all five pads loaded, preloading each other
+    angles = [math.radians(-54.0 + 72.0 * k) for k in range(5)]
+    pads = tuple(Pad(a, 1.07298, 0.5, 95.935e-6, 95.935e-6, 0.0311, 0.0, 0.0311, 0.5, 3e-4) for a in angles)
+    oil = Oil(0.05392, 0.034, 860.0, 7e-4, 2000.0, 0.13, 38.545)
+    ring = Bearing("ring", 0.155476, 0.143519, pads, Pivot(), oil)
+    p = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8)
+    assert p.converged
+    assert p.idle_pads == ()
+    assert p.pad_load.min() > 0.5 * p.load  # light load: they push one another
+    assert_equilibrium(p)
+    fine = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8, mesh=(160, 12))
+    np.testing.assert_allclose(p.k, fine.k, atol=1e-3 * p.kyy)
+    elsewhere = predict(ring, 8000.0, 0.5, 700.0, pivots=9.1884e8)
+    warm = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8, start=elsewhere)
+    np.testing.assert_allclose(warm.k, p.k, atol=1e-4 * p.kyy)
