@@ -277,6 +277,78 @@ def _uff_set(time: np.ndarray, values: np.ndarray) -> dict[str, object]:
     )
 
 
+def _coefficient_tables() -> tuple[bytes, ...]:
+    """A table as `identify` writes it, and one as somebody reads it off a paper's figures."""
+    from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
+
+    endings = ("", "_lo", "_hi", "_se")
+    names = [*POINT_COLUMNS, *(name + end for name in COEFFICIENT_COLUMNS for end in endings), "quality", "converged"]
+    rows = []
+    for load in (2500.0, 5000.0):
+        values = [load, -90.0, 22.0, 25.0]
+        for index in range(len(COEFFICIENT_COLUMNS)):
+            value = load * 2e4 * (1 + index)
+            values += [value, 0.9 * value, 1.1 * value, 0.05 * value]
+        rows.append(",".join([*map(repr, values), "ok", "True"]))
+    ours = "\n".join([",".join(names), *rows, ""])
+    theirs = (
+        "# figure 7;;;;\nstatic_load_N;shaft_speed_Hz;kxx_N_per_m;kyy_N_per_m;kyy_N_per_m_se\n"
+        "5000;22;;2e8;4e6\n8750;22;1.2e8;;\n"
+    )
+    return ours.encode(), theirs.encode()
+
+
+def table_target(folder: Path) -> Target:
+    """A table of coefficients that comes back: what is taken is finite, possible and within its intervals."""
+    from tpjb_ident.compare.coefficient_table import read_coefficients
+    from tpjb_ident.errors import BadInputError
+    from tpjb_ident.exports.formats import ExportError, static_points
+    from tpjb_ident.runtime.table_reader import read_table
+
+    path = folder / "coefficients.csv"
+
+    def feed(data: bytes) -> None:
+        path.write_bytes(data)
+        frame = read_table(path)
+        with contextlib.suppress(BadInputError):
+            for row in read_coefficients(path, 0.05):
+                assert 0 < row.load < math.inf
+                assert 0 < row.speed < math.inf
+                assert all(math.isfinite(v) and 0 <= e < math.inf for v, e in row.coefficients.values())
+        for point in static_points(frame).points:
+            assert (point.frequency >= 0).all()
+            for name, values in point.coefficients.items():
+                low, high = point.low[name], point.high[name]
+                assert not ((values < low) | (values > high) | (low > high)).any()
+
+    return Target("table", _coefficient_tables(), feed, (BadInputError, ExportError))
+
+
+def record_target(folder: Path) -> Target:
+    """run.json and check.json of a results folder, as `verify`, `rerun`, `export` and `view` read them."""
+    from tpjb_ident.cli.commands.rerun import _typed
+    from tpjb_ident.cli.commands.verify import files_of, recorded
+    from tpjb_ident.errors import BadInputError, NotTrustedError
+    from tpjb_ident.runtime.documents import read_document
+    from tpjb_ident.runtime.output_folder import contradiction
+
+    older = Path(__file__).resolve().parents[1] / "runtime" / "older"
+    (folder / "clearance.csv").write_bytes((older / "clearance.csv").read_bytes())
+    seeds = tuple((older / name).read_bytes() for name in ("run.json", "check.json"))
+
+    def feed(data: bytes) -> None:
+        (folder / "run.json").write_bytes(data)
+        (folder / "check.json").write_bytes(data)
+        contradiction(folder / "clearance.csv")
+        with contextlib.suppress(BadInputError):
+            read_document(folder / "check.json", "tpjb-check")
+        for name, entry in recorded(folder).items():
+            list(files_of(folder, name, entry, ()))
+            _typed([], entry, folder)
+
+    return Target("record", seeds, feed, (BadInputError, NotTrustedError, OSError))
+
+
 COMMAND_LINES = (
     'predict rocker.toml --pivots kirk --load "5 kN" --speed "22 Hz" --excitation "25 Hz" --thermal isothermal --out o',
     "check none.h5 --out o --json",
@@ -370,6 +442,8 @@ def make_target(name: str, folder: Path) -> Target:
         "effects": effects_target,
         "csv": csv_target,
         "hdf5": hdf5_target,
+        "table": table_target,
+        "record": record_target,
         "cli": command_target,
     }
     if name in makers:
@@ -380,4 +454,4 @@ def make_target(name: str, folder: Path) -> Target:
 
 
 FOREIGN = ("mat", "mat73", "parquet", "tdms", "uff", "mf4", "asc")
-TARGETS = ("manifest", "bearing", "pivots", "effects", "csv", "hdf5", "cli", *FOREIGN)
+TARGETS = ("manifest", "bearing", "pivots", "effects", "csv", "hdf5", "table", "record", "cli", *FOREIGN)

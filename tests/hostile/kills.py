@@ -29,6 +29,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = ("identify", "pivot", "locus")
+#: Commands that take longer, killed on request.
+_LONG = ("compare", "diagnose", "demo")
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _STEPS = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "shutil.rmtree")
 
@@ -124,8 +126,9 @@ class Bench:
     folder: Path
 
     def words(self, command: str, out: Path) -> list[str]:
-        extra = ["--workers", "1"] if command == "identify" else []
-        return [command, str(self.campaign), "--out", str(out), *extra]
+        extra = ["--workers", "1"] if command in ("identify", "diagnose") else []
+        source = [] if command == "demo" else [str(self.campaign)]
+        return [command, *source, "--out", str(out), *extra]
 
     def reference(self, command: str) -> Reference:
         """Run once undisturbed."""
@@ -265,7 +268,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
+    parser.add_argument("--commands", nargs="+", choices=(*COMMANDS, *_LONG), default=COMMANDS)
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     tell("kills" if given.write else "", *run(given.kills, given.seed, tuple(given.commands)))

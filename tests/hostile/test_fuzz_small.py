@@ -12,8 +12,8 @@ from tests.hostile.fuzz_mutations import mutated
 from tests.hostile.fuzz_targets import make_target
 
 CASES = {
-    "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "mat": 150, "parquet": 60,
-    "tdms": 60, "uff": 60, "mat73": 60, "asc": 60, "mf4": 5,
+    "manifest": 100, "bearing": 100, "pivots": 150, "effects": 150, "csv": 40, "hdf5": 40, "table": 200, "record": 200,
+    "mat": 150, "parquet": 60, "tdms": 60, "uff": 60, "mat73": 60, "asc": 60, "mf4": 5,
 }  # fmt: skip
 LIBRARIES = {"tdms": "nptdms", "uff": "pyuff", "mf4": "asammdf"}
 

@@ -84,6 +84,18 @@ def test_a_line_that_does_not_hold_to_the_schema_is_refused_at_its_place(tmp_pat
 
 
 @pytest.mark.parametrize(
+    ("end", "limit", "is_within"), [("lo", 9e7, 1), ("lo", 2e8, 0), ("hi", 2e8, 1), ("hi", 9e7, 0)]
+)
+def test_one_end_of_an_interval_is_held_against_the_value(tmp_path, end, limit, is_within):
+    path = saved(tmp_path, f"5000,1e8,{limit}", head=f"static_load_N,kxx_N_per_m,kxx_N_per_m_{end}")
+    if is_within:
+        assert len(read_table(path)) == 1
+    else:
+        with pytest.raises(BadInputError, match=r"line 2, kxx_N_per_m: 1e.08 is not within"):
+            read_table(path)
+
+
+@pytest.mark.parametrize(
     ("head", "message"),
     [
         (f"{HEAD},", "column 9 has no name"),

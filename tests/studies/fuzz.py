@@ -3,10 +3,10 @@
     python -m tests.studies.fuzz all [--cases 100000] [--seconds 600] [--seed 1] [--keep DIR] [--write]
     python -m tests.studies.fuzz TARGET --seed 1 --case 4711
 
-Targets: manifest, bearing, pivots, effects, csv, hdf5, cli, mat, mat73, parquet, tdms, uff, mf4, asc, all. The first
-cases of a seed run traced: an input that reaches a line no other has reached joins the corpus. It then stays as it is,
-so that case i of a seed is always the same input (``--case i`` feeds it alone); what fails is kept as a file. The cases
-run in child processes, so that a crash of a C library is a finding and not the end.
+Targets: manifest, bearing, pivots, effects, csv, hdf5, table, record, cli, mat, mat73, parquet, tdms, uff, mf4, asc,
+all. The first cases of a seed run traced: an input that reaches a line no other has reached joins the corpus. It then
+stays as it is, so that case i of a seed is always the same input (``--case i`` feeds it alone); what fails is kept as a
+file. The cases run in child processes, so that a crash of a C library is a finding and not the end.
 """
 
 from __future__ import annotations

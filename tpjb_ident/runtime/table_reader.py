@@ -152,11 +152,11 @@ def _value(cell: str, column: Column | None, ending: str, place: str) -> object:
 
 
 def _check_intervals(values: dict[str, object], place: str) -> None:
-    """Refuse a value outside its own interval."""
-    for name, low in values.items():
-        base = name.removesuffix("_lo")
-        high, value = values.get(f"{base}_hi"), values.get(base, math.nan)
-        if base == name or not (isinstance(low, float) and isinstance(high, float) and isinstance(value, float)):
+    """Refuse a value outside its own interval, of which one end may be missing."""
+    for end in [name for name in values if name.endswith(("_lo", "_hi"))]:
+        base = end[:-3]
+        low, value, high = (values.get(base + ending, math.nan) for ending in ("_lo", "", "_hi"))
+        if not (isinstance(low, float) and isinstance(value, float) and isinstance(high, float)):
             continue
         if low > high or value < low or value > high:
             shown = f"{value:g} is not within {low:g} to {high:g}"
