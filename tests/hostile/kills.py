@@ -17,6 +17,7 @@ import json
 import mmap
 import os
 import random
+import re
 import shutil
 import signal
 import sys
@@ -31,6 +32,8 @@ ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = ("identify", "pivot", "locus")
 #: Commands that take longer, killed on request.
 _LONG = ("compare", "diagnose", "demo")
+#: When a page was written.
+_MINUTE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2} UTC")
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _STEPS = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "shutil.rmtree")
 
@@ -56,8 +59,13 @@ def files_with_hash(folder: Path) -> dict[str, str]:
 
 
 def tables(folder: Path) -> dict[str, str]:
-    """Results without run.json, which tells the time."""
-    return {n: h for n, h in files_with_hash(folder).items() if n != "run.json" and not n.startswith(".tpjb")}
+    """Results without run.json, which tells the time, and pages without theirs."""
+    hashes = {n: h for n, h in files_with_hash(folder).items() if n != "run.json" and not n.startswith(".tpjb")}
+    for name in hashes:
+        if name.endswith(".html"):
+            text = _MINUTE.sub("", (folder / name).read_text(encoding="utf-8"))
+            hashes[name] = hashlib.sha256(text.encode()).hexdigest()
+    return hashes
 
 
 def watch_steps(at_step: Callable[[int], None]) -> None:
@@ -172,7 +180,7 @@ def prepare(bench: Bench, out: Path, command: str, former: bool) -> dict[str, st
     entry = record["commands"][command]
     (out / "gone.csv").write_text("x\n")
     entry["outputs"] = sorted([*entry["outputs"], "gone.csv"])
-    entry["outputs_sha256"] = tables(out)
+    entry["outputs_sha256"] = {n: h for n, h in files_with_hash(out).items() if n in entry["outputs"]}
     (out / "run.json").write_text(json.dumps(record))
     return tables(out)
 

@@ -196,7 +196,10 @@ class LineFitter:
                 return None
             rows = self.design[left_out]
             # the residual of the left-out samples is what they contributed beyond the fit
-            change = np.linalg.solve(gram - rows.T @ rows, residual[left_out] @ rows)
+            try:
+                change = np.linalg.solve(gram - rows.T @ rows, residual[left_out] @ rows)
+            except np.linalg.LinAlgError:  # what is left does not tell its lines apart
+                return None
             solution = coefficients - change
             size = np.abs(residual + self.design @ change)
             scale = 1.4826 * float(np.median(size))
