@@ -102,6 +102,15 @@ def _memory(pid: int) -> float:
     return sum(float(row.split()[1]) for row in rows if row.startswith("Pss:")) / 1024
 
 
+def _processor(pid: int) -> float:
+    """Processor time of a process so far [s]; zero of one that has ended."""
+    try:
+        fields = (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def _files(pid: int) -> int:
     try:
         return len(os.listdir(f"/proc/{pid}/fd"))
@@ -112,9 +121,12 @@ def _files(pid: int) -> int:
 def watch(command: list[str], every: float) -> dict[str, float]:
     """Run a command; its peak memory over all processes, and that of every tenth of its time [MB]."""
     began, seen = time.time(), []
+    spent: dict[int, float] = {}  # workers end with their server, whose times nobody gathers
     process = subprocess.Popen(command)
     while process.poll() is None:
         family = _family(process.pid)
+        for pid in family:
+            spent[pid] = max(spent.get(pid, 0.0), _processor(pid))
         seen.append((time.time() - began, sum(map(_memory, family)), len(family), max(map(_files, family))))
         time.sleep(every)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -123,7 +135,7 @@ def watch(command: list[str], every: float) -> dict[str, float]:
     return {
         "exit_code": process.returncode,
         "seconds": round(time.time() - began, 1),
-        "cpu_seconds": round(used.ru_utime + used.ru_stime, 1),
+        "cpu_seconds": round(max(used.ru_utime + used.ru_stime, sum(spent.values())), 1),
         "peak_MB": round(float(rows[:, 1].max()), 1),
         "peak_MB_by_tenths": tenths,
         "processes": int(rows[:, 2].max()),
