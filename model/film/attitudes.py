@@ -33,6 +33,8 @@ _FIRST, _DEEPER, _FLATTER = 0.4, 1.3, 0.72
 _ROWS = 48
 #: Films thinner than this share of the clearance, or hotter by so much [K], are of no concern.
 _DEEPEST, _HOTTEST = 60.0, 300.0
+#: Where a step fails it is halved, up to this factor.
+_LEAST_STEP = 0.96
 #: Below this wedge, as a share of the first, heat alone balances a film.
 _FLATTEST = 0.015
 
@@ -130,23 +132,27 @@ def walk(
             break
     if high == middle:
         return middle, middle
-    for row in range(middle - 1, 0, -1):
-        wedge = numbers[row + 1, 1] * _FLATTER
+    row, flatter = middle - 1, _FLATTER
+    while row > 0 and flatter < _LEAST_STEP:
+        before = row + 1
+        wedge = numbers[before, 1] * flatter
         if wedge < _FLATTEST * first:
             break
-        curvature = numbers[row + 1, 0] * _FLATTER
+        curvature = numbers[before, 0] * flatter
         if row + 2 < high:
-            slope = (numbers[row + 1, 0] - numbers[row + 2, 0]) / (numbers[row + 1, 1] - numbers[row + 2, 1])
-            curvature = numbers[row + 1, 0] + slope * (wedge - numbers[row + 1, 1])
+            slope = (numbers[before, 0] - numbers[row + 2, 0]) / (numbers[before, 1] - numbers[row + 2, 1])
+            most = 0.3 * (1.0 + numbers[before, 0])
+            curvature = numbers[before, 0] + min(max(slope * (wedge - numbers[before, 1]), -most), most)
         for i in range(work.temperature.shape[0]):
             for j in range(work.temperature.shape[1]):
-                work.temperature[i, j] = 40.0 + rises[row + 1, i, j]
+                work.temperature[i, j] = 40.0 + rises[before, i, j]
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
-        if not found or not load > 0.0:
-            break
-        _keep(work, numbers, rises, row, (curvature, wedge, load))
-        low = row
+        found, curvature, load = _balance(grid, work, running, isothermal, max(curvature, -0.75), wedge)
+        if found and load > 0.0:
+            _keep(work, numbers, rises, row, (curvature, wedge, load))
+            low, row = row, row - 1
+        else:
+            flatter = np.sqrt(flatter)
     return low, high
 
 
