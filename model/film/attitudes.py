@@ -33,6 +33,8 @@ _FIRST, _DEEPER, _FLATTER = 0.4, 1.3, 0.72
 _ROWS = 48
 #: Films thinner than this share of the clearance, or hotter by so much [K], are of no concern.
 _DEEPEST, _HOTTEST = 60.0, 300.0
+#: Attitudes beyond this are of no concern: the journal would stand clearances away.
+_FARTHEST = -0.8
 #: Where a step fails it is halved, up to this factor.
 _LEAST_STEP = 0.96
 #: Below this wedge, as a share of the first, heat alone balances a film.
@@ -151,6 +153,8 @@ def walk(
         if found and load > 0.0:
             _keep(work, numbers, rises, row, (curvature, wedge, load))
             low, row = row, row - 1
+            if curvature == _FARTHEST:
+                break
         else:
             flatter = np.sqrt(flatter)
     return low, high
@@ -186,7 +190,10 @@ def _balance(
             moment, load, hottest = moment + tangential, load + radial, work.temperature[-1, 0] - 40.0
         slope = room * room * (forces.stiffness[1, 0] - wedge * forces.stiffness[1, 1])
         move = -moment / slope if slope < 0.0 else np.copysign(0.1 * (1.0 + curvature), moment)
-        if warmer < max(0.3, 0.01 * hottest) and abs(move) < 1e-3 * (1.0 + curvature):
+        settled = warmer < max(0.3, 0.01 * hottest)
+        if settled and curvature == _FARTHEST and move < 0.0:
+            return True, curvature, load  # the pad carries as far off as is of concern
+        if settled and abs(move) < 1e-3 * (1.0 + curvature):
             return True, curvature + share * move, load
         # a film that comes nearer grows hotter, and needs less of a step than one that stays as warm (Aitken)
         if last != 0.0:
@@ -194,7 +201,7 @@ def _balance(
             share = min(max(share / turn, 0.15), 1.0) if turn > 0.0 else 1.0
         last = move
         most = 0.3 * (1.0 + curvature)
-        curvature = max(curvature + min(max(share * move, -most), most), -0.8)
+        curvature = max(curvature + min(max(share * move, -most), most), _FARTHEST)
         if curvature > 3.0 * _DEEPEST:
             break
     return False, curvature, load
