@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from model.errors import check_known
 from model.film.cavitation import solve_flooded_film
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
@@ -13,24 +12,3 @@ from model.film.reynolds import FilmForces, solve_film
 FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]
 
 FILM_MODELS: dict[str, FilmSolver] = {"swift-stieber": solve_film, "jfo": solve_flooded_film}
-
-
-def film_solver(name: str) -> FilmSolver:
-    """Solver of a film that is flooded where it enters, by what happens where it ruptures.
-
-    Parameters
-    ----------
-    name : {"swift-stieber", "jfo"}
-
-    Returns
-    -------
-    callable
-        As `model.film.reynolds.solve_film`.
-
-    Raises
-    ------
-    OptionError
-        There is no such model; names the nearest.
-    """
-    check_known("cavitation", name, FILM_MODELS)
-    return FILM_MODELS[name]

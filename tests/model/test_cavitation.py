@@ -10,7 +10,7 @@ import pytest
 from model.bearing import Bearing
 from model.dynamics import bearing_impedance
 from model.effects import Effect
-from model.film.models import film_solver
+from model.film.models import FILM_MODELS
 from model.film.reynolds import solve_film
 from model.options import CAVITATION, Options
 from model.predict import predict
@@ -51,7 +51,7 @@ def test_pads_that_are_held_notice(rocker):
 def test_what_lies_behind_the_rupture_is_known(spherical):
     p = run(spherical, 8750.0)
     film = p.equilibrium.films[0]
-    assert film_solver("swift-stieber") is solve_film
+    assert FILM_MODELS["swift-stieber"] is solve_film
     wedge = (film.pad.pad_clearance, *film.approach(p.bearing_position))
     theta = fluid_fraction(film.grid, film.work, wedge, SPEED * spherical.journal_radius)
     ruptured = film.work.ruptured.copy()
