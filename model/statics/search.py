@@ -193,22 +193,19 @@ class Search:
         if self.rises:
             return
         load = max(float(np.hypot(*self.load)), 1.0)
-        case, nothing = self.case, np.empty(0)
-        running = case.running
-        if case.thermal in (COUPLED, ACROSS):
-            specific, conductivity = running.heat
-            kept = max(case.kept, 1e-9)
-            running = running._replace(heat=(specific / kept, conductivity / kept))
-        radius, length = self.setup.bearing.journal_radius, self.setup.bearing.length
-        oil = self.setup.bearing.oil
+        case, oil = self.case, self.setup.bearing.oil
+        # what the films run with, each for itself
+        cold = case.thermal == ISOTHERMAL
+        running = case.running if cold else self.films[0].running(self.surface_speed, oil)
+        size = self.setup.bearing.journal_radius**2 * self.setup.bearing.length
         viscosity = float(oil.viscosity(case.supply))
         for m, film in enumerate(self.films):
             clearance = float(self.pads.clearance[m])
             curve = attitudes(film.grid, clearance, running, case.supply, load)
-            unit = viscosity * self.surface_speed * radius**2 * length / clearance**2
-            law, gives = self.setup.pivots[m], nothing
+            unit = viscosity * self.surface_speed * size / clearance**2
+            gives = np.empty(0)
             if self.pads.laws[m, 0] == OTHER:
-                gives = np.array([law.deflection(max(w, 0.0)) for w in (curve.load * unit).tolist()])
+                gives = np.array([self.setup.pivots[m].deflection(w) for w in (curve.load * unit).tolist()])
             self.pads.rows[m] = pivot_curve(
                 curve[:3], (clearance, unit), self.pads.laws[m], self.pads.curves[m], gives, self.pads.attitudes[m]
             )
@@ -392,8 +389,8 @@ class Search:
         if not self.setup.friction:
             return []
         tilts = np.abs(self.state.moves[:, 0])
-        swinging = tilts >= _SWINGING * float(tilts.max())
-        return [conditions.stick_and_slip([k + 1 for k in np.flatnonzero(swinging).tolist()])]
+        swinging = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
+        return [conditions.stick_and_slip(swinging.tolist())]
 
 
 def _as_started(setup: Setup) -> Setup:

@@ -110,8 +110,7 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
         names.append(conditions.on_edge(edge))
     if search.other.any() and not restless:
         names.append(conditions.another([m + 1 for m in np.flatnonzero(~search.other).tolist()]))
-    across = search.not_held()
-    if across:
+    if search.not_held():
         names.append(conditions.NOT_HELD)
     return replace(result, status=(*names, *result.status)) if names else result
 
