@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (136.9, 16_510),
+    "measurement": (137.1, 16_560),
     "model": (90.9, 11_990),
     "rigdata": (69.9, 9_550),
     "diagnosis": (42.6, 5_220),

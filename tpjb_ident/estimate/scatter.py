@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtr, fdtrc
+from scipy.special import chdtr, fdtrc, fdtri
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
@@ -20,6 +20,8 @@ from tpjb_ident.estimate.blocks import Blocks, totals
 FORCE_ROWS = 4.0
 #: Distance over its usual size at which a block has no weight.
 _NO_WEIGHT = 3.0
+#: Probability of chance below which a run of few has no weight.
+_IMPROBABLE = 1e-4
 #: A block counts as good from this weight on; good runs that a point keeps, at least, and the share of its runs.
 _GOOD, _MIN_GOOD, _SHARE = 0.3, 4, 0.7
 #: Probability of chance below which a point's runs differ more than the others'.
@@ -64,8 +66,8 @@ class Scatter:
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom of the pooled variance, the usual one's included."""
-        return self.spare + _USUAL_FREEDOM
+        """Degrees of freedom of the pooled variance."""
+        return max(self.spare, 1.0)
 
     def updated(self, blocks: Blocks, fit: Residuals, solvable: BoolArray, count: int) -> Scatter:
         """Weights after the first step, scatter from the third on."""
@@ -98,18 +100,24 @@ class Scatter:
             return max(self.pooled, _USUAL**2), 0.0
         moment = max(0.0, self.pooled + float((chi - spare)[told].sum()) / float(gain[told].sum()))
         freedom = float(spare[told].sum())
-        return (_USUAL_FREEDOM * _USUAL**2 + freedom * moment) / (_USUAL_FREEDOM + freedom), freedom
+        # what a good rig has is added where few runs tell: a mean of both would shrink what they show
+        usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + freedom) * _USUAL**2
+        return moment + usual, freedom
 
     def _weights(self, blocks: Blocks, fit: Residuals, solvable: BoolArray) -> FloatArray:
         freedom = fit.rows * (1 - np.minimum(fit.leverage, _MAX_LEVERAGE))
         distance = fit.chi_square / np.maximum(freedom, 1.0)
         judged = solvable[blocks.point]
         usual = max(1.0, float(np.median(distance[judged]))) if judged.any() else 1.0
-        weights = np.asarray(np.maximum(1 - distance / usual / _NO_WEIGHT**2, 0.0) ** 2, dtype=float)
         points = len(blocks.points)
+        runs = totals(blocks.point, np.ones(len(blocks)), points)
+        freedom_of_others = 2 * float(np.maximum(runs - 2, 0.0).sum())
+        # few runs know little of what is usual among them: then only the improbable has no weight
+        improbable = float(fdtri(FORCE_ROWS, max(freedom_of_others, 1.0), 1 - _IMPROBABLE))
+        limit = max(_NO_WEIGHT**2, improbable)
+        weights = np.asarray(np.maximum(1 - distance / usual / limit, 0.0) ** 2, dtype=float)
         good = totals(blocks.point, np.asarray(weights > _GOOD), points)
-        number = totals(blocks.point, np.ones(len(blocks)), points)
-        few = good < np.maximum(_MIN_GOOD, _SHARE * number)
+        few = good < np.maximum(_MIN_GOOD, _SHARE * runs)
         return np.where(few[blocks.point], 1.0, weights)
 
 

@@ -23,7 +23,7 @@ from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
 #: A run with less than this share of its windows accepted differs as a whole: its windows are judged among themselves.
 _ACCEPTED = 0.2
-#: Share of a run's windows in which a channel has a phasor, at least, to count as recorded.
+#: Share of the windows of a run's best channel in which a channel has a phasor, at least, to count as recorded.
 _LEAST_WINDOWS = 0.4
 #: A channel whose phasors are below this share of its quantity's is dead.
 _NOTHING = 1e-6
@@ -130,12 +130,13 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
     described: list[list[Channel | None]] = []
     for run, line in zip(data.runs, data.lines):
         places = {channel.name: k for k, channel in enumerate(run.channels)}
+        least = _LEAST_WINDOWS * float(np.isfinite(run.z[:, line]).mean(axis=0).max(initial=0.0))
         z = np.full((len(run.start), len(task.sensors)), np.nan + 0j)
         channels: list[Channel | None] = []
         for j, sensor in enumerate(task.sensors):
             channel = run.channels[places[sensor.name]] if sensor.name in places else None
             values = None if channel is None else run.z[:, line, places[sensor.name]]
-            if channel is None or values is None or channel.quantity != sensor.quantity or not _usual(values):
+            if channel is None or values is None or channel.quantity != sensor.quantity or not _usual(values, least):
                 channels.append(None)
                 continue
             z[:, j] = values / _warm_gain(channel, task.temperatures.get(run.run))
@@ -174,10 +175,10 @@ def _driven(z: ComplexArray, data: PointData) -> ComplexArray:
     return z
 
 
-def _usual(values: ComplexArray) -> bool:
-    """Whether a channel has phasors in most of a run's windows, and not zeros throughout."""
+def _usual(values: ComplexArray, least: float) -> bool:
+    """Whether a channel has phasors in more than a share `least` of a run's windows, and not zeros throughout."""
     finite = np.isfinite(values)
-    return bool(finite.mean() > _LEAST_WINDOWS and np.abs(values[finite]).max() > 0)
+    return bool(finite.mean() > least and np.abs(values[finite]).max(initial=0.0) > 0)
 
 
 def _warm_gain(channel: Channel, temperature: float | None) -> float:
