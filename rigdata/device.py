@@ -32,7 +32,7 @@ class Device:
 
     Examples
     --------
-    >>> [(device.name, device.rate, device.length) for device in load_campaign(demo).run("d-05000-25-01").devices]
+    >>> [(device.name, device.rate, device.length) for device in ti.load_campaign(demo).run("d-05000-25-01").devices]
     [('', 1000.0, 2000)]
     """
 

@@ -74,12 +74,11 @@ def test_a_toml_file_of_four_gigabytes_is_refused_unread(tmp_path, name):
 
 @pytest.mark.parametrize("rows", [10**9, 2**31 + 1, 2**62])
 def test_a_dataset_that_claims_billions_of_rows(tmp_path, rows):
-    campaign = hdf5_campaign(
-        tmp_path / "a.h5", lambda g: g.create_dataset("X1A", shape=(rows,), dtype="f4", chunks=(1024,))
-    )
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(RigDataError, match=r"claims|samples"):
-        campaign.run("c-1").record("X1A")
+        hdf5_campaign(
+            tmp_path / "a.h5", lambda g: g.create_dataset("X1A", shape=(rows,), dtype="f4", chunks=(1024,))
+        ).run("c-1").record("X1A")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 2**17
 
 

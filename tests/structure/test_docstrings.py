@@ -20,7 +20,7 @@ HANDED_ON = ("tpjb_ident/__init__.py", "model/__init__.py", "rigdata/__init__.py
 EXTENSION_POINTS = {
     "an effect": ("model/effects/*.py:apply", "model/setup.py:Setup"),
     "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
-    "a film": ("model/film/models.py:*", "model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
+    "a film": ("model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
     "a reader": (
         "rigdata/readers/formats/*.py:read_series",
         "rigdata/readers/*.py:Series",

@@ -68,7 +68,7 @@ def identify(
     --------
     >>> result = ti.identify(demo)
     >>> print(result.points[0])
-    2.5 kN, 25 Hz: kxx 53.12 ± 0.63 MN/m, cxx 582.3 ± 6.6 kN s/m, kyy 90.7 ± 1.1 MN/m, cyy 689.1 ± 8.0 kN s/m
+    2.5 kN, 25 Hz: kxx 53.09 ± 0.54 MN/m, cxx 581.3 ± 5.2 kN s/m, kyy 90.73 ± 0.89 MN/m, cyy 689.1 ± 6.6 kN s/m
     """
     settings = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")

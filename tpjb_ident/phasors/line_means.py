@@ -56,9 +56,15 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
                 d, f = _plane(run, run.record[place])
                 lines[name] = FilmLine(frequency / driven.frequency, d, f)
         bins = [_plane(run, row) for row in run.residual[i]]
-        noise = [float(np.nanmean([np.sum(np.abs(pair[k]) ** 2) for pair in bins])) if bins else 0.0 for k in (0, 1)]
-        result.append(FilmLines(float(np.linalg.norm(_plane(run, run.record[i])[1])), lines, *noise))
+        force = float(np.linalg.norm(_plane(run, run.record[i])[1]))
+        result.append(FilmLines(force, lines, _mean_square([d for d, _ in bins]), _mean_square([f for _, f in bins])))
     return tuple(result)
+
+
+def _mean_square(rows: list[ComplexArray]) -> float:
+    """Mean over rows (2,) of their squared size, those without a value left out; zero where there is none."""
+    sizes = [float(np.sum(np.abs(row) ** 2)) for row in rows if np.isfinite(row).all()]
+    return float(np.mean(sizes)) if sizes else 0.0
 
 
 def _alone(run: RunPhasors, frequency: float, name: str) -> int | None:

@@ -151,7 +151,7 @@ def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
 def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float, FloatArray]]:
     """Load, direction and stiffness (2, 2) at rest: Re h = K - omega^2 M, extrapolated over the frequencies of a load.
 
-    A single frequency does not tell the film's and the housing's inertia from its stiffness: it says nothing.
+    With a single frequency Re h itself stands in.
     """
     groups: dict[tuple[float, ...], list[PointResult]] = {}
     for p in points:
@@ -162,9 +162,9 @@ def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float,
     for (load, direction, _), members in groups.items():
         square = np.array([p.stiffness.omega**2 for p in members])
         k = np.array([p.stiffness.k.ravel() for p in members])
-        if len(members) > 1 and np.ptp(square) > 0:
-            line = np.polynomial.polynomial.polyfit(square, k, 1)[0]
-            result.append((load, direction, line.reshape(2, 2)))
+        several = len(members) > 1 and np.ptp(square) > 0
+        at_rest = np.polynomial.polynomial.polyfit(square, k, 1)[0] if several else k[0]
+        result.append((load, direction, at_rest.reshape(2, 2)))
     return result
 
 
