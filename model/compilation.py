@@ -9,6 +9,7 @@ numba itself is imported at the first call of a loop: a process that only reads,
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -118,6 +119,8 @@ def _warn_once(message: str) -> None:
     warnings.warn(message, RuntimeWarning, stacklevel=4)
 
 
+#: Bytes of a digest.
+_DIGEST = 32
 #: What `_cache_type` relies on in numba.
 _LOADING = ("_load_overload", "_guard_against_spurious_io_errors")
 
@@ -142,6 +145,44 @@ def _cache_type() -> Any:
     return Cache
 
 
+@functools.cache
+def _store_type() -> Any:
+    from numba.core.caching import IndexDataCacheFile
+
+    class Store(IndexDataCacheFile):  # type: ignore[misc]
+        """Files of machine code that know whose they are: what is damaged, or was written by two at once, is no code.
+
+        Two processes that compile at the same time may give one file's name to two signatures.
+        """
+
+        def load(self, key: Any) -> Any:
+            with contextlib.suppress(Exception):  # what a damaged file raises is any error at all
+                kept = Path(self._data_path(self._load_index()[key])).read_bytes()
+                if kept[-_DIGEST:] == _digest(key, kept[:-_DIGEST]):
+                    return super().load(key)
+            return None
+
+        def save(self, key: Any, data: Any) -> None:
+            self.key = key
+            with contextlib.suppress(OSError):  # a full disk: the next process compiles again
+                super().save(key, data)
+
+        def _dump(self, obj: Any) -> bytes:
+            code = super()._dump(obj)
+            return code + _digest(self.key, code)  # who reads it does not read on to here
+
+        def _load_index(self) -> Any:
+            with contextlib.suppress(Exception):  # it may also name what an older version had
+                return super()._load_index()
+            return {}
+
+    return Store
+
+
+def _digest(key: Any, code: bytes) -> bytes:
+    return hashlib.sha256(repr(key).encode() + code).digest()
+
+
 def _register_inner_loops() -> None:
     numba = _compiler()
     while _inner:
@@ -160,20 +201,12 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
     if not hasattr(store, "_source_stamp"):  # a cache that is built otherwise: compile in every process, trust nothing
         return _without_cache(numba, function)
     store._source_stamp = stamp()
-    store._load_index = functools.partial(_readable_index, store._load_index)
+    store.__class__ = _store_type()
     if all(hasattr(dispatcher._cache, name) for name in _LOADING):  # a numba that loads otherwise: its own way
         dispatcher._cache.__class__ = _cache_type()
     else:
         _register_inner_loops()
     return dispatcher
-
-
-def _readable_index(load: Callable[[], dict[Any, Any]]) -> dict[Any, Any]:
-    """Machine code on disk by signature; none where an older version's names something that has gone."""
-    try:
-        return load()
-    except (ImportError, AttributeError):
-        return {}
 
 
 def _without_cache(numba: Any, function: Callable[..., Any]) -> Any:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from model.conditions import named
 from model.film.following_heat import heat_impedance
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
@@ -350,8 +351,8 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
         (loose if free.any() else held).append(film.number)
     names = []
     if held:
-        names.append(Condition(f"pivot friction holds pads {', '.join(map(str, held))}", "note", pads=tuple(held)))
+        names.append(named("pivot friction holds pads {pads}", held))
     if loose:
-        text = f"vibration of {1e6 * setup.vibration:g} um breaks the pivots of pads {', '.join(map(str, loose))} loose"
-        names.append(Condition(text, "note", pads=tuple(loose)))
+        kind = "vibration of {number:g} um breaks the pivots of pads {pads} loose"
+        names.append(named(kind, loose, 1e6 * setup.vibration))
     return tuple(names)

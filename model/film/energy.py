@@ -22,8 +22,6 @@ from rigdata.arrays import FloatArray
 #: back there; what the journal drags in mixes with what returns, so that the net flow is no measure of the heat
 #: carried along, and with less than this the temperature there runs away. Bearings as they are run stay above it.
 _LEAST_FLOW = 0.2
-#: Below, an oil does not thin [1/K].
-_LEAST_THINNING = 1e-6
 
 
 @compiled
@@ -133,26 +131,6 @@ def heat_step(
             work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
     force = pressure_change(grid, work, running.speed, running.oil, shift)
     return change, limited, force[0], force[1]
-
-
-@compiled
-def heat_by_drag(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, inlet: float
-) -> None:
-    """Temperature of a film whose oil is dragged along and not pressed: a start for the search.
-
-    With m = rho U h / 2 along and mu(T) = mu_in exp(-kappa (T - T_in)), m c T_x = mu U^2 / h is
-    kappa (T - T_in) = ln(1 + kappa (2 mu_in U / (rho c)) int dx / h^2).
-    """
-    speed, oil, heat = running.speed, running.oil, running.heat[0]
-    fluid = oil[0] * np.exp(oil[1] * (40.0 - inlet)) / (oil[2] * (1.0 + oil[3] * (40.0 - inlet)))
-    along = 0.0
-    for i in range(work.temperature.shape[0]):
-        if i > 0:
-            h = wedge[0] - wedge[1] * grid.cos_face[i - 1] - wedge[2] * grid.sin_face[i - 1]
-            along += grid.dx / h**2
-        rise = 2.0 * fluid * speed / heat * along  # of oil that does not thin
-        work.temperature[i] = inlet + (np.log(1.0 + oil[1] * rise) / oil[1] if oil[1] > _LEAST_THINNING else rise)
 
 
 @compiled

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from model.conditions import has_answer
+from model.conditions import has_answer, named
 from model.film.attitudes import attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.oil_state import Running, set_viscosity
@@ -53,9 +53,7 @@ from rigdata.problem import Condition
 
 #: What turns films into what `Case.rupture` says.
 _RUPTURES = {"swift-stieber": None, "jfo": MASS_CONSERVING, "turbulent": TURBULENT}
-_FAILURES = {
-    FILM_LOST: conditions.FILM_LOST, BOUNDLESS_HEAT: conditions.BOUNDLESS_HEAT, SINGULAR: conditions.SINGULAR,
-}  # fmt: skip
+_FAILURES = {FILM_LOST: "film lost", BOUNDLESS_HEAT: "heat without bounds", SINGULAR: "singular"}
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.
 _SWINGING = 0.3
 #: Share of the clearance that tells a place from a fold.
@@ -365,18 +363,17 @@ class Search:
         films, figures = self.films, self.state.figures
         names: list[Condition] = []
         if code != SETTLED:
-            names = [_FAILURES[code]] if code in _FAILURES else self._restless()
-            names.append(conditions.NOT_CONVERGED)
+            names = [named(_FAILURES[code])] if code in _FAILURES else self._restless()
+            names.append(named("not converged"))
         if not has_answer(names) and conditions.unsupported(self.setup, self.load):
-            names.insert(0, conditions.UNSUPPORTED)
-        overloaded = conditions.overloaded_pads(films)
-        if overloaded and has_answer(names):
-            names.append(conditions.overloaded(overloaded))
+            names.insert(0, named("no pads against the load"))
+        if has_answer(names):
+            names += conditions.overloaded_pads(films)
         idle = [f.number for f in films if f.idle]
         if idle:
-            names.append(conditions.idle(idle))
+            names.append(named("idle pads {pads}", idle))
         if figures[BACKFLOW] > 0.0:
-            names.append(conditions.FLOW_BACK)
+            names.append(named("flow back at a leading edge"))
         names += conditions.regimes(self.setup, films, self.surface_speed)
         trail = memory.trail
         return Equilibrium(
@@ -390,7 +387,7 @@ class Search:
             return []
         tilts = np.abs(self.state.moves[:, 0])
         swinging = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
-        return [conditions.stick_and_slip(swinging.tolist())]
+        return [named("pads {pads} neither stick nor slide at rest", swinging.tolist())]
 
 
 def _as_started(setup: Setup) -> Setup:

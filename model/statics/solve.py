@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from model.conditions import named, pads_of
 from model.setup import Setup
-from model.statics import conditions
-from model.statics.conditions import HOTTEST_FILM, runaway
+from model.statics.conditions import HOTTEST_FILM
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
 from model.statics.search import Search
@@ -32,7 +32,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
         if search.start_from(start):
             result = _settled(search, search.run())
             # where pads are left idle that could carry, another start may leave others
-            if result.converged and not conditions.left(result.status):
+            if result.converged and not pads_of("pads {pads} cannot keep their load", result.status):
                 return result
     search = Search(setup, load, speed)
     search.stand()
@@ -100,18 +100,19 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     restless = [m + 1 for m in unloaded if m not in off]
     off = sorted({*off, *(m for m in held if films[m].idle)})
     if restless:
-        names = [conditions.undecided(restless), conditions.NOT_CONVERGED]
+        names = [named("pads {pads} can neither carry nor idle", restless), named("not converged")]
     elif off:
-        names = [conditions.left_unloaded([m + 1 for m in off])]
+        names = [named("pads {pads} cannot keep their load", [m + 1 for m in off])]
     if even and not restless:
-        names.append(conditions.even(even))
+        names.append(named("pads {pads} stand concentric", even))
     edge = [m + 1 for m, above in enumerate(search.margins()) if abs(above) < _EDGE and m + 1 not in even]
     if edge:
-        names.append(conditions.on_edge(edge))
+        names.append(named("pads {pads} on the edge of carrying", edge))
     if search.other.any() and not restless:
-        names.append(conditions.another([m + 1 for m in np.flatnonzero(~search.other).tolist()]))
+        idling = np.flatnonzero(~search.other) + 1
+        names.append(named("another equilibrium exists", idling.tolist()))
     if search.not_held():
-        names.append(conditions.NOT_HELD)
+        names.append(named("nothing holds the journal across its load"))
     return replace(result, status=(*names, *result.status)) if names else result
 
 
@@ -121,7 +122,11 @@ def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilib
     search.stand()
     result, held = search.run(), frozenset[int]()
     for _ in search.films:
-        swinging = [k - 1 for k in conditions.held_off(result.status) if not search.state.idle[k - 1]]
+        swinging = [
+            k - 1
+            for k in pads_of("pads {pads} neither stick nor slide at rest", result.status)
+            if not search.state.idle[k - 1]
+        ]
         if not swinging:
             return failed
         held |= frozenset(swinging)
@@ -141,7 +146,7 @@ def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibriu
     hottest = max(float(f.work.temperature.max()) for f in failed.films)
     if found is not None or not reached or hottest < HOTTEST_FILM:
         return found or failed
-    return replace(failed, status=(runaway(reached), *failed.status))
+    return replace(failed, status=(named("heat runs away", number=100 * reached), *failed.status))
 
 
 def _raise(setup: Setup, load: FloatArray, speed: float, what: str) -> tuple[Equilibrium | None, float]:

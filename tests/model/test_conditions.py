@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from model.bearing import Bearing
+from model.conditions import KINDS, named, pads_of
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.predict import predict
@@ -101,11 +104,11 @@ def test_limits_of_a_pad_are_told_apart(rocker):
     hot = films[1]
     kept = hot.work.temperature[3, 1]
     hot.work.temperature[3, 1] = 151.0
-    assert overloaded_pads(films) == [2]
+    assert overloaded_pads(films)[0].pads == (2,)
     hot.work.temperature[3, 1] = kept
     films[2].work.pressure[5, 0] = 46e6
     films[3].work.thickness[5, 0] = 2e-6
-    assert overloaded_pads(films) == [3, 4]
+    assert overloaded_pads(films)[0].pads == (3, 4)
     films[2].idle = films[3].idle = True  # what carries nothing is not overloaded
     assert overloaded_pads(films) == []
 
@@ -120,3 +123,28 @@ def test_singular_steps_are_named(rocker, monkeypatch):
     p = run(rocker)
     assert "singular" in p.status
     assert not p.converged
+
+
+def test_every_condition_is_explained_where_the_model_is():
+    text = (Path(__file__).parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    rows = "\n".join(line.split("|")[1] for line in text.splitlines() if line.startswith("| "))
+    # `pads 2, 4 stand concentric` stands for its kind; after `..` in a row only what differs
+    kinds = [re.escape(kind) for kind in KINDS]
+    patterns = [re.sub(r"\\\{[a-z]+(:[^}]*)?\\\}", r"[\\d,. and]+", kind) for kind in kinds]
+    tails = [kind.split("}")[-1].strip() for kind in KINDS]
+    missing = [
+        k
+        for k, p, t in zip(KINDS, patterns, tails, strict=True)
+        if not re.search(rf"`({p}|\.\. {re.escape(t)})`", rows)
+    ]
+    assert missing == []
+
+
+def test_a_condition_names_its_pads_and_numbers():
+    touching = named("pads {pads} touch", (5, 1))
+    assert (touching, touching.severity, touching.pads) == ("pads 5 and 1 touch", "warning", (5, 1))
+    assert named("heat runs away", number=41.6).detail.startswith("journal and films find rest with up to 42 %")
+    status = (named("idle pads {pads}", [3]), named("pads {pads} cannot keep their load", [2, 4]))
+    assert pads_of("pads {pads} cannot keep their load", status) == (2, 4)
+    with pytest.raises(KeyError):
+        named("idle pad {pads}")

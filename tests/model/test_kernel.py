@@ -95,6 +95,44 @@ def test_other_troubles_of_the_compiler_are_not_taken_for_that(monkeypatch):
         _ = compilation.compiled(_twice).dispatcher
 
 
+@pytest.fixture
+def store(tmp_path):
+    kept = compilation._store_type()(str(tmp_path), "loop", "stamp")
+    assert type(model.film.reynolds.solve_film.dispatcher._cache._cache_file) is type(kept)
+    kept.save("one signature", "code")
+    assert kept.load("one signature") == "code"
+    return kept
+
+
+@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
+@pytest.mark.parametrize(
+    "damage", [lambda b: b[:-9], lambda b: b"", lambda b: b.replace(b"code", b"c0de"), bytes.swapcase]
+)
+def test_damaged_machine_code_is_no_code_and_is_written_anew(store, tmp_path, kind, damage):
+    (path,) = tmp_path.glob(kind)
+    path.write_bytes(damage(path.read_bytes()))
+    assert store.load("one signature") in (None, "code" if kind == "*.nbi" else None)
+    store.save("one signature", "new code")
+    assert store.load("one signature") == "new code"
+
+
+def test_a_file_that_two_processes_wrote_is_the_code_of_one(store):
+    index = store._load_index()
+    index["another"] = index["one signature"]
+    store._save_index(index)
+    assert store.load("another") is None
+    assert store.load("one signature") == "code"
+
+
+def test_a_full_disk_is_no_reason_to_fail(store, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store, "_save_data", full)
+    store.save("another", "code")
+    assert store.load("another") is None
+
+
 @pytest.mark.parametrize(
     ("chosen", "numbas", "under"), [("own", None, "own/compiled"), ("own", "other", None), ("off", None, None)]
 )
