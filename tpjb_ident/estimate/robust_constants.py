@@ -10,7 +10,6 @@ import functools
 from math import comb
 
 import numpy as np
-from scipy import optimize
 from scipy.special import chdtr, gammaincinv, gammaln, xlogy
 
 from rigdata.arrays import FloatArray
@@ -45,7 +44,11 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
         b = moment(0, c) - (2 + more) * moment(1, c) / c**2 + (1 + more) * moment(2, c) / c**4
         return float(b**2 / a - efficiency)
 
-    return float(optimize.brentq(shortfall, 2.0, 30.0))
+    lower, upper = 2.0, 30.0
+    while upper - lower > 1e-12:  # halved: scipy's root finders take longer to import than `identify` to solve
+        middle = (lower + upper) / 2
+        lower, upper = (lower, middle) if shortfall(middle) > 0 else (middle, upper)
+    return lower
 
 
 @functools.cache

@@ -130,7 +130,7 @@ def _line_slip(result: RunPhasors, line: int, rate: float, places: list[int] | N
     if not present.any():
         return 0.0
     # a channel without noise must not stand for all
-    least = 1e-9 * np.nanmedian(np.abs(z[:, present]), axis=0)
+    least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
     return frequency_slip(z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny), result.start, 1.0)
 
 

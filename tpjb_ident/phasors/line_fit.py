@@ -236,6 +236,8 @@ def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArra
 
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale; infinite where none has; `scale` (n_windows, q)."""
+    if len(scale) and np.isfinite(scale).all():
+        return np.asarray(np.median(scale, axis=0))
     usual = np.full(scale.shape[1], np.inf)
     for k, column in enumerate(scale.T):
         finite_values = column[np.isfinite(column)]

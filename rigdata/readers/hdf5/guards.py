@@ -7,7 +7,6 @@ can make it; so such files are found here, by the layout of the HDF5 File Format
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 import struct
 from collections.abc import Iterator, Sequence
@@ -28,6 +27,8 @@ _LONGEST_UNIT = 64
 #: the descriptions of type and shape.
 _REFERENCE, _BEHIND = struct.Struct("<IQI"), 80
 _MAX_STEPS = 64
+#: What h5py raises of a damaged file.
+_BROKEN = (RigDataError, OSError, RuntimeError, KeyError, ValueError, TypeError)
 #: Filters that the library brings along.
 _FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 4: "szip", 5: "nbit", 6: "scaleoffset", 32000: "lzf"}
 #: Attributes of a dataset that state its unit.
@@ -109,40 +110,37 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
     import h5py
 
     remedy = "Copy the data into this file"
-    member, remaining, steps = start, _parts(path), 0
+    place, remaining, steps = start.id, _parts(path), 0
     is_soft = False
     while remaining:
         steps += 1
         if steps > _MAX_STEPS:
             raise refuse(file, path, "is a circle of links, or too deep", remedy, run)
-        name = remaining.pop(0)
-        link = None
-        if isinstance(member, h5py.Group) and has_link(member, name):
-            link = member.get(name, getlink=True)
-        if isinstance(link, h5py.HardLink):
-            member = member[name]
-        elif isinstance(link, h5py.SoftLink):
-            target, is_soft = str(link.path), True
-            member = member.file["/"] if target.startswith("/") else member
+        name = remaining.pop(0).encode("utf-8", "surrogateescape")
+        kind = None
+        if isinstance(place, h5py.h5g.GroupID) and place.links.exists(name):
+            kind = place.links.get_info(name).type
+        if kind == h5py.h5l.TYPE_HARD:
+            place = h5py.h5o.open(place, name)
+        elif kind == h5py.h5l.TYPE_SOFT:
+            target, is_soft = place.links.get_val(name).decode("utf-8", "surrogateescape"), True
+            place = h5py.h5g.open(h5py.h5i.get_file_id(place), b"/") if target.startswith("/") else place
             remaining = _parts(target) + remaining
-        elif isinstance(link, h5py.ExternalLink):
-            raise refuse(file, path, f"is a link out of the file (to {str(link.filename)[:80]!a})", remedy, run)
-        elif link is not None:
+        elif kind == h5py.h5l.TYPE_EXTERNAL:
+            target = place.links.get_val(name)[0].decode("utf-8", "surrogateescape")
+            raise refuse(file, path, f"is a link out of the file (to {target[:80]!a})", remedy, run)
+        elif kind is not None:
             raise refuse(file, path, "is a link of an unknown kind", remedy, run)
         elif is_soft:
             raise refuse(file, path, "is a soft link that leads nowhere", remedy, run)
         else:
             return None
-    return member
+    members = {h5py.h5g.GroupID: h5py.Group, h5py.h5d.DatasetID: h5py.Dataset, h5py.h5t.TypeID: h5py.Datatype}
+    return next((member(place) for kind, member in members.items() if isinstance(place, kind)), start)
 
 
 def _parts(path: str) -> list[str]:
     return [part for part in path.split("/") if part not in ("", ".")]
-
-
-def has_link(group: Any, name: str) -> bool:
-    """Whether the group has such a link: a dangling or external one counts and is never followed."""
-    return bool(group.id.links.exists(name.encode("utf-8", "surrogateescape")))
 
 
 def claimed_bytes(member: Any) -> int:
@@ -160,10 +158,12 @@ def claimed_by_runs(handle: Any, runs: Sequence[str], names: Sequence[str]) -> i
     import h5py
 
     claimed = 0
-    for run, name in itertools.product(runs, names):
-        with contextlib.suppress(RigDataError, OSError, RuntimeError, KeyError, ValueError, TypeError):
-            member = resolve(handle, f"runs/{run}/{name}", "")
-            claimed += claimed_bytes(member) if isinstance(member, h5py.Dataset) else 0
+    for run in runs:
+        with contextlib.suppress(*_BROKEN):
+            group = resolve(handle, f"runs/{run}", "")
+            for name in names if isinstance(group, h5py.Group) else ():
+                with contextlib.suppress(*_BROKEN):
+                    claimed += claimed_bytes(resolve(group, name, ""))
     return claimed
 
 

@@ -43,8 +43,8 @@ _MOST_NUMBER = 64
 _MAX_MEMBERS, _LISTED = 4096, 20
 #: Attribute of a run's group.
 _RATE = "sample_rate_hz"
-#: Key of an open group among the opened members; no dataset can have this name.
-_GROUP = "/"
+#: Keys of an open group and of its facts among the opened members; no dataset can have these names.
+_GROUP, _FACTS = "/", ""
 #: Samples of a time dataset that tell its rate.
 _LOOK = 100_000
 #: Bytes of unpacked chunks that the library keeps per dataset.
@@ -209,7 +209,10 @@ class Hdf5Reader(GridReader):
             return tuple(group.keys())
 
     def _facts(self, opened: Any = None) -> _Facts:
-        """Give the facts, from the group that the caller has `opened` if any must be read."""
+        """Give the facts, from the group that the caller has `opened` if any must be read; once for a file kept open."""
+        if _FACTS in self.opened_members:
+            facts: _Facts = self.opened_members[_FACTS]
+            return facts
         try:
             state = self.path.stat()
         except OSError as error:
@@ -222,7 +225,10 @@ class Hdf5Reader(GridReader):
                 facts = _Facts(members, *self._planned(group, rate))
             self.cached_facts.clear()
             self.cached_facts[signature] = facts
-        return self.cached_facts[signature]
+        facts = self.cached_facts[signature]
+        if _GROUP in self.opened_members:
+            self.opened_members[_FACTS] = facts
+        return facts
 
     def _lengths(self, group: Any) -> dict[str, int]:
         """Samples of every dataset that can be used."""
@@ -346,15 +352,14 @@ class Hdf5Reader(GridReader):
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""
         with self._group() as group:
-            usable = []
-            for name in self._facts().members:
+            usable = {}
+            for name in self._facts(group).members:
                 with suppress(RigDataError):  # raised when that channel is asked for; no result can come from it
-                    self._dataset(group, name)
-                    usable.append(name)
+                    usable[name] = self._dataset(group, name)
             digest = hashlib.sha256()
             with self.path.open("rb") as file:
                 for name in sorted(usable):
-                    _hash_dataset(digest, file, name, group[name])
+                    _hash_dataset(digest, file, name, usable[name])
             plain = sorted(key for key in group.attrs if is_plain(group.attrs.get_id(key), _PIECE))
             digest.update(repr([(key, repr(group.attrs[key])) for key in plain]).encode())
         return digest.hexdigest()

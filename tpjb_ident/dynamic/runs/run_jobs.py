@@ -95,11 +95,12 @@ def _process_run(
 ) -> tuple[str, RunResult | None]:
     if known is None:
         return "", one_run(run, housing_mass, settings)
-    mark = fingerprint(run, housing_mass, settings)
-    if mark and mark == known:
-        return mark, None
-    before = _state(run)
-    result = one_run(run, housing_mass, settings)
+    with run.opened():  # once for both
+        mark = fingerprint(run, housing_mass, settings)
+        if mark and mark == known:
+            return mark, None
+        before = _state(run)
+        result = one_run(run, housing_mass, settings)
     return (mark if before == _state(run) else ""), result
 
 
