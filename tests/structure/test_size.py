@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (137.1, 16_560),
     "model": (90.9, 11_990),
-    "rigdata": (69.9, 9_550),
+    "rigdata": (70.1, 9_560),
     "diagnosis": (42.6, 5_220),
     "cli": (26.7, 3_740),
     "report": (24.6, 3_270),

@@ -281,7 +281,7 @@ def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[st
                     elif not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
                         bad |= set() if is_sound else {name}
-                    parts[name].append(column.to_numpy(zero_copy_only=False))
+                    parts[name].append(np.array(column.to_pylist(), object) if name in stamped else _values(column))
         except pa.ArrowInvalid as error:
             if numbers:
                 raise
@@ -295,6 +295,15 @@ def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[st
     if bad:
         raise RigDataError(_locate_text(source, [name for name in names if name in bad]))
     return columns, odd_lines
+
+
+def _values(column: Any) -> FloatArray:
+    """Readings of a column, NaN where there is none; `to_numpy` would import pandas in every worker."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    numbers = pc.fill_null(column.cast(pa.float64()), float("nan"))
+    return np.frombuffer(numbers.buffers()[1], np.float64, len(numbers), 8 * numbers.offset)
 
 
 def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:
