@@ -1,6 +1,7 @@
 """Coefficients sorted by static point, as every export wants them, and the forms in which they leave.
 
-A new form is a file with a writer and a line in `FORMATS`.
+A new form is a file with a writer and a line in `FORMATS`. Programs of rotors take a shaft that turns counter-clockwise
+for granted: what was measured on another one is mirrored for them.
 """
 
 from __future__ import annotations
@@ -8,8 +9,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
@@ -28,12 +28,7 @@ class ExportError(TpjbError):
 
 
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
-
-
-def _no_frequencies() -> BoolArray:
-    import numpy as np
-
-    return np.zeros(0, bool)
+_ROTATION, _COUNTER_CLOCKWISE = "rotation", "counter-clockwise"
 
 
 @dataclass(frozen=True)
@@ -58,6 +53,10 @@ class StaticPoint:
         Per frequency the named conditions, ``"ok"`` if there are none.
     trusted : (n,) bool ndarray
         False where the coefficients are exported against advice.
+    rotation : str
+        ``"counter-clockwise"`` or ``"clockwise"``, of the shaft in the frame of the coefficients.
+    mirrored : bool
+        Whether that frame is the mirror image of the rig's, x to -x.
     """
 
     load: float
@@ -67,13 +66,10 @@ class StaticPoint:
     coefficients: dict[str, FloatArray] = field(repr=False)
     low: dict[str, FloatArray] = field(repr=False)
     high: dict[str, FloatArray] = field(repr=False)
-    quality: tuple[str, ...] = ()
-    trusted: BoolArray = field(repr=False, default_factory=_no_frequencies)
-
-    @property
-    def tag(self) -> str:
-        """Name that says what the frequency axis means."""
-        return f"{self.load:.0f}N_{self.direction:g}deg_{self.speed:g}Hz_excitation"
+    quality: tuple[str, ...]
+    trusted: BoolArray = field(repr=False)
+    rotation: str = _COUNTER_CLOCKWISE
+    mirrored: bool = False
 
     @property
     def flags(self) -> tuple[str, ...]:
@@ -115,7 +111,9 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
             doubtful.append(f"{_place(row)}: {reasons[-1]}")
     usable = usable.assign(_trusted=[not reason for reason in reasons], _reasons=reasons)
     exported = usable if force else usable[usable["_trusted"]]
-    points = [_point(keys, group) for keys, group in exported.groupby(list(STATIC_COLUMNS), sort=True)]
+    if _ROTATION not in exported:
+        exported = exported.assign(**{_ROTATION: _COUNTER_CLOCKWISE})
+    points = [_point(keys, group) for keys, group in exported.groupby([*STATIC_COLUMNS, _ROTATION], sort=True)]
     return Chosen(tuple(points), left_out, tuple(doubtful))
 
 
@@ -123,8 +121,8 @@ def _place(row: pd.Series) -> str:
     return f"{row['static_load_N']:g} N, {row['excitation_Hz']:g} Hz"
 
 
-def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint:
-    load, direction, speed = (float(key) for key in keys)
+def _point(keys: tuple[Any, ...], group: pd.DataFrame) -> StaticPoint:
+    load, direction, speed = (float(key) for key in keys[:3])
     ordered = group.sort_values("excitation_Hz")
     if ordered["excitation_Hz"].duplicated().any():
         raise ExportError(f"the point {load:g} N stands twice at one frequency. Export one method at a time.")
@@ -134,7 +132,25 @@ def _point(keys: tuple[float, float, float], group: pd.DataFrame) -> StaticPoint
     texts = list(ordered[column]) if column in ordered else [""] * len(ordered)
     flags = tuple(_with_reasons(text, reason) for text, reason in zip(texts, ordered["_reasons"], strict=True))
     trusted = ordered["_trusted"].to_numpy(bool)
-    return StaticPoint(load, direction, speed, omega, values, low, high, flags, trusted)
+    return StaticPoint(load, direction, speed, omega, values, low, high, flags, trusted, str(keys[3]))
+
+
+def turning_counter_clockwise(point: StaticPoint) -> StaticPoint:
+    """Give a point in a frame in which its shaft turns counter-clockwise: x to -x where it does not."""
+    if point.rotation == _COUNTER_CLOCKWISE:
+        return point
+    sign = {name: -1.0 if name[1] != name[2] else 1.0 for name in COLUMNS}
+    values, low, high = (
+        {name: sign[name] * column for name, column in part.items()}
+        for part in (point.coefficients, point.low, point.high)
+    )
+    for name in COLUMNS:
+        if sign[name] < 0:
+            low[name], high[name] = high[name], low[name]
+    direction = (180.0 - point.direction + 180.0) % 360.0 - 180.0
+    return replace(
+        point, direction=direction, coefficients=values, low=low, high=high, rotation=_COUNTER_CLOCKWISE, mirrored=True
+    )
 
 
 def _coefficients(table: pd.DataFrame, end: str) -> dict[str, FloatArray]:
@@ -173,8 +189,10 @@ def _distrust(row: Mapping[str, Any]) -> str:
     return "; ".join(reasons)
 
 
-#: Writes points into an existing folder; the text says where they come from.
-Writer = Callable[[Path, tuple[StaticPoint, ...], str], None]
+#: Versions of ROSS whose files are written.
+ROSS_VERSIONS = (2, 3)
+#: Writes points into an existing folder; the text says where they come from. ROSS's takes a version as well.
+Writer = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -187,15 +205,16 @@ class Format:
     ----------
     module, function : str
         Where its writer is; imported when it is used.
-    holds_intervals : bool
-        Whether its files hold intervals and flags; where not, a table of them is written beside.
+    of_rotors : bool
+        Whether it is a rotor program's: its files hold no intervals and flags (a table beside them does), and its
+        shafts turn counter-clockwise.
     note : str
         What its user must know.
     """
 
     module: str
     function: str
-    holds_intervals: bool = True
+    of_rotors: bool = False
     note: str = ""
 
     @property
@@ -206,20 +225,18 @@ class Format:
 
 
 _BY_SPEED = "this program knows K and C over shaft speed only: one file per excitation frequency."
+_ROSS = "ROSS extrapolates outside the speeds and frequencies given; K holds Re h, there are no masses."
+
+
 FORMATS: dict[str, Format] = {
-    "ross": Format(
-        "rotor_programs",
-        "write_ross",
-        holds_intervals=False,
-        note="ROSS extrapolates outside the frequencies given; K holds Re h, the masses are zero.",
-    ),
+    "ross": Format("rotor_programs", "write_ross", True, _ROSS),
     "csv": Format("table", "write_csv"),
     "parquet": Format("table", "write_parquet"),
     "excel": Format("table", "write_excel"),
     "mat": Format("table", "write_mat"),
-    "xltrc": Format("rotor_programs", "write_xltrc", holds_intervals=False, note=_BY_SPEED),
-    "dyrobes": Format("rotor_programs", "write_dyrobes", holds_intervals=False, note=_BY_SPEED),
-    "ansys": Format("rotor_programs", "write_ansys", holds_intervals=False, note=_BY_SPEED),
+    "xltrc": Format("rotor_programs", "write_xltrc", True, _BY_SPEED),
+    "dyrobes": Format("rotor_programs", "write_dyrobes", True, _BY_SPEED),
+    "ansys": Format("rotor_programs", "write_ansys", True, _BY_SPEED),
 }
 
 

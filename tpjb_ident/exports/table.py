@@ -27,7 +27,7 @@ _TIME, _NO_TIME = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:.]+Z"), b"1980-0
 _MAT_HEAD = b"MATLAB 5.0 MAT-file, written by tpjb-ident".ljust(116)
 _FIELDS = (
     "load_N", "direction_deg", "speed_Hz", "frequency_rad_per_s", "K", "C", "K_lo", "K_hi", "C_lo", "C_hi",
-    "quality", "trusted",
+    "quality", "trusted", "rotation",
 )  # fmt: skip
 
 
@@ -41,6 +41,7 @@ def _coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
             "static_load_N": point.load,
             "static_load_direction_deg": point.direction,
             "shaft_speed_rpm": 60 * point.speed,
+            "rotation": point.rotation,
             "frequency_rad_per_s": point.frequency,
         }
         for short, name in COLUMNS.items():
@@ -147,7 +148,7 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
             p.load, p.direction, p.speed, p.frequency,
             _matrices(p.coefficients, "k"), _matrices(p.coefficients, "c"),
             _matrices(p.low, "k"), _matrices(p.high, "k"), _matrices(p.low, "c"), _matrices(p.high, "c"),
-            np.array([printable(text) for text in p.quality], dtype=object), p.trusted,
+            np.array([printable(text) for text in p.quality], dtype=object), p.trusted, p.rotation,
         )  # fmt: skip
     content = {"bearing": array, "source": printable(source)}
     file = io.BytesIO()

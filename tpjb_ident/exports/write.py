@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports.formats import Chosen, ExportError, export_format, static_points
+from tpjb_ident.exports.formats import (
+    ROSS_VERSIONS,
+    Chosen,
+    ExportError,
+    export_format,
+    static_points,
+    turning_counter_clockwise,
+)
 from tpjb_ident.exports.table import write_intervals
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
@@ -50,6 +57,7 @@ def export(
     *,
     force: bool = False,
     name: str = "",
+    ross: int | None = None,
 ) -> Export:
     """Write coefficients as another program reads them, with intervals and flags in the files or beside them.
 
@@ -65,6 +73,8 @@ def export(
         Also write points that are not to be trusted, marked as such.
     name : str
         What the coefficients are of, for the files' heads; default: known from the source.
+    ross : int, optional
+        Version of ROSS, 2 or 3, that the files are for; default: the one that is installed, else 3.
 
     Returns
     -------
@@ -79,6 +89,7 @@ def export(
         Nothing is left that can be trusted.
     """
     form = export_format(to)
+    options = _ross_options(to, ross)
     frame, origin = _table(source)
     chosen = static_points(frame, force)
     if not chosen.points:
@@ -87,11 +98,22 @@ def export(
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
-    form.writer(target, chosen.points, f"tpjb-ident: coefficients of {name or origin}")
-    if not form.holds_intervals:
-        write_intervals(target, chosen.points)
+    points = tuple(turning_counter_clockwise(point) if form.of_rotors else point for point in chosen.points)
+    form.writer(target, points, f"tpjb-ident: coefficients of {name or origin}", **options)
+    if form.of_rotors:
+        write_intervals(target, points)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
     return Export(target, files, chosen)
+
+
+def _ross_options(to: str, version: int | None) -> dict[str, int]:
+    if version is None:
+        return {}
+    if to != "ross":
+        raise ExportError(f"--ross {version} belongs to --to ross, not to --to {to}. Leave it out.")
+    if version not in ROSS_VERSIONS:
+        raise ExportError(f"--ross: version {version} is not known. Use {' or '.join(map(str, ROSS_VERSIONS))}.")
+    return {"version": version}
 
 
 def result_table(path: Path) -> Path | None:

@@ -28,6 +28,9 @@ Force = Annotated[
 ]
 
 
+Ross = Annotated[int | None, typer.Option(metavar="2|3", help="Version of ROSS; default: the installed one, else 3.")]
+
+
 @command(
     "tpjb export tpjb-identify-out --to ross",
     "tpjb export tpjb-predict-out --to excel",
@@ -40,20 +43,20 @@ def export(
     method: Method = "mm-eiv",
     norm: Norm = None,
     force: Force = False,
+    ross: Ross = None,
 ) -> None:
     """Write coefficients as other programs read them.
 
-    With their intervals and flags: ROSS bearing elements (one TOML file per static point), tables (CSV,
-    Parquet, Excel), a MATLAB file, or text over shaft speed for XLTRC, Dyrobes and ANSYS (one file per load and
-    excitation frequency). Where the form holds no intervals and flags, bearing_coefficients_intervals.csv
-    beside it does. Points that are not to be trusted stay behind (exit code 3).
+    ROSS elements (TOML), tables (CSV, Parquet, Excel), a MATLAB file, or text over speed for XLTRC, Dyrobes and ANSYS.
+    Where a form holds no intervals and flags, bearing_coefficients_intervals.csv beside it does. Points that are not
+    to be trusted stay behind (exit code 3).
     """
     from tpjb_ident.exports.write import export as write_export
 
     form = export_format(to)
     frame, name = _coefficients(c, source, method, norm)
     with c.results(f"export {to}") as folder:
-        written = write_export(frame, to, folder, force=force, name=name)
+        written = write_export(frame, to, folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
     c.print(str(written))
     c.print(f"Results: {c.target}")
@@ -69,9 +72,7 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
         parts.append(f"left out, because their coefficients are not finite: {'; '.join(chosen.left_out[:5])}")
     if doubtful := chosen.doubtful:
         action = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
-        parts += [f"{counted(len(doubtful), 'point')}, {action}:", *doubtful[:5]]
-        if len(doubtful) > 5:
-            parts.append(f"... and {len(doubtful) - 5} more")
+        parts += [f"{counted(len(doubtful), 'point')}, {action}; the first of them:", *doubtful[:5]]
     if parts:
         raise NotTrustedError("\n".join(parts))
 
