@@ -96,8 +96,13 @@ ENDINGS = {
     "_predicted": "what the model gives",
     "_difference": "predicted - measured",
     "_ratio": "predicted / measured; empty where the measured interval holds zero",
+    "_a": "of the first of two campaigns",
+    "_b": "of the second",
+    "_difference_lo": "lower end of the 95 % interval of second - first, without what both share",
+    "_difference_hi": "its upper end",
 }
 _ALL = ("_lo", "_hi", "_se", "_se_systematic", "_random95", "_systematic95")
+_CHANGE = ("_a", "_b", "_difference", "_difference_lo", "_difference_hi")
 _AGAINST = ("_lo", "_hi", "_predicted", "_difference", "_ratio")
 
 
@@ -332,6 +337,26 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("y_m_predicted", "length", "m", "y of it"),
     ),
 }
+
+
+TABLES["difference"] = (
+    *_POINT,
+    Column("static_load_measured_N", "force", "N", "mean load that the cells show", ("_a", "_b")),
+    Column("quality", "text", "", 'named conditions, "ok" if there are none', ("_a", "_b")),
+    *_coefficients(_CHANGE, STIFFNESS, DAMPING),
+    *(Column(f"{s}{{e}}_changed", "text", "", "yes, no, or cannot tell") for s in "kc"),
+)
+TABLES["pivot_difference"] = (
+    PAD,
+    Column("force_N", "force", "N", "load on the pad"),
+    Column(TANGENT, "stiffness", "N/m", "tangent, what small vibrations feel", _CHANGE),
+    Column("stiffness_changed", "text", "", "yes, no, or cannot tell"),
+)
+TABLES["clearance_difference"] = (
+    PAD,
+    Column("clearance_m", "length", "m", "assembled clearance at zero push load", _CHANGE),
+    Column("clearance_changed", "text", "", "yes, no, or cannot tell"),
+)
 
 
 def markdown(table: str) -> str:

@@ -112,6 +112,7 @@ def _with_bands(result: Identification, bands: IdentifiedBands) -> Identificatio
         calibration_changes=changes[:, order].reshape(len(changes), -1),
         conditions=tuple(table.values()),
         bands=bands.results,
+        calibration_names=(),  # what moves a band's lines is drawn, and has no names
     )
 
 
@@ -155,27 +156,29 @@ def assemble(
     excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
     conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
     named = with_probe_doubts(sweeps, named_at_points(points, excluded, several), settings.clearance)
-    changes = systematic_changes(solved)
-    return Identification(campaign.id, settings.method, named, changes, unstated(campaign) + conditions)
+    changes, names = systematic_changes(solved)
+    remarks = unstated(campaign) + conditions
+    return Identification(campaign.id, settings.method, named, changes, remarks, calibration_names=names)
 
 
-def systematic_changes(solved: CampaignSolution) -> FloatArray:
-    """What every source that points share does to the entries of all P points, (q, 8 P) [N/m].
+def systematic_changes(solved: CampaignSolution) -> tuple[FloatArray, tuple[str, ...]]:
+    """What every source that points share does to the entries of all P points, (q, 8 P) [N/m], and the sources.
 
     One row a parameter, scaled so that the mean of the rows' products is the covariance.
     """
     solution = solved.solution
-    rows, first = [], 0
+    rows, names, first = [], [], 0
     for term in solution.terms:
         last = first + len(term.parameters)
         if term.name not in RUN_TERMS:
             rows.append(solution.factors[first:last])
+            names += [f"{term.name}: {parameter.name}" for parameter in term.parameters]
         first = last
     points = len(solution.h)
     if not rows or not sum(len(row) for row in rows):
-        return np.zeros((1, 8 * points))
+        return np.zeros((1, 8 * points)), ()
     factors = np.concatenate(rows)
-    return np.asarray(factors.reshape(len(factors), -1) * np.sqrt(len(factors)))
+    return np.asarray(factors.reshape(len(factors), -1) * np.sqrt(len(factors))), tuple(names)
 
 
 def unstated(campaign: Campaign) -> tuple[Condition, ...]:

@@ -24,21 +24,30 @@ from tpjb_ident.cli.common.options import (
     named,
     refuse_unknown,
 )
-from tpjb_ident.columns import amount, words
+from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.compare.difference import Difference, Side
 
+Other = Annotated[
+    Path | None, typer.Argument(metavar="[OTHER]", help="A second campaign, or a folder of results: what changed.")
+]
 Pivots = Annotated[
     str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
 ]
 
 
-@command(f"tpjb compare {DEMO}", f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd')
+@command(
+    f"tpjb compare {DEMO}",
+    f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd',
+    "tpjb compare before.h5 after.h5",
+)
 def compare(
     c: Command,
     campaign: MaybeCampaign = None,
+    other: Other = None,
     bearing: BearingOption = None,
     pivots: Pivots = "rigid, kirk, measured",
     thermal: Thermal = "adiabatic",
@@ -48,11 +57,17 @@ def compare(
     method: Method = "mm-eiv",
     norm: Norm = None,
 ) -> None:
-    """Compare prediction and measurement, with a report.
+    """Compare prediction and measurement, or two campaigns, with a report.
 
     With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
     pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
+
+    Two campaigns of one rig (before and after an overhaul), or their folders of results: writes difference,
+    pivot_difference, clearance_difference and report.html.
     """
+    if campaign is not None and other is not None:
+        _compare_two(c, (campaign, other), bearing, method, norm)
+        return
     variants = _variants(pivots)
     c.options["pivots"] = list(variants)
     model = model_settings(c, "kirk", thermal, effects)
@@ -89,6 +104,72 @@ def compare(
     show_comparison(c, result, following)
     c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
+
+
+def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
+    """Hold two campaigns against each other."""
+    from tpjb_ident.compare.difference import difference_of
+
+    with c.results() as folder:
+        a, b = (_side(c, path, bearing, method, norm) for path in paths)
+        difference = difference_of(a, b)
+        from tpjb_ident.report.difference_page import write_difference_report
+
+        for name in ("points", "pivots", "clearance"):
+            frame = getattr(difference, name)
+            if len(frame):
+                c.table("difference" if name == "points" else f"{name.rstrip('s')}_difference", frame)
+        following = f"tpjb diagnose {paths[1]}" if b.campaign is not None else f"tpjb view {c.target}"
+        write_difference_report(folder, difference, named(c.options), c.inputs, following)
+    _show_difference(c, difference)
+    c.print(f"Report: {c.target / 'report.html'}")
+    c.next(following)
+    _refuse_difference(difference)
+
+
+def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str | None) -> Side:
+    """One of two campaigns, identified, or a folder of results as it is."""
+    from tpjb_ident.compare.difference import measured_side, recorded_side
+
+    if (path / "coefficients.csv").is_file():
+        c.file(path / "coefficients.csv")
+        return recorded_side(path)
+    from tpjb_ident.compare.static_tests import measure_static
+    from tpjb_ident.identification.identify import identify
+
+    campaign = c.open(path)
+    settings = identify_settings(c, campaign, method, norm)
+    with c.progress(f"identifying {campaign.id}") as show:
+        identification = identify(campaign, settings, show)
+    drawing = c.bearing_of(campaign, bearing) if bearing is not None or campaign.bearing_text else None
+    return measured_side(campaign, identification, None if drawing is None else measure_static(campaign, drawing))
+
+
+def _show_difference(c: Command, difference: Difference) -> None:
+    """Print what changed: sentences, and how many coefficients of every point."""
+    from tpjb_ident.compare.difference import difference_sentences
+
+    first, *more = difference_sentences(difference)
+    c.print(first)
+    rows = []
+    for row in difference.points.to_dict("records"):
+        judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}
+        changed = [name for name, verdict in judged.items() if verdict == "yes"]
+        cells = [str(list(judged.values()).count(verdict)) for verdict in ("yes", "no", "cannot tell")]
+        rows.append([row["static_load_N"], row["excitation_Hz"], *cells, ", ".join(changed)])
+    columns = [Column("load {load}"), Column("exc. {frequency}"), "changed", "same", "cannot tell", *words("which")]
+    c.show(f"{difference.a.name} and {difference.b.name}", columns, rows, file="difference.csv")
+    for line in more:
+        c.print(line)
+
+
+def _refuse_difference(difference: Difference) -> None:
+    """End with exit code 3 where nothing can be compared, or a point is not to be trusted."""
+    if difference.points.empty:
+        raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
+    bad = difference.untrusted_points()
+    if bad:
+        raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
 def _variants(text: str) -> tuple[str, ...]:

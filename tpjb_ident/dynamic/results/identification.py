@@ -58,6 +58,8 @@ class Identification(Presented):
         About the campaign as a whole.
     bands : tuple of BandResult
         Of runs that were excited over a band.
+    calibration_names : tuple of str
+        Source of each row of `calibration_changes`, term and parameter; empty where rows have no name.
 
     Examples
     --------
@@ -72,6 +74,7 @@ class Identification(Presented):
     calibration_changes: FloatArray = field(repr=False)
     conditions: tuple[Condition, ...] = ()
     bands: tuple[BandResult, ...] = ()
+    calibration_names: tuple[str, ...] = field(default=(), repr=False)
 
     @property
     def systematic(self) -> FloatArray:

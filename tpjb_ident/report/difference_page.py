@@ -1,0 +1,118 @@
+"""The page of two campaigns held against each other: what changed, by how much, and how sure that is."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
+from tpjb_ident.report.drawing.colours import INK, LIGHT
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures, shrink
+from tpjb_ident.report.figure import panel
+from tpjb_ident.report.page import Page, Section, Table, write_page
+from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, TANGENT, Coefficient
+
+_MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
+#: Height of the ticks' second line [inches].
+_SECOND_LINE = 0.16
+
+
+def write_difference_report(
+    folder: Path, difference: Difference, settings: Mapping[str, Any], inputs: Mapping[str, str], then: str
+) -> Path:
+    """Write report.html and its figure into an existing folder."""
+    answer, *more = difference_sentences(difference)
+    a, b = difference.a, difference.b
+    page = Page(
+        title=f"{a.name} and {b.name}: what changed",
+        subtitle="Second less first, with 95 % intervals",
+        answer=answer,
+        more=more,
+        then=then,
+        sections=_sections(difference),
+        settings={name: str(value) for name, value in settings.items()},
+        inputs=dict(inputs),
+    )
+    return write_page(folder, page)
+
+
+def _sections(difference: Difference) -> list[Section]:
+    sections = []
+    points = difference.points
+    if len(points):
+        drawing = functools.partial(_drawn, points)
+        title = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
+        tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
+        sections.append(Section("Coefficients", panels=[panel("difference", title, drawing, "")], tables=tables))
+    if not difference.pivots.empty:
+        rows = [_row(row, TANGENT, 1e6, f"{row['force_N'] / 1e3:.2f}") for row in difference.pivots.to_dict("records")]
+        columns = ["pad", "load, kN", "first, MN/m", "second, MN/m", "difference", "changed"]
+        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows, frozenset({0, 5}))
+        sections.append(Section("Pivots", tables=[table]))
+    if not difference.clearance.empty:
+        rows = [_row(row, "clearance_m", 1e-6) for row in difference.clearance.to_dict("records")]
+        columns = ["pad", "first, µm", "second, µm", "difference", "changed"]
+        table = Table("Assembled clearance at zero push load", columns, rows, frozenset({0, 4}))
+        sections.append(Section("Clearance", tables=[table]))
+    return sections
+
+
+def _row(row: Mapping[Any, Any], name: str, scale: float, *place: str) -> list[str]:
+    values = [f"{row[f'{name}_{side}'] / scale:.4g}" for side in "ab"]
+    difference = shown_difference(row, name, scale)
+    return [f"#{row['pad']:g}", *place, *values, difference, row[f"{name.partition('_')[0]}_changed"]]
+
+
+def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
+    """Differences of K or of C at every point, and which of them changed."""
+    rows = []
+    for row in points.to_dict("records"):
+        cells, changed = [], []
+        for entry in ENTRIES:
+            cells.append(shown_difference(row, kind.column(entry), kind.display_scale))
+            if row[f"{kind.symbol}{entry}_changed"] == "yes":
+                cells[-1] += " *"
+                changed.append(f"{kind.symbol}{entry}")
+        flags = dict.fromkeys(
+            f for side in "ab" for f in str(row.get(f"quality_{side}", "ok")).split("; ") if f != "ok"
+        )
+        rows.append([_place(row), *cells, ", ".join(flags) or "ok"])
+    named = [f"{kind.symbol}{entry}, {kind.display_unit}" for entry in ENTRIES]
+    caption = f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow"
+    return Table(caption, ["point", *named, "flags of both"], rows, frozenset({0, 5}))
+
+
+def _place(row: Mapping[Any, Any]) -> str:
+    return f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
+
+
+def _drawn(points: pd.DataFrame) -> Figure:
+    """Draw differences of K and C with their intervals, point by point."""
+    figure, ((left, right),) = new_pictures(1, 2, height=3.6)
+    place = np.arange(len(points), dtype=float)
+    for axes, kind in ((left, STIFFNESS), (right, DAMPING)):
+        label(
+            axes, "operating point: load in kN, excitation in Hz", f"difference of {kind.quantity}, {kind.display_unit}"
+        )
+        axes.axhline(0.0, color=INK, linewidth=1.0)
+        for k, (entry, colour, marker) in enumerate(_MARKS):
+            name = f"{kind.column(entry)}_difference"
+            value, low, high = (points[name + end].to_numpy(float) / kind.display_scale for end in ("", "_lo", "_hi"))
+            x = place + 0.16 * (k - 1.5)
+            axes.errorbar(x, value, yerr=[value - low, high - value], fmt="none", ecolor=LIGHT[colour], capsize=2.5)
+            axes.plot(x, value, marker, color=LIGHT[colour], markerfacecolor=LIGHT["paper"], markersize=5, label=entry)
+            changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
+            axes.plot(x[changed], value[changed], marker, color=LIGHT[colour], markersize=5)
+        texts = [f"{row['static_load_N'] / 1e3:g}\n{row['excitation_Hz']:g}" for row in points.to_dict("records")]
+        axes.set_xticks(place, texts)
+        shrink(axes, bottom=_SECOND_LINE)
+    add_legend(left, across=True)
+    box = right.get_position()
+    right.set_position((box.x0, box.y0, box.width, left.get_position().height))
+    return figure
