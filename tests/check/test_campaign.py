@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigdata import load_campaign
 from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.operating_point import OperatingPoint
@@ -21,15 +22,20 @@ from rigdata.virtual_rig import Fault, Noise, Timing
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.findings import Finding, Reporter, merge
+from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, steady_level, strongest_line
 from tpjb_ident.check.response import definiteness, mirrored
+from tpjb_ident.check.signals import is_spare
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.bad_samples import robust_fit
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import line_design
 
 SAMPLES = Path(__file__).parents[2].parent / "shared" / "samples"
+#: Probes of the virtual rig.
+PAIR = ("X1A", "X1B")
 PROBES = (
     Channel("A", "displacement", axis=math.radians(45)),
     Channel("B", "displacement", axis=math.radians(135)),
@@ -228,3 +234,43 @@ def test_sample_campaigns_raise_no_alarm(name):
     if not (SAMPLES / name).exists():
         pytest.skip("no ../shared/samples beside this checkout")
     assert [p for p in check_campaign(SAMPLES / name) if p.severity != "note"] == []
+
+
+def test_a_channel_is_spare_where_the_others_tell_the_plane():
+    probes = [Channel(n, "displacement", axis=math.radians(a)) for n, a in (("A", 45), ("B", 135), ("C", 270))]
+    cell = Channel("L", "force", axis=0.0)
+    assert is_spare(probes[2], [*probes[:2], cell])
+    assert not is_spare(probes[1], [probes[0], cell])
+    assert not is_spare(probes[2], [probes[0], replace(probes[1], axis=probes[0].axis)])
+    assert not is_spare(cell, probes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("turned", "says"), [(0.0, None), (-10.0, "warning"), (30.0, "error"), (-45.0, "error")])
+def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_point(tmp_path, turned, says):
+    plan = replace(PLAN, dry=(), locus=())
+    campaign = load_campaign(written(tmp_path / "c.h5", stiff_rig(3, plan=plan)))
+    stated = {n: replace(c, axis=c.axis + math.radians(turned)) for n, c in campaign.channels.items() if n in PAIR}
+    runs = tuple(replace(run, channels=dict(run.channels) | stated) for run in campaign.runs)
+    campaign = replace(campaign, channels=dict(campaign.channels) | stated, runs=runs)
+    found = [p for p in check_campaign(campaign) if "from where the load pushes it" in p.what]
+    assert [(p.severity, p.run) for p in found] == ([] if says is None else [(says, "c-1")])
+    (point,) = identify(campaign, IdentifySettings(methods=())).points
+    reached = {"error": "records-contradicted", "warning": "records-doubtful"}.get(says or "")
+    assert [c for c in point.quality if "from where the load pushes it" in c.detail] == ([reached] if reached else [])
+
+
+def test_what_one_of_many_static_runs_shows_stays_its_own():
+    def reports(kinds, concerned):
+        made = []
+        for i, kind in enumerate(kinds):
+            run = replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), id=f"r{i}", kind=kind)
+            made.append(Reporter(run))
+            if i in concerned:
+                made[-1].say("signs A B", "error", "channels A and B", "go elsewhere", "Look", ["A", "B"])
+        reach(made)
+        return [len(report.found) for report in made]
+
+    assert reports(["clearance", "dynamic", "dynamic"], [0]) == [1, 1, 1]
+    assert reports(["dry_pivot"] * 5 + ["dynamic"], [1]) == [0, 1, 0, 0, 0, 0]
+    assert reports(["dry_pivot"] * 5 + ["dynamic"], [1, 2, 3]) == [0, 1, 1, 1, 0, 1]

@@ -15,6 +15,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
+from tpjb_ident.check.findings import RUN_GAIN
 from tpjb_ident.check.gain_evidence import PointReadings, leverage, stiffness_of
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import gain_of_run
@@ -166,7 +167,8 @@ def _tell(response: RunResponse, stiffness: ComplexArray, gain: str) -> None:
     share = f"{misfit:.0%}" if misfit > 0.1 else f"{misfit:.1%}"
     text = f"differs by {share} from the other runs at this operating point{hint}"
     cure = "Check this run's channels and set points; leave it out or repeat it"
-    response.seen.report.say("disagrees", severity, "displacement and force", text, cure)
+    key = f"{RUN_GAIN}of the run" if gain and hint == gain else "disagrees"
+    response.seen.report.say(key, severity, "displacement and force", text, cure)
 
 
 def _name_misfit(response: RunResponse, stiffness: ComplexArray, misfit: float) -> str:

@@ -9,6 +9,8 @@ from rigdata.problem import Problem, Severity
 from rigdata.run import Run
 
 _LISTED = 4
+#: How the key of a finding begins that one channel reads too much or too little in one run.
+RUN_GAIN = "gain "
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,7 @@ class Finding:
 
     problem: Problem
     key: str
+    channels: tuple[str, ...] = ()  #: whose nature it is, in whatever run they serve; none: it is the run's own
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,10 @@ class Reporter:
         """A reporter that has found the same so far."""
         return Reporter(self.run, list(self.found), set(self.doubts), dict(self.gains))
 
-    def say(self, key: str, severity: Severity, place: str, what: str, cure: str) -> None:
-        """Note a finding; `key` is the same for equal findings in other runs."""
-        self.found.append(Finding(Problem(severity, self.run.file, place, what, cure, self.run.id), key))
+    def say(self, key: str, severity: Severity, place: str, what: str, cure: str, channels: Sequence[str] = ()) -> None:
+        """Note a finding; `key` is the same for equal findings in other runs, `channels` whose nature it is."""
+        problem = Problem(severity, self.run.file, place, what, cure, self.run.id)
+        self.found.append(Finding(problem, key, tuple(channels)))
 
     def take(self, problems: Sequence[Problem]) -> None:
         """Note problems that a reader raised."""
@@ -75,6 +79,31 @@ class Verdicts:
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     gains: dict[str, float] = field(default_factory=dict)
+    run_gains: dict[str, list[Problem]] = field(default_factory=dict)
+
+
+def reach(reports: Sequence[Reporter]) -> None:
+    """Carry findings of static runs about channels to the dynamic runs that use these channels.
+
+    What only one of many runs of its kind shows is that run's own: a cable was changed.
+    """
+    kinds: dict[str, list[Reporter]] = {}
+    for report in reports:
+        kinds.setdefault(report.run.kind, []).append(report)
+    for kind, alike in kinds.items():
+        groups: dict[tuple[str, Severity, tuple[str, ...]], list[Problem]] = {}
+        for report in alike if kind != "dynamic" else ():
+            for finding in report.found:
+                if finding.channels:
+                    groups.setdefault((finding.key, finding.problem.severity, finding.channels), []).append(
+                        finding.problem
+                    )
+        for (key, _, channels), problems in groups.items():
+            if len(problems) < len(alike) and not _is_shared(len(problems), len(alike)):
+                continue
+            for report in kinds.get("dynamic", ()):
+                if set(channels) & set(report.run.channels):
+                    report.found.append(Finding(problems[0], key))
 
 
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:
@@ -86,9 +115,11 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
         for finding in report.found:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
     alike = len({report.run.id for report in reports})
-    for (_, severity), concerned in groups.items():
+    for (key, severity), concerned in groups.items():
         for run, problem in concerned.items():
-            if severity == "warning":
+            if key.startswith(RUN_GAIN) and severity == "warning":
+                result.run_gains.setdefault(run, []).append(problem)
+            elif severity == "warning":
                 result.doubtful.setdefault(run, []).append(problem)
             elif severity == "error" and _is_shared(len(concerned), alike):
                 result.shared.setdefault(run, []).append(problem)

@@ -128,7 +128,7 @@ def dynamic_difference(
     `stiffness` (2, 2) [N/m].
     """
     spare = 2 * (2 * len(agreeing) - 4)
-    if spare < 4:
+    if spare < 4 or not np.any(readings.displacement[run]):
         return None
     displacement, force = readings.displacement, readings.force
     sizes = np.linalg.norm(displacement[list(agreeing)], axis=1)[:, None]

@@ -17,6 +17,7 @@ from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import plane_vector
+from tpjb_ident.check.signals import is_spare
 
 #: A running shaft's vibration, run-out and noise together, from low to high, that no probe shows [m]: error, warning.
 _STILL_PROBE = (2e-8, 1e-7)
@@ -53,6 +54,7 @@ class Sizes:
     static: float  #: N, mean of the cells
     travel: dict[str, float]  #: by probe, m: from low to high over the run, whatever moves it
     noise_free: bool = False
+    spare: tuple[str, ...] = ()  #: still probes that the run does not need
 
     @property
     def film_length(self) -> float:
@@ -86,10 +88,12 @@ def sizes(observation: Observation, mass: float) -> Sizes:
     travel = {}
     for place in observation.pick("displacement"):
         travel[observation.channels[place].name] = float(observation.spread[2, place] - observation.spread[0, place])
+    alive = [c for c in observation.channels if travel.get(c.name, 0.0) >= _STILL_PROBE[1]]
+    spare = tuple(c.name for c in observation.channels if c.name in travel and is_spare(c, alive))
     noise_free = any(finding.key == "no noise" for finding in observation.report.found)
     measured = (vectors.get(name, math.nan) for name in ("displacement", "force", "acceleration"))
     motion, cells, accelerated = measured
-    return Sizes(observation.run, motion, cells, film, accelerated, static, travel, noise_free)
+    return Sizes(observation.run, motion, cells, film, accelerated, static, travel, noise_free, spare)
 
 
 def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
@@ -113,7 +117,8 @@ def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
 def _probes(measured: Sizes) -> Iterator[Finding]:
     for name, travel in measured.travel.items():
         if travel < _STILL_PROBE[1] and not measured.noise_free and measured.run.point.shaft_speed > 0:
-            severity: Severity = "error" if travel < _STILL_PROBE[0] else "warning"
+            grave = travel < _STILL_PROBE[0] and name not in measured.spare
+            severity: Severity = "error" if grave else "warning"
             text = f"shows {1e9 * travel:.2g} nm of vibration, run-out and noise together: no probe resolves that"
             yield f"still {name}", severity, f"channel {name}", text, _CALIBRATION
 

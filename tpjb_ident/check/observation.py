@@ -87,10 +87,9 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:
         report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
+    alive = [c for name, c in readable.items() if not _is_dead(statistics[name])]
     for name, channel in readable.items():
-        others = [n for n, c in readable.items() if c.quantity == channel.quantity and n != name]
-        alone = all(_is_dead(statistics[n]) for n in others)
-        check_signal(report, channel, statistics[name], noise_free, alone)
+        check_signal(report, channel, statistics[name], noise_free, alive)
     if time is None or not live:
         return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
     thin = slice(None, None, max(1, len(time) // _DECIMATED))

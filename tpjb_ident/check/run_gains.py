@@ -10,6 +10,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from tpjb_ident.check.agreement import RunResponse
+from tpjb_ident.check.findings import RUN_GAIN
 from tpjb_ident.check.gain_evidence import PointReadings
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.one_gain import WrongGain, wrong_gains
@@ -99,7 +100,9 @@ def swept_centre(load: FloatArray, reading: FloatArray) -> float | None:
 
 def _tell(response: RunResponse, found: WrongGain, names: Sequence[str]) -> None:
     cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
-    response.seen.report.say(f"gain {names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure)
+    response.seen.report.say(
+        f"{RUN_GAIN}{names[0]}", "warning", f"channel {names[0]}", gain_in_words(found, names), cure
+    )
 
 
 def gain_in_words(gain: WrongGain, names: Sequence[str]) -> str:

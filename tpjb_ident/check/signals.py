@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rigdata.arrays import FloatArray
@@ -9,6 +11,7 @@ from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Severity
 from rigdata.run import Run
+from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
 
 #: Quantities without which a run of that kind says nothing.
@@ -23,6 +26,8 @@ _CELSIUS = 273.15
 #: Film and housing temperatures of a rig that is not on fire [K].
 _TEMPERATURES = (_CELSIUS - 50.0, _CELSIUS + 300.0)
 _MIN_CYCLES = 5.0
+#: Smaller singular value of the axes of channels that tell a plane, at least.
+_PLANE = 0.1
 
 
 def needed(run: Run, channel: Channel) -> bool:
@@ -30,11 +35,19 @@ def needed(run: Run, channel: Channel) -> bool:
     return channel.quantity in _NEEDED[run.kind]
 
 
+def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
+    """Whether the others of a channel's quantity that are alive tell the plane without it."""
+    axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
+    return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
+
+
 def check_signal(
-    report: Reporter, channel: Channel, statistics: ChannelStatistics, noise_free: bool, alone: bool
+    report: Reporter, channel: Channel, statistics: ChannelStatistics, noise_free: bool, alive: Sequence[Channel]
 ) -> None:
-    """Judge one channel of one run."""
-    grave: Severity = "error" if needed(report.run, channel) else "warning"
+    """Judge one channel of one run; `alive` are those of the run that show something."""
+    spare = is_spare(channel, alive)
+    grave: Severity = "error" if needed(report.run, channel) and not spare else "warning"
+    alone = not any(c.quantity == channel.quantity and c.name != channel.name for c in alive)
     place = f"channel {channel.name}"
     if statistics.values == 0:
         text = "holds no values at all"

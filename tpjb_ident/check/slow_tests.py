@@ -18,6 +18,10 @@ from tpjb_ident.check.wiring import guess_wiring, name_fault
 _ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 #: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
 _FOLLOWS = math.cos(math.radians(40.0))
+#: Angle [deg] by which the shaft lies aside of the load, beyond what friction does: warning, error.
+_TURNED = (12.0, 20.0)
+#: Standard errors of the mean angle over the dry runs beyond which it is one, and runs that tell it.
+_CLEAR, _MIN_RUNS = 4.0, 3
 #: A shaft that moves less than this [m] in a dry test may as well be a probe that drifts.
 _FIRM_MOVE = 1.5e-6
 #: A clearance polygon and a locus are far from round; 1 is round.
@@ -34,7 +38,7 @@ _Shown = tuple[Observation, float]
 def _planes(observation: Observation) -> tuple[FloatArray, FloatArray] | None:
     """Force and displacement (n, 2) of the thinned samples, rows without a value left out."""
     force, shaft = observation.pick("force"), observation.pick("displacement")
-    if len(force) < 2 or len(shaft) != 2:
+    if len(force) < 2 or len(shaft) < 2:
         return None
     rows = np.isfinite(observation.samples[:, force + shaft]).all(axis=1)
     if np.count_nonzero(rows) < 20:
@@ -71,11 +75,23 @@ def check_dry(runs: Sequence[Observation]) -> None:
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
     """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
+    followed: list[Observation] = []
+    angles: list[float] = []
     for observation in runs:
         planes = _planes(observation)
         push = None if planes is None or "force" in observation.report.doubts else _main_move(planes[0])
-        if planes is not None and push is not None:
-            _check_follows(observation, planes, push)
+        if planes is None or push is None:
+            continue
+        aside = _check_follows(observation, planes, push)
+        if aside is not None:
+            followed.append(observation)
+            angles.append(aside)
+    if len(angles) < _MIN_RUNS:
+        return
+    turn = float(np.mean(angles))
+    if abs(turn) > _CLEAR * float(np.std(angles, ddof=1)) / math.sqrt(len(angles)):
+        for observation in followed:
+            _judge_turns(observation, np.full(len(observation.pick("displacement")), turn))
 
 
 def _main_move(force: FloatArray) -> FloatArray | None:
@@ -107,15 +123,17 @@ def _check_push(observation: Observation, shows: float, push: FloatArray) -> Non
     observation.report.say(f"push direction{guess}", severity, "force", text, cure)
 
 
-def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> None:
-    """The shaft must go toward the pad, mainly along the load."""
+def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> float | None:
+    """The shaft must go toward the pad, mainly along the load; by how much it goes aside [deg], None where untold."""
     unit = push / np.hypot(*push)
     load = planes[0] @ unit
     centred = load - load.mean()
     slope = centred @ (planes[1] - planes[1].mean(axis=0)) / float(centred @ centred)
     size = float(np.hypot(*slope))
-    if size * float(np.ptp(load)) < _FIRM_MOVE or float(slope @ unit) > _FOLLOWS * size:
-        return
+    if size * float(np.ptp(load)) < _FIRM_MOVE:
+        return None
+    if float(slope @ unit) > _FOLLOWS * size:
+        return math.degrees(math.atan2(unit[0] * slope[1] - unit[1] * slope[0], float(slope @ unit)))
     probes = observation.pick("displacement")
     channels = [observation.channels[i] for i in probes]
     guess = guess_wiring(channels, _directions(observation, probes) @ slope, unit, within=20.0)
@@ -123,7 +141,14 @@ def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArra
     text = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"
     names = " and ".join(c.name for c in channels)
-    observation.report.say(f"signs {names}{guess}", "error", f"channels {names}", text, cure)
+    _say_of_probes(observation, f"signs {names}{guess}", "error", text, cure)
+    return None
+
+
+def _say_of_probes(observation: Observation, key: str, severity: Severity, text: str, cure: str) -> None:
+    """Say what is wrong with the probes, in whatever run they serve."""
+    names = [observation.channels[i].name for i in observation.pick("displacement")]
+    observation.report.say(key, severity, f"channels {' and '.join(names)}", text, cure, names)
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
@@ -139,7 +164,38 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
             observation.report.say("sweep", "warning", "force", text, "A clearance run needs a rotating load")
             continue
         gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
-        _judge_gain(observation, gain)
+        if _judge_gain(observation, gain):
+            _judge_turns(observation, _turns(observation))
+
+
+def _turns(observation: Observation) -> FloatArray:
+    """Angle of every probe's axis, as the load that goes around shows it, less the stated one (m,) [deg]."""
+    force, probes = observation.pick("force"), observation.pick("displacement")
+    samples = observation.samples[np.isfinite(observation.samples[:, force + probes]).all(axis=1)]
+    load = samples[:, force] @ np.linalg.pinv(_directions(observation, force)).T
+    load -= load.mean(axis=0)
+    design = np.column_stack([load / np.linalg.norm(load, axis=1, keepdims=True), np.ones(len(load))])
+    answer = np.linalg.lstsq(design, samples[:, probes], rcond=None)[0]
+    along = _directions(observation, probes)
+    turned = along[:, 0] * answer[1] - along[:, 1] * answer[0]
+    return np.asarray(np.degrees(np.arctan2(turned, np.sum(along * answer[:2].T, axis=1))))
+
+
+def _judge_turns(observation: Observation, turns: FloatArray) -> None:
+    """Axes of probes (m,) [deg] that lie elsewhere than stated, all alike or some."""
+    names = [observation.channels[i].name for i in observation.pick("displacement")]
+    common = float(np.median(turns))
+    cure = "Check the axes of the probes (and of the cells)"
+    if abs(common) > _TURNED[0]:
+        severity: Severity = "error" if abs(common) > _TURNED[1] else "warning"
+        text = f"the shaft lies {common:+.0f} deg from where the load pushes it, as if all probes stood there"
+        _say_of_probes(observation, f"turned {' '.join(names)}", severity, text, cure)
+        return
+    for name, turn in zip(names, turns):
+        if abs(turn - common) > _TURNED[0]:
+            severity = "error" if abs(turn - common) > _TURNED[1] else "warning"
+            text = f"answers the load as if it stood {turn - common:+.0f} deg from its axis"
+            observation.report.say(f"turned {name}", severity, f"channel {name}", text, cure, [name])
 
 
 def check_locus(runs: Sequence[Observation]) -> None:
@@ -182,16 +238,17 @@ def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArr
             observation.report.say("place", "warning", "displacement", text, cure)
 
 
-def _judge_gain(observation: Observation, gain: FloatArray) -> None:
-    """`gain` (2, 2) [m/N] from force to displacement must be positive definite."""
+def _judge_gain(observation: Observation, gain: FloatArray) -> bool:
+    """Whether `gain` (2, 2) [m/N] from force to displacement is positive definite, as it must be."""
     if definiteness(gain) > _LEAST_DEFINITE or not np.any(gain) or "force" in observation.report.doubts:
-        return
+        return bool(np.any(gain)) and "force" not in observation.report.doubts
     channels = [observation.channels[i] for i in observation.pick("displacement")]
     hint = name_fault(channels, lambda repair: definiteness(mirrored(channels, repair) @ gain))
     names = " and ".join(c.name for c in channels)
     text = f"the shaft does not go to the side to which the load pushes it{hint}"
     cure = "Check axis, polarity and cables of the probes (and of the cells)"
-    observation.report.say(f"signs {names}{hint}", "error" if hint else "warning", f"channels {names}", text, cure)
+    _say_of_probes(observation, f"signs {names}{hint}", "error" if hint else "warning", text, cure)
+    return False
 
 
 def _check_labels(directions: Sequence[_Shown]) -> None:

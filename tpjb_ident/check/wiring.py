@@ -45,6 +45,8 @@ def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: Floa
 
 def name_fault(channels: Sequence[Channel], quality: Callable[[FloatArray], float]) -> str:
     """Name the fault of two channels whose mending is clearly the best; "" where none is."""
+    if len(channels) != 2:
+        return ""
     tried = sorted(((quality(matrix), words) for words, matrix in repairs(channels)), reverse=True)
     best, second = tried[0], tried[1]
     return f"; as if {best[1]}" if best[0] > 0.15 and best[0] > 2 * second[0] else ""

@@ -22,6 +22,8 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: Posterior over prior deviation above which a parameter is considered.
 CONSIDERED = 0.8
+#: Smallest eigenvalue of a point's equations, scaled to a diagonal of ones, that tells its numbers apart.
+_TOLD = 1e-13
 #: Numbers of a point: real and imaginary parts of h_xx, h_xy, h_yx, h_yy.
 NUMBERS = 8
 
@@ -56,6 +58,17 @@ class Sums:
         flat = J_t.reshape(J_t.shape[0] * J_t.shape[1], J_t.shape[2])
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
+
+    def drop(self, points: BoolArray) -> None:
+        """Leave points (P,) out that have no answer."""
+        self.A[points], self.E[points], self.g_h[points] = np.eye(NUMBERS), 0.0, 0.0
+
+
+def are_told(A: FloatArray) -> BoolArray:
+    """Whether the equations of points (P, 8, 8) determine their numbers, (P,)."""
+    size = np.sqrt(np.maximum(np.einsum("paa->pa", A), 1e-300))
+    scaled = A / (size[:, :, None] * size[:, None, :])
+    return np.asarray(np.linalg.eigvalsh(scaled)[:, 0] > _TOLD)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, step
+from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
 from tpjb_ident.estimate.equation import (
     HOUSING_ROWS,
@@ -145,7 +145,9 @@ class Solver:
                 rows.J_t * weight[:, None, None],
             )
             fits.append(self._fit(blocks, rows, weight**2, last))
-        sums.A[~self.solvable] = np.eye(NUMBERS)
+        if last is None:  # a point whose readings leave a number untold has no answer
+            self.solvable &= are_told(sums.A)
+        sums.drop(~self.solvable)
         joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 

@@ -12,7 +12,7 @@ from rigdata.vector import zero_uncertainty
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_point import BandSettings, is_broadband
 from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
-from tpjb_ident.dynamic.results.gains import channel_pairs, swept_probes, with_probe_doubts
+from tpjb_ident.dynamic.results.gains import swept_probes, with_probe_doubts
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
@@ -147,7 +147,7 @@ def assemble(
     report("estimating", 0, len(sources))
     solved = solve_campaign(campaign, sources, digests, workers, settings.correct)
     temperatures = {digest.run: digest.temperatures for digest in digests}
-    task = PointTask(settings, solved.task, temperatures, channel_pairs(campaign, sweeps), checked)
+    task = PointTask(settings, solved.task, temperatures, checked)
     jobs = [(source, point_share(solved, source, p)) for p, source in enumerate(sources)]
     points = []
     for point in map_ordered(workers, finished_point, jobs, task):

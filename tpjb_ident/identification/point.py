@@ -15,7 +15,6 @@ from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
-from tpjb_ident.dynamic.results.gains import Pairs, gain_doubts
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions
 from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
@@ -66,7 +65,6 @@ class PointTask:
     settings: IdentifySettings
     means: MeansTask
     temperatures: dict[str, dict[int, float]]
-    pairs: Pairs | None
     checked: Verdicts
 
 
@@ -208,10 +206,9 @@ def finished_point(task: PointTask, source: PointSource, share: PointShare) -> P
     best = by_method[settings.method]
     figures = point_figures(_without_shaft_remarks(corrected, share), settings, by_method, share.mains_in_cells)
     bent = change_conditions(share.film, share.amplitude_left, best, figures.amplitude, settings.clearance)
-    gains = gain_doubts(recorded, task.pairs)
     checks = check_conditions(task.checked, [run.run for run in recorded.runs])
     missing = source.baseline.missing(recorded)
-    conditions = merged(gains, share.conditions, missing, bent, checks)
+    conditions = merged(share.conditions, missing, bent, checks)
     budget = share.budget | source.baseline.spread(recorded)
     figures = replace(figures, conditions=merged(figures.conditions, conditions))
     return _result(task, recorded, by_method, figures, replace(share, budget=budget))

@@ -1,4 +1,4 @@
-"""Gains that are not the manifest's: probes that read no lengths here, one channel of a run off the other runs."""
+"""Probes that read no lengths in this bearing, by its clearance."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.run import Run
-from rigdata.vector import inverse_directions
-from tpjb_ident.check.gain_evidence import PointReadings
-from tpjb_ident.check.one_gain import wrong_gains
-from tpjb_ident.check.run_gains import gain_in_words, swept_centre
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.phasors.line_means import complex_median
 
 #: Readings below which a sweep says nothing of a probe.
 _FEWEST = 100
@@ -28,18 +22,6 @@ _TRAVEL = (0.5, 2.5)
 _APART = 3.0
 #: Clearance times stiffness over load, at least: pivots that give let the shaft move by more than the clearance.
 _LEAST_STIFF = 0.5
-#: Name of the condition.
-_RUN_GAIN_OFF = "run-gain-off"
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """The two probes and the two cells of a rig."""
-
-    names: tuple[str, ...]
-    probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from two readings to X and Y
-    cell_plane: FloatArray
-    centre: tuple[float | None, float | None]
 
 
 @dataclass(frozen=True)
@@ -49,7 +31,6 @@ class SweptProbe:
     run: str
     name: str
     half_travel: float
-    centre: float | None
 
 
 def swept_probes(campaign: Campaign) -> tuple[SweptProbe, ...]:
@@ -58,19 +39,14 @@ def swept_probes(campaign: Campaign) -> tuple[SweptProbe, ...]:
 
 
 def _of_sweep(run: Run) -> list[SweptProbe]:
-    probes = [n for n, c in run.channels.items() if c.quantity == "displacement"]
-    cells = [n for n, c in run.channels.items() if c.quantity == "force"]
-    readings = {name: values for name in (*probes, *cells) if (values := _values(run, name)) is not None}
-    load = _load(run, [readings[n] for n in cells if n in readings])
     swept = []
-    for name in probes:
-        if name not in readings:
+    for name in (n for n, c in run.channels.items() if c.quantity == "displacement"):
+        values = _values(run, name)
+        if values is None:
             continue
-        values = readings[name]
         finite_values = values[np.isfinite(values)]
         low, high = np.quantile(finite_values, [0.01, 0.99]) if len(finite_values) >= _FEWEST else (np.nan, np.nan)
-        centre = swept_centre(load, values) if load is not None and len(load) == len(values) else None
-        swept.append(SweptProbe(run.id, name, 0.5 * float(high - low), centre))
+        swept.append(SweptProbe(run.id, name, 0.5 * float(high - low)))
     return swept
 
 
@@ -79,15 +55,6 @@ def _values(run: Run, name: str) -> FloatArray | None:
         return run.record(name).values
     except RigDataError:  # a damaged sweep is no matter of the dynamic runs
         return None
-
-
-def _load(run: Run, readings: list[FloatArray]) -> FloatArray | None:
-    """X and Y of the load (n, 2); None unless two cells in different directions give it."""
-    cells = [c for c in run.channels.values() if c.quantity == "force"]
-    if len(cells) != 2 or len(readings) != 2 or len(readings[0]) != len(readings[1]):
-        return None
-    plane = inverse_directions(tuple(float(c.axis or 0.0) for c in cells))
-    return np.stack(readings, axis=1) @ plane.T if np.isfinite(plane).all() else None
 
 
 def with_probe_doubts(
@@ -166,75 +133,3 @@ def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float,
         at_rest = np.polynomial.polynomial.polyfit(square, k, 1)[0] if several else k[0]
         result.append((load, direction, at_rest.reshape(2, 2)))
     return result
-
-
-def channel_pairs(campaign: Campaign, sweeps: Sequence[SweptProbe] = ()) -> Pairs | None:
-    """Probes and cells of a campaign; None where it has not two of each in different directions."""
-    of = {q: [c for c in campaign.channels.values() if c.quantity == q] for q in ("displacement", "force")}
-    if any(len(channels) != 2 for channels in of.values()):
-        return None
-    probe_plane, cell_plane = (
-        inverse_directions(tuple(float(c.axis or 0.0) for c in channels)) for channels in of.values()
-    )
-    if not np.isfinite(probe_plane).all() or not np.isfinite(cell_plane).all():
-        return None
-    names = tuple(c.name for channels in of.values() for c in channels)
-    first, second = (_centre(sweeps, name) for name in names[:2])
-    return Pairs(names, probe_plane, cell_plane, (first, second))
-
-
-def _centre(sweeps: Sequence[SweptProbe], probe: str) -> float | None:
-    centres = [sweep.centre for sweep in sweeps if sweep.name == probe and sweep.centre is not None]
-    return float(np.median(centres)) if centres else None
-
-
-def gain_doubts(data: PointData, pairs: Pairs | None) -> tuple[Condition, ...]:
-    """A condition that names the runs of a point in which one channel has a gain of its own; none where there is none.
-
-    The search is that of `tpjb check`, `tpjb_ident.check.one_gain`; here it works on the phasors of all windows.
-    """
-    if pairs is None:
-        return ()
-    medians = [_medians(data, k) for k in range(len(data.runs))]
-    complete = [k for k, values in enumerate(medians) if all(np.isfinite(v).all() for v in values)]
-    if not complete:
-        return ()
-    gains = wrong_gains(_readings(data, [medians[k] for k in complete], complete, pairs))
-    doubts = []
-    for gain in sorted(gains, key=lambda f: f.run):
-        names = [pairs.names[i] for i in gain.channels]
-        doubts.append(f"{data.runs[complete[gain.run]].run}: {names[0]} {gain_in_words(gain, names)}")
-    return (Condition(_RUN_GAIN_OFF, "; ".join(doubts)),) if doubts else ()
-
-
-def _medians(data: PointData, k: int) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Displacement, cell force and oil force of one run, X and Y, medians over its windows; NaN where it has none."""
-    selected = data.run_index == k
-    run, line = data.runs[k], data.lines[k]
-    blocks = (data.D[selected], run.cell_force.phasors[:, line], data.F[selected])
-    good = np.logical_and.reduce([np.isfinite(block).all(axis=1) for block in blocks])
-    if not good.any():
-        nothing = np.full(2, np.nan + 0j)
-        return nothing, nothing, nothing
-    first, second, third = (complex_median(b[good]) for b in blocks)
-    return first, second, third
-
-
-def _readings(
-    data: PointData,
-    medians: Sequence[tuple[ComplexArray, ComplexArray, ComplexArray]],
-    kept: Sequence[int],
-    pairs: Pairs,
-) -> PointReadings:
-    displacement, cells, force = (np.stack([values[i] for values in medians]) for i in range(3))
-    to_probes, to_cells = np.linalg.inv(pairs.probe_plane).T, np.linalg.inv(pairs.cell_plane).T
-    return PointReadings(
-        probes=displacement @ to_probes,
-        cells=cells @ to_cells,
-        inertia=force - cells,
-        probe_means=data.mean_positions[list(kept)] @ to_probes,
-        cell_means=data.mean_loads[list(kept)] @ to_cells,
-        probe_plane=pairs.probe_plane,
-        cell_plane=pairs.cell_plane,
-        centre=pairs.centre,
-    )

@@ -7,12 +7,14 @@ from collections.abc import Iterable, Sequence
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem
 from tpjb_ident.check.campaign import judged
-from tpjb_ident.check.findings import Verdicts, verdicts
-from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.findings import Verdicts, reach, verdicts
+from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 
-_CONTRADICTED, _DOUBTFUL = "records-contradicted", "records-doubtful"
+#: Runs that tell of the channels what dynamic runs cannot.
+_STATIC = ("dry_pivot", "clearance", "locus")
+_CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful", "run-gain-off"
 
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
@@ -28,8 +30,11 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
 
 
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
-    """What the checks say of dynamic runs beside each other, by run."""
-    result = verdicts([observation.report for observation in judged(campaign, observations)])
+    """What the checks say of dynamic runs, by run; static runs say what they show of the channels."""
+    static = [observe(run) for run in campaign.runs if run.kind in _STATIC]
+    reports = [observation.report for observation in judged(campaign, [*observations, *static])]
+    reach(reports)
+    result = verdicts([report for report in reports if report.run.kind == "dynamic"])
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in result.shared.items():
@@ -41,7 +46,7 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
 def check_conditions(result: Verdicts, runs: Iterable[str]) -> tuple[Condition, ...]:
     """What the checks say of one point."""
     members = list(runs)
-    groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful))
+    groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful), (_RUN_GAIN, result.run_gains))
     told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
     return tuple(Condition(name, _sentence(problems)) for name, problems in told if problems)
 

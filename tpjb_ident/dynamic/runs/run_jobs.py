@@ -16,6 +16,7 @@ from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
@@ -132,6 +133,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
         conditions = merged(phasors.conditions, _dead_accelerometers(cached, phasors), _repaired(run))
+        phasors = _without_spares(phasors)
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
         return RunResult(result, mean_temperatures(cached), _seen(run, cached, phasors))
 
@@ -176,12 +178,26 @@ def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
     return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
 
 
+def _without_spares(phasors: RunPhasors) -> RunPhasors:
+    """The run without channels that show nothing where the others of their quantity tell the plane."""
+    silent = [k for k in range(len(phasors.channels)) if _silent(phasors, k)]
+    alive = [channel for k, channel in enumerate(phasors.channels) if k not in silent]
+    spare = [k for k in silent if is_spare(phasors.channels[k], alive)]
+    if not spare:
+        return phasors
+    z, mean = phasors.z.copy(), phasors.mean.copy()
+    z[:, :, spare], mean[:, spare] = np.nan, np.nan
+    return replace(phasors, z=z, mean=mean)
+
+
 def _silent(phasors: RunPhasors, channel: int) -> bool:
     """Whether no window shows any line in a channel; False where no window shows anything at all."""
     quantity = phasors.pick(phasors.channels[channel].quantity)
-    finite = np.isfinite(phasors.z[:, :, quantity]).all(axis=(1, 2))
+    finite = np.isfinite(phasors.z[:, :, quantity]).any(axis=(1, 2))
     if not finite.any():
         return False
-    largest = float(np.abs(phasors.z[finite][:, :, quantity]).max())
-    size, mean = np.abs(phasors.z[finite, :, channel]).max(), np.abs(phasors.mean[finite][:, quantity]).max()
-    return bool(size <= max(_NOTHING * largest, _ROUNDING * float(mean)))
+    largest = float(np.nanmax(np.abs(phasors.z[finite][:, :, quantity])))
+    own = np.abs(phasors.z[finite, :, channel])
+    size = float(np.max(own, initial=0.0, where=np.isfinite(own)))
+    mean = float(np.nanmax(np.abs(phasors.mean[finite][:, quantity])))
+    return size <= max(_NOTHING * largest, _ROUNDING * mean)
