@@ -58,7 +58,7 @@ def test_warnings_of_arithmetic_go_to_the_record_and_others_to_people(tmp_path, 
 
 @pytest.fixture
 def heard_interrupts():
-    """A shell that starts the tests in the background has interrupts ignored; programs started here would inherit it."""
+    """A shell that starts the tests in the background ignores interrupts; programs started here would inherit that."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

@@ -209,7 +209,7 @@ class Hdf5Reader(GridReader):
             return tuple(group.keys())
 
     def _facts(self, opened: Any = None) -> _Facts:
-        """Give the facts, from the group that the caller has `opened` if any must be read; once for a file kept open."""
+        """The facts, from the group that the caller has `opened` if any must be read; once for a file kept open."""
         if _FACTS in self.opened_members:
             facts: _Facts = self.opened_members[_FACTS]
             return facts
