@@ -38,6 +38,7 @@ KERNELS = (
     "film/reynolds.py",
     "film/slopes.py",
     "film/turbulence.py",
+    "interpolation.py",
     "statics/compiled/anderson.py",
     "statics/compiled/bending.py",
     "statics/compiled/case.py",

@@ -1,10 +1,24 @@
-"""Monotone cubics: scipy's would cost 0.26 s of the 3 s that the first prediction takes."""
+"""Tables: the row a value belongs to; monotone cubics, which scipy has, at 0.26 s of the first prediction."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from model.compilation import inner
 from rigdata.arrays import FloatArray
+
+
+@inner
+def row_below(x: FloatArray, count: int, at: float) -> int:
+    """Row of the first `count` that a value lies above, the first or the last but one at least."""
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x[middle] <= at:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def monotone_cubics(x: FloatArray, y: FloatArray) -> FloatArray:

@@ -70,7 +70,10 @@ def hold_numbers(setup: Setup) -> HoldNumbers:
 
 def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
     """Moment that holds a pad back at a tilt [rad] and pad load [N]."""
-    return TiltHold(*held_moment(hold_numbers(setup), float(tilt), float(load)))
+    hold = hold_numbers(setup)
+    if not any(hold):
+        return TiltHold(0.0, 0.0, 0.0, False)
+    return TiltHold(*held_moment(hold, float(tilt), float(load)))
 
 
 def rolling_radius(pivot: Pivot) -> float:

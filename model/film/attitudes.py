@@ -29,8 +29,10 @@ _MESH = (20, 4)
 #: Rounding of the heat number, logarithmic: 2 % of the temperature rise.
 _STEP = 0.02
 #: What the trailing edge of the first film has lost of the gap at the pivot, and by which factors it goes on.
-_FIRST, _DEEPER, _FLATTER = 0.4, 1.3, 0.72
-_ROWS = 48
+_FIRST, _DEEPER, _FLATTER = 0.4, 1.4, 0.68
+_ROWS = 40
+#: Points of a curve from one row to the next: cubics through four rows, straight from point to point.
+BETWEEN = 4
 #: Films thinner than this share of the clearance, or hotter by so much [K], are of no concern.
 _DEEPEST, _HOTTEST = 60.0, 300.0
 #: Attitudes beyond this are of no concern: the journal would stand clearances away.
@@ -47,7 +49,7 @@ class Attitudes(NamedTuple):
     curvature: FloatArray  #: (n,): A
     wedge: FloatArray  #: (n,): B
     load: FloatArray  #: (n,): Radial force over mu U R^2 L / Cp^2.
-    rise: FloatArray  #: (n, rows, columns): Temperature above the inlet [K].
+    rise: FloatArray  #: (n // `BETWEEN` + 1, rows, columns): Temperature above the inlet [K].
 
 
 class Heat(NamedTuple):
@@ -95,25 +97,48 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: He
     oil = (1.0, heat.exponent, 1.0, heat.expansion)
     running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
     numbers, rises = np.zeros((2 * _ROWS, 3)), np.zeros((2 * _ROWS, *shape))
-    low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
+    low, high = walk(grid, work, running, (isothermal, False, depth * radius**2 * length), (numbers, rises))
     numbers[low - 1] = 0.0  # a parallel film
     if not isothermal:
         rises[low - 1] = rises[low]
     rows = slice(low - 1, high)
-    curvature, wedge, load = numbers[rows].T.copy()
-    if len(load) < 4:
+    if high - low < 3:
         nothing = np.zeros(1)
         return Attitudes(nothing, nothing, nothing, np.zeros((1, *shape)))
+    curvature, wedge, load = _between(numbers[rows]).T.copy()
     return Attitudes(curvature, wedge, load / (radius**2 * length), rises[rows].copy())
+
+
+def _between(rows: FloatArray) -> FloatArray:
+    """Points of a curve (A, B, W) between its rows, (n, 3): cubics in log(B), straight from the parallel film on."""
+    along = np.log(rows[:, 1] + rows[1, 1])
+    place = np.arange(BETWEEN * (len(rows) - 1) + 1) / BETWEEN
+    x = np.interp(place, np.arange(len(rows)), along)
+    first = np.clip(place.astype(int) - 1, 1, len(rows) - 4)
+    out = np.zeros((len(x), 3))
+    for k in range(4):
+        others = [(x - along[first + j]) / (along[first + k] - along[first + j]) for j in range(4) if j != k]
+        out += np.prod(others, axis=0)[:, None] * rows[first + k]
+    straight = place[: BETWEEN + 1, None]
+    out[: BETWEEN + 1] = (1.0 - straight) * rows[0] + straight * rows[1]
+    out[:, 0] = np.maximum(out[:, 0], _FARTHEST)
+    return out
 
 
 @compiled
 def walk(
-    grid: FilmGrid, work: FilmWork, running: Running, limits: tuple[bool, float], out: tuple[FloatArray, FloatArray]
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    limits: tuple[bool, bool, float],
+    out: tuple[FloatArray, FloatArray],
 ) -> tuple[int, int]:
-    """Fill rows (A, B, W) and temperature rises, from the middle on deeper and flatter; first row and end."""
+    """Fill rows (A, B, W) and temperature rises, from the middle on deeper and flatter; first row and end.
+
+    `limits`: whether the film is isothermal, whether its rupture line is sharp, the largest load.
+    """
     numbers, rises = out
-    isothermal, depth = limits
+    isothermal, sharp, depth = limits
     middle = numbers.shape[0] // 2
     if not grid.angle[-1] > 0.0 or not grid.angle[0] < 0.0:
         return middle, middle
@@ -124,7 +149,8 @@ def walk(
         if row > middle + 1:
             slope = (numbers[row - 1, 0] - numbers[row - 2, 0]) / (numbers[row - 1, 1] - numbers[row - 2, 1])
             curvature = numbers[row - 1, 0] + slope * (wedge - numbers[row - 1, 1])
-        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
+            _warm(work, rises, row - 1, row - 2)
+        found, curvature, load = _balance(grid, work, running, (isothermal, sharp), curvature, wedge)
         if not found:
             break
         _keep(work, numbers, rises, row, (curvature, wedge, load))
@@ -145,11 +171,9 @@ def walk(
             slope = (numbers[before, 0] - numbers[row + 2, 0]) / (numbers[before, 1] - numbers[row + 2, 1])
             most = 0.3 * (1.0 + numbers[before, 0])
             curvature = numbers[before, 0] + min(max(slope * (wedge - numbers[before, 1]), -most), most)
-        for i in range(work.temperature.shape[0]):
-            for j in range(work.temperature.shape[1]):
-                work.temperature[i, j] = 40.0 + rises[before, i, j]
+        _warm(work, rises, before, min(before + 1, high - 1))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, isothermal, max(curvature, -0.75), wedge)
+        found, curvature, load = _balance(grid, work, running, (isothermal, sharp), max(curvature, -0.75), wedge)
         if found and load > 0.0:
             _keep(work, numbers, rises, row, (curvature, wedge, load))
             low, row = row, row - 1
@@ -158,6 +182,15 @@ def walk(
         else:
             flatter = np.sqrt(flatter)
     return low, high
+
+
+@inner
+def _warm(work: FilmWork, rises: FloatArray, last: int, before: int) -> None:
+    """Temperatures as the last two rows head, row by row."""
+    for i in range(work.temperature.shape[0]):
+        for j in range(work.temperature.shape[1]):
+            rise = rises[last, i, j]
+            work.temperature[i, j] = 40.0 + min(max(2.0 * rise - rises[before, i, j], 0.5 * rise), 1.5 * rise)
 
 
 @inner
@@ -172,15 +205,15 @@ def _keep(
 
 @inner
 def _balance(
-    grid: FilmGrid, work: FilmWork, running: Running, isothermal: bool, curvature: float, wedge: float
+    grid: FilmGrid, work: FilmWork, running: Running, kind: tuple[bool, bool], curvature: float, wedge: float
 ) -> tuple[bool, float, float]:
     """A at which the heated film has no moment, and its load: more A takes the pressure upstream."""
-    shift = np.empty(work.unknown.shape[0])
+    shift, (isothermal, sharp) = np.empty(work.unknown.shape[0]), kind
     load, share, last = 0.0, 1.0, 0.0
     for _step in range(40):
         set_viscosity(work, running.oil)
         room = 1.0 / (1.0 + curvature)
-        forces: FilmForces = solve_film(grid, work, (1.0, curvature * room, wedge * room), 1.0, False)
+        forces: FilmForces = solve_film(grid, work, (1.0, curvature * room, wedge * room), 1.0, sharp)
         if forces.steps <= 0:  # gone at the trailing edge: a larger A opens it
             curvature, last = 1.5 * curvature + 0.2, 0.0
             continue

@@ -40,9 +40,9 @@ from model.statics.compiled.iteration import (
     vector_size,
 )
 from model.statics.compiled.laws import OTHER, ask_laws, encoded
-from model.statics.compiled.place import place
+from model.statics.compiled.place import place_pads
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
-from model.statics.compiled.start import first_position, pivot_curve, row_at, warm_film
+from model.statics.compiled.start import first_position, pivot_curve, warm_film
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat, stacked_conduction
@@ -59,7 +59,7 @@ _SWINGING = 0.3
 #: Share of the clearance that tells a place from a fold.
 _EVEN = 1e-6
 #: Rows of a pad's loaded attitudes at most.
-_ROWS = 64
+_ROWS = 400
 
 
 class Search:
@@ -116,12 +116,14 @@ class Search:
     def _shapes(self) -> Shapes:
         setup, films = self.setup, self.films
         bodies: tuple[Any, ...] = tuple(f.deformation for f in films if f.deformation is not None)
-        grid = films[0].grid
+        grid, grids = films[0].grid, stacked_grids(tuple(f.grid for f in films))
+        if self.case.thermal in (ISOTHERMAL, ALONE) and not (setup.flexible_pads or self.case.axial):
+            return Shapes(grids, None, None)
         conducting = bodies if self.case.thermal == COUPLED and setup.options.conduction else ()
         bending: BodyStack = stacked_bodies(
             bodies if setup.flexible_pads else (), (grid.first, len(grid.z)), setup.bending_factor, self.case.supply
         )
-        return Shapes(stacked_grids(tuple(f.grid for f in films)), bending, stacked_conduction(conducting))
+        return Shapes(grids, bending, stacked_conduction(conducting))
 
     def _pads(self) -> PadStack:
         films, count = self.films, len(self.films)
@@ -197,43 +199,45 @@ class Search:
         running = case.running if cold else self.films[0].running(self.surface_speed, oil)
         size = self.setup.bearing.journal_radius**2 * self.setup.bearing.length
         viscosity = float(oil.viscosity(case.supply))
+        pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
-            clearance = float(self.pads.clearance[m])
+            clearance, law = float(pads.clearance[m]), self.setup.pivots[m]
             curve = attitudes(film.grid, clearance, running, case.supply, load)
+            first = alike.setdefault((id(curve), clearance, id(law)), m)
+            if first < m:
+                pads.rows[m], pads.attitudes[m] = pads.rows[first], pads.attitudes[first]
+                self.rises.append(self.rises[first])
+                continue
             unit = viscosity * self.surface_speed * size / clearance**2
             gives = np.empty(0)
-            if self.pads.laws[m, 0] == OTHER:
-                gives = np.array([self.setup.pivots[m].deflection(w) for w in (curve.load * unit).tolist()])
-            self.pads.rows[m] = pivot_curve(
-                curve[:3], (clearance, unit), self.pads.laws[m], self.pads.curves[m], gives, self.pads.attitudes[m]
+            if pads.laws[m, 0] == OTHER:
+                gives = np.array([law.deflection(w) for w in (curve.load * unit).tolist()])
+            pads.rows[m] = pivot_curve(
+                curve[:3], (clearance, unit), pads.laws[m], pads.curves[m], gives, pads.attitudes[m]
             )
-            self.rises.append((len(curve.load) - int(self.pads.rows[m]), curve.rise))
+            self.rises.append((len(curve.load) - int(pads.rows[m]), curve.rise))
 
     def stand(self) -> None:
         """Put journal and pads where the curves carry the load, and films as warm as they are there."""
         self.know_attitudes()
         pads, state = self.pads, self.state
-        numbers = np.column_stack([pads.frame[:, 0], pads.preload, pads.clearance])
-        state.position[:], loaded, self.other = first_position(self.case.load, numbers, pads.attitudes, pads.rows)
+        state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
-        for m in np.flatnonzero(loaded).tolist():
-            self.load_pad(m)
+        self.load_pads(loaded)
 
-    def load_pad(self, m: int) -> None:
-        """Put a pad on its loaded attitude for the journal's position, its film as warm as it is there."""
+    def load_pads(self, loaded: BoolArray) -> None:
+        """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
         self.know_attitudes()
-        pads, film = self.pads, self.films[m]
-        place(pads, self.works, self.state, m)
+        place_pads(self.pads, self.works, self.state, loaded)
         if self.case.thermal == ISOTHERMAL:
             return
-        low, rises = self.rises[m]
-        reach = film.preload_distance + float(film.normal @ self.state.position)
-        row, share = row_at(pads.attitudes[m, 0], int(pads.rows[m]), reach)
-        temperature = film.work.temperature
-        warm_film(rises, (low + row, share), self.state.inlet[m], film.grid.first == 1, temperature)
-        if film.cross is not None:
-            film.cross.temperature[:] = temperature[:, :, None]
-            film.cross.face[:] = temperature
+        for m in np.flatnonzero(loaded).tolist():
+            (low, rises), film = self.rises[m], self.films[m]
+            temperature = film.work.temperature
+            warm_film(rises, self.pads, self.state, m, (low, film.grid.first), temperature)
+            if film.cross is not None:
+                film.cross.temperature[:] = temperature[:, :, None]
+                film.cross.face[:] = temperature
 
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""

@@ -42,8 +42,8 @@ class Shapes(NamedTuple):
     """The films' meshes and the bodies of their pads."""
 
     grids: GridStack
-    bodies: BodyStack
-    conduction: Conduction
+    bodies: BodyStack | None  #: None, both: rigid pads and films for themselves, a search without those loops.
+    conduction: Conduction | None
 
 
 def stacked_bodies(
@@ -88,13 +88,12 @@ _RIGID = BodyStack(
 
 
 @inner
-def bend_pads(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> float:
+def bend_pads(shapes: Shapes, bodies: BodyStack, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> float:
     """Close the loop of pressure, deformation and tilt along the shaft for every pad that carries.
 
     Returns the largest change asked for, as a share of the thinnest film.
     """
-    grids, bodies = shapes.grids, shapes.bodies
-    count = len(state.tilt)
+    grids, count = shapes.grids, len(state.tilt)
     asked = np.zeros((count, state.bent[0].size))
     if len(bodies.which) > 0:
         _ask_bodies(bodies, works, state, asked)

@@ -31,9 +31,9 @@ from model.statics.compiled.constants import (
     SLOW,
     SLOW_ACROSS,
 )
-from model.statics.compiled.heat import exchange_heat, heat_films
+from model.statics.compiled.heat import Conduction, exchange_heat, heat_films
 from model.statics.compiled.place import is_stable, let_idle, rescue
-from model.statics.compiled.stack import BACKFLOW, GROWN, PadStack, PadState
+from model.statics.compiled.stack import BACKFLOW, GROWN, GridStack, PadStack, PadState
 from model.statics.compiled.step import grow_and_bend, move, newton, solve_pressures
 from rigdata.arrays import FloatArray
 
@@ -80,7 +80,7 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
                 return ASKS_OIL
         if trail[_STAGE] == _PRESSURE:
             if not sharp:
-                _begin(shapes, pads, state, case, memory)
+                _begin(pads, state, case, memory)
             found = solve_pressures(shapes, pads, works, state, case, sharp)
             if sharp:  # derivatives once more, with the rupture line between the nodes; the pressure stays
                 return SETTLED
@@ -90,11 +90,7 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
             if across:
                 return ASKS_HEAT
         if trail[_STAGE] == _HEATING:
-            heat = trail[HEAT]
-            if case.thermal == ALONE:
-                heat = heat_films(shapes.grids, works, state, case, trail[RELAXED])
-            elif case.thermal == COUPLED:
-                heat = exchange_heat(shapes.grids, shapes.conduction, pads, works, state, case, trail[RELAXED])
+            heat = _heat(shapes.conduction, shapes.grids, pads, works, state, case, trail)
             trail[HEAT] = grow_and_bend(shapes, pads, works, state, case, trail[RELAXED], heat)
             if not trail[HEAT] < BOUNDLESS:
                 trail[RESIDUAL] = math.inf
@@ -116,13 +112,33 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
 
 
 @inner
-def _begin(shapes: Shapes, pads: PadStack, state: PadState, case: Case, memory: Memory) -> None:
+def _heat(
+    bodies: Conduction | None,
+    grids: GridStack,
+    pads: PadStack,
+    works: FilmWork,
+    state: PadState,
+    case: Case,
+    trail: FloatArray,
+) -> float:
+    """Temperatures of the films for their pressures; returns the largest change asked for [K]."""
+    if case.thermal == ALONE:
+        return heat_films(grids, works, state, case, trail[RELAXED])
+    if bodies is None:
+        return trail[HEAT]
+    if case.thermal == COUPLED:
+        return exchange_heat(grids, bodies, pads, works, state, case, trail[RELAXED])
+    return trail[HEAT]
+
+
+@inner
+def _begin(pads: PadStack, state: PadState, case: Case, memory: Memory) -> None:
     """Remember where a step starts from, if the last ones were slow."""
     trail = memory.trail
     state.figures[BACKFLOW] = 0.0
     trail[_STAGE], trail[HEAT] = _HEATING, 0.0
     slow = SLOW_ACROSS if case.thermal == ACROSS else SLOW
-    mixes = case.thermal != ISOTHERMAL or len(shapes.bodies.which) > 0
+    mixes = case.thermal != ISOTHERMAL or state.bent.size > 0
     trail[_KEPT] = 1.0 if trail[_LEFT] > slow * trail[_BEST_LEFT] and mixes else 0.0
     if trail[_KEPT] > 0.0:
         _write_vector(pads, state, case, memory.before)

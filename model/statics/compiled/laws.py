@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from model.compilation import inner
+from model.interpolation import row_below
 from model.measured_pivot import MeasuredPivot
 from model.pivots import ConstantPivot, PivotLaw, RigidPivot, RockerPivot, ScaledPivot, SphericalPivot
 from rigdata.arrays import FloatArray
@@ -119,13 +120,7 @@ def _logarithm(load_scale: float, load: float) -> float:
 
 @inner
 def _piece(law: FloatArray, curve: FloatArray, load: float) -> tuple[int, float]:
-    low, high = 0, int(law[1]) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if curve[0, middle] <= load:
-            low = middle
-        else:
-            high = middle
+    low = row_below(curve[0], int(law[1]), load)
     return low, load - curve[0, low]
 
 

@@ -6,11 +6,12 @@ import math
 
 from model.compilation import compiled, inner
 from model.film.mesh import FilmWork
+from model.interpolation import row_below
 from model.statics.compiled.case import Case, along, rigid_approach
 from model.statics.compiled.laws import compliance
 from model.statics.compiled.stack import PadStack, PadState
 from model.tilt_hold import held_moment
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray
 
 #: How often a search puts a pad back on its loaded attitude that has lost it on the way.
 _RESCUES = 12
@@ -25,12 +26,21 @@ def let_idle(state: PadState, m: int) -> None:
 
 
 @compiled
-def place(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
-    """Put a pad on its loaded attitude for the journal's position; at its fold where it has none there."""
-    table, count = pads.attitudes[m], pads.rows[m]
-    rigid = rigid_approach(pads, state, m)
-    at = max(rigid, table[0, 0])
-    a, b = interpolate(table[0], table[1], count, at), interpolate(table[0], table[2], count, at)
+def place_pads(pads: PadStack, works: FilmWork, state: PadState, loaded: BoolArray) -> None:
+    """Put pads on their loaded attitudes for the journal's position; at their folds where they have none there."""
+    for m in range(len(loaded)):
+        if loaded[m]:
+            _place(pads, works, state, m)
+
+
+@inner
+def _place(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
+    table, last = pads.attitudes[m], pads.rows[m] - 1
+    at = max(rigid_approach(pads, state, m), table[0, 0])
+    low = row_below(table[0], pads.rows[m], at)
+    share = (min(at, table[0, last]) - table[0, low]) / (table[0, low + 1] - table[0, low])
+    a = table[1, low] + share * (table[1, low + 1] - table[1, low])
+    b = table[2, low] + share * (table[2, low + 1] - table[2, low])
     state.idle[m] = False
     state.deflection[m] = at - a
     state.tilt[m] = (b - along(pads, state, m)) / pads.pivot_radius[m]
@@ -43,7 +53,7 @@ def rescue(pads: PadStack, works: FilmWork, state: PadState, m: int) -> bool:
     if pads.rows[m] < 2 or state.rescues[m] >= _RESCUES or margin(pads, state, m) < 0.0:
         return False
     state.rescues[m] += 1
-    place(pads, works, state, m)
+    _place(pads, works, state, m)
     return True
 
 
@@ -51,23 +61,6 @@ def rescue(pads: PadStack, works: FilmWork, state: PadState, m: int) -> bool:
 def margin(pads: PadStack, state: PadState, m: int) -> float:
     """How far a pad is from the fold of its loaded attitudes, as a share of its clearance; negative beyond."""
     return (rigid_approach(pads, state, m) - pads.attitudes[m, 0, 0]) / pads.clearance[m]
-
-
-@inner
-def interpolate(x: FloatArray, y: FloatArray, count: int, at: float) -> float:
-    """Straight between the first `count` points, constant beyond them."""
-    if at <= x[0]:
-        return y[0]
-    if at >= x[count - 1]:
-        return y[count - 1]
-    low, high = 0, count - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x[middle] <= at:
-            low = middle
-        else:
-            high = middle
-    return y[low] + (y[high] - y[low]) / (x[high] - x[low]) * (at - x[low])
 
 
 @inner

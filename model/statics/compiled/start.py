@@ -14,7 +14,10 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.attitudes import BETWEEN
+from model.interpolation import row_below
 from model.statics.compiled.laws import deflection
+from model.statics.compiled.stack import PadStack, PadState
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
@@ -61,39 +64,33 @@ def pivot_curve(
 
 
 @compiled
-def first_position(
-    load: FloatArray, pads: FloatArray, tables: FloatArray, rows: IntArray
-) -> tuple[FloatArray, BoolArray, BoolArray]:
+def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Journal (2,) [m], which pads carry there, and which do in another equilibrium (none: there is no other).
 
-    `load` (2,) [N], `pads` (n, 4): normal, Cp - Cb and Cp [m].
+    `load` (2,) [N].
     """
-    n = len(pads)
-    loaded = rows >= 2
+    n = len(pads.rows)
+    loaded = pads.rows >= 2
     position = np.zeros(2)
-    _stand(load, pads, tables, rows, loaded, position)
+    _stand(load, pads, loaded, position)
     doubtful, count = np.empty(n, dtype=np.int64), 0
     size = math.hypot(load[0], load[1])
     for m in range(n):
-        beyond = tables[m, 0, 0] - _reach(pads, m, position)
+        beyond = pads.attitudes[m, 0, 0] - _reach(pads, m, position)
         if loaded[m] and beyond > 0.0:
             loaded[m] = False
-            if _pushes(pads, tables, rows, m, position)[0] > _NOTHING * size and count < _MOST_DOUBTFUL:
+            if _pushes(pads, m, position)[0] > _NOTHING * size and count < _MOST_DOUBTFUL:
                 doubtful[count] = m
                 count += 1
     other = np.zeros(n, dtype=np.bool_)
     if count > 0:
-        position, loaded, other = _most_loaded(load, pads, tables, rows, (loaded, doubtful[:count], position))
+        position, loaded, other = _most_loaded(load, pads, (loaded, doubtful[:count], position))
     return position, loaded, other
 
 
 @inner
 def _most_loaded(
-    load: FloatArray,
-    pads: FloatArray,
-    tables: FloatArray,
-    rows: IntArray,
-    found: tuple[BoolArray, IntArray, FloatArray],
+    load: FloatArray, pads: PadStack, found: tuple[BoolArray, IntArray, FloatArray]
 ) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Of pads near their folds, those that carry: the set with the most of them in which all are above their folds."""
     certain, doubtful, start = found
@@ -108,9 +105,9 @@ def _most_loaded(
             mask, position = certain.copy(), start.copy()
             for k in range(count):
                 mask[doubtful[k]] = number // 2 ** (count - 1 - k) % 2 == 1
-            good = _stand(load, pads, tables, rows, mask, position)
+            good = _stand(load, pads, mask, position)
             for m in range(len(mask)):
-                if mask[m] and _reach(pads, m, position) < tables[m, 0, 0] - _FOLD * pads[m, 3]:
+                if mask[m] and _reach(pads, m, position) < pads.attitudes[m, 0, 0] - _FOLD * pads.clearance[m]:
                     good = False
             if good and best < 0:
                 best, answer, chosen = size, position, mask
@@ -131,74 +128,61 @@ def _bits(number: int) -> int:
 
 
 @inner
-def _reach(pads: FloatArray, m: int, position: FloatArray) -> float:
-    return pads[m, 2] + pads[m, 0] * position[0] + pads[m, 1] * position[1]
+def _reach(pads: PadStack, m: int, position: FloatArray) -> float:
+    return pads.preload[m] + pads.frame[m, 0, 0] * position[0] + pads.frame[m, 0, 1] * position[1]
 
 
 @inner
-def _pushes(pads: FloatArray, tables: FloatArray, rows: IntArray, m: int, position: FloatArray) -> tuple[float, float]:
+def _pushes(pads: PadStack, m: int, position: FloatArray) -> tuple[float, float]:
     """Load of a pad's curve at a position [N], and its slope [N/m]."""
-    reach, table, count = _reach(pads, m, position), tables[m, 0], rows[m]
+    reach, table, load = _reach(pads, m, position), pads.attitudes[m, 0], pads.attitudes[m, 3]
     if reach < table[0]:
-        tail = _TAIL * pads[m, 3]
-        push = tables[m, 3, 0] * math.exp(max((reach - table[0]) / tail, -60.0))
+        tail = _TAIL * pads.clearance[m]
+        push = load[0] * math.exp(max((reach - table[0]) / tail, -60.0))
         return push, push / tail
-    low, high = 0, count - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle] <= reach:
-            low = middle
-        else:
-            high = middle
-    slope = (tables[m, 3, high] - tables[m, 3, low]) / (table[high] - table[low])
-    return tables[m, 3, low] + slope * (reach - table[low]), slope
+    low = row_below(table, pads.rows[m], reach)
+    slope = (load[low + 1] - load[low]) / (table[low + 1] - table[low])
+    return load[low] + slope * (reach - table[low]), slope
 
 
 @inner
 def _missing(
-    load: FloatArray,
-    pads: FloatArray,
-    tables: FloatArray,
-    rows: IntArray,
-    loaded: BoolArray,
-    position: FloatArray,
-    slopes: FloatArray,
+    load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray, slopes: FloatArray
 ) -> tuple[float, float]:
     """Part of the load that the loaded pads do not carry at a position; `slopes` (2, 2) are set."""
     fx, fy = load[0], load[1]
     slopes[:] = 0.0
-    for m in range(len(pads)):
+    for m in range(len(loaded)):
         if loaded[m]:
-            push, slope = _pushes(pads, tables, rows, m, position)
-            fx, fy = fx - pads[m, 0] * push, fy - pads[m, 1] * push
+            push, slope = _pushes(pads, m, position)
+            fx, fy = fx - pads.frame[m, 0, 0] * push, fy - pads.frame[m, 0, 1] * push
             for i in range(2):
                 for j in range(2):
-                    slopes[i, j] += slope * pads[m, i] * pads[m, j]
+                    slopes[i, j] += slope * pads.frame[m, 0, i] * pads.frame[m, 0, j]
     return fx, fy
 
 
 @inner
-def _stand(
-    load: FloatArray, pads: FloatArray, tables: FloatArray, rows: IntArray, loaded: BoolArray, position: FloatArray
-) -> bool:
+def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray) -> bool:
     """Move the journal to where a set of pads carries the load, by Newton's steps down the energy; False if nowhere."""
     room, stiff, largest = math.inf, 0.0, 0.0
-    for m in range(len(pads)):
+    for m in range(len(loaded)):
         if loaded[m]:
-            room = min(room, tables[m, 1, rows[m] - 1] - pads[m, 2])
-            stiff = max(stiff, tables[m, 3, rows[m] - 1] / pads[m, 3])
+            last = pads.rows[m] - 1
+            room = min(room, pads.attitudes[m, 1, last] - pads.preload[m])
+            stiff = max(stiff, pads.attitudes[m, 3, last] / pads.clearance[m])
     if math.isinf(room):
         return False
-    room = max(room, 0.05 * np.min(pads[:, 3]))
+    room = max(room, 0.05 * np.min(pads.clearance))
     size = math.hypot(load[0], load[1])
     if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
         position[0], position[1] = 0.4 * room * load[0] / size, 0.4 * room * load[1] / size
     slopes, trial = np.empty((2, 2)), np.empty(2)
-    fx, fy = _missing(load, pads, tables, rows, loaded, position, slopes)
+    fx, fy = _missing(load, pads, loaded, position, slopes)
     if size == 0.0:
-        for m in range(len(pads)):
+        for m in range(len(loaded)):
             if loaded[m]:
-                largest = max(largest, _pushes(pads, tables, rows, m, position)[0])
+                largest = max(largest, _pushes(pads, m, position)[0])
         size = largest
     for _ in range(60):
         if math.hypot(fx, fy) < _GOOD_ENOUGH * size:
@@ -212,7 +196,7 @@ def _stand(
         for halving in range(12):
             # along a step down a convex energy its slope rises: far enough is where it is past its zero, not far past
             trial[0], trial[1] = position[0] + mx * 0.5**halving, position[1] + my * 0.5**halving
-            gx, gy = _missing(load, pads, tables, rows, loaded, trial, slopes)
+            gx, gy = _missing(load, pads, loaded, trial, slopes)
             if gx * mx + gy * my > -0.5 * (fx * mx + fy * my) or halving == 11:
                 break
         position[0], position[1], fx, fy = trial[0], trial[1], gx, gy
@@ -220,12 +204,20 @@ def _stand(
 
 
 @compiled
-def warm_film(rises: FloatArray, shares: tuple[int, float], inlet: float, whole: bool, temperature: FloatArray) -> None:
+def warm_film(
+    rises: FloatArray, pads: PadStack, state: PadState, m: int, first: tuple[int, int], temperature: FloatArray
+) -> None:
     """Temperatures of a film on its loaded attitude, from those of a curve's rows: `rises` (rows, coarse mesh) [K].
 
-    Across, either mesh is graded alike; a whole film is symmetric.
+    `first`: point of the curve where the table begins, and `FilmGrid.first`. Across, either mesh is graded alike; a
+    whole film is symmetric.
     """
-    row, part = shares
+    table, reach = pads.attitudes[m, 0], _reach(pads, m, state.position)
+    low, whole, inlet = row_below(table, pads.rows[m], reach), first[1] == 1, state.inlet[m]
+    part = min(max((reach - table[low]) / (table[low + 1] - table[low]), 0.0), 1.0)
+    part = (first[0] + low + part) / BETWEEN
+    row = min(int(part), rises.shape[0] - 2)
+    part -= row
     rows, columns = temperature.shape
     coarse_rows, coarse_columns = rises.shape[1], rises.shape[2]
     for i in range(rows):
@@ -246,18 +238,3 @@ def warm_film(rises: FloatArray, shares: tuple[int, float], inlet: float, whole:
                 value += u * ((1.0 - v) * field[p + 1, q] + v * field[p + 1, q + 1])
                 total += (part if k == 1 else 1.0 - part) * value
             temperature[i, j] = inlet + total
-
-
-@compiled
-def row_at(table: FloatArray, count: int, reach: float) -> tuple[int, float]:
-    """Row of a curve below a reach, and how far on to the next one."""
-    if reach <= table[0]:
-        return 0, 0.0
-    low, high = 0, count - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle] <= reach:
-            low = middle
-        else:
-            high = middle
-    return low, min((reach - table[low]) / (table[high] - table[low]), 1.0)

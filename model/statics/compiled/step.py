@@ -12,7 +12,7 @@ from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import least_share, set_viscosity
 from model.film.reynolds import FilmForces, solve_film
 from model.film.turbulence import solve_turbulent_film
-from model.statics.compiled.bending import Shapes, bend_pads, change_shape
+from model.statics.compiled.bending import BodyStack, Shapes, bend_pads, change_shape
 from model.statics.compiled.case import ACROSS, TURBULENT, Case, along, rigid_approach
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
@@ -84,10 +84,25 @@ def grow_and_bend(
             state.felt[m, i] = state.corrected[m, i]
             for j in range(2):
                 state.felt_stiffness[m, i, j] = state.stiffness[m, i, j]
-    if (len(shapes.bodies.which) > 0 or case.axial) and change < BOUNDLESS:
-        # a deformation counts like a temperature change of the same weight in the film's resistance
-        change = max(change, HEAT_PER_FORCE * bend_pads(shapes, pads, works, state, case))
-    return change
+    # a deformation counts like a temperature change of the same weight in the film's resistance
+    return max(change, HEAT_PER_FORCE * _bend(shapes.bodies, shapes, pads, works, state, case, change))
+
+
+@inner
+def _bend(
+    bodies: BodyStack | None,
+    shapes: Shapes,
+    pads: PadStack,
+    works: FilmWork,
+    state: PadState,
+    case: Case,
+    change: float,
+) -> float:
+    if bodies is None:
+        return 0.0
+    if not change < BOUNDLESS or state.bent.size == 0:
+        return 0.0
+    return bend_pads(shapes, bodies, pads, works, state, case)
 
 
 @inner
@@ -157,9 +172,9 @@ def move(
     shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, shift: FloatArray, damping: float
 ) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
-    grids, bodies = shapes.grids, shapes.bodies
+    grids = shapes.grids
     scale = min(damping, LONGEST_STEP * np.min(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
-    extra, bending = np.empty((0, 0)), len(bodies.which) > 0 or case.axial
+    extra, bending = np.empty((0, 0)), state.bent.size > 0
     closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
     for m in range(len(state.tilt)):
         if state.solved[m]:
@@ -167,7 +182,7 @@ def move(
             da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
             db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pads.pivot_radius[m] * moves[0]
             if bending:
-                axial[m] = change_shape(state, bodies, case, m, da, db)
+                axial[m] = _follow(shapes.bodies, state, case, m, da, db)
                 extra = _extra(grid_of(grids, m), state, m, axial[m])
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
             if worst * damping < SHRINK - 1.0:
@@ -188,6 +203,14 @@ def move(
             state.axial[m] += scale * axial[m]
     state.figures[GROWING] = 0.0
     return scale == 1.0
+
+
+@inner
+def _follow(bodies: BodyStack | None, state: PadState, case: Case, m: int, da: float, db: float) -> float:
+    """Change of a pad's tilt along the shaft [rad], see `change_shape`."""
+    if bodies is None:
+        return 0.0
+    return change_shape(state, bodies, case, m, da, db)
 
 
 @inner
