@@ -5,18 +5,61 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-#: Symbol and size of the unit in which a quantity is printed; sizes in SI, of angles in degrees, of speeds in Hz.
-UNITS = {
-    "load": ("kN", 1e3),
-    "stiffness": ("MN/m", 1e6),
-    "damping": ("kNs/m", 1e3),
-    "mass": ("kg", 1.0),
-    "length": ("µm", 1e-6),
-    "angle": ("deg", 1.0),
-    "frequency": ("Hz", 1.0),
-    "share": ("%", 0.01),
+from tpjb_ident.errors import BadInputError
+
+#: Pounds and inches in SI.
+_LBF, _INCH = 4.4482216152605, 0.0254
+#: Symbol and size of the unit in which a quantity is shown, by system; sizes in SI, of angles in degrees, of
+#: frequencies and speeds in Hz.
+SYSTEMS = {
+    "si": {
+        "load": ("kN", 1e3),
+        "force": ("N", 1.0),
+        "stiffness": ("MN/m", 1e6),
+        "damping": ("kN s/m", 1e3),
+        "mass": ("kg", 1.0),
+        "length": ("µm", 1e-6),
+        "size": ("mm", 1e-3),
+        "pressure": ("MPa", 1e6),
+        "angle": ("deg", 1.0),
+        "frequency": ("Hz", 1.0),
+        "speed": ("Hz", 1.0),
+        "share": ("%", 0.01),
+    },
+    "us": {
+        "load": ("lbf", _LBF),
+        "force": ("lbf", _LBF),
+        "stiffness": ("lbf/in", _LBF / _INCH),
+        "damping": ("lbf s/in", _LBF / _INCH),
+        "mass": ("lb", 0.45359237),
+        "length": ("mil", 1e-3 * _INCH),
+        "size": ("in", _INCH),
+        "pressure": ("psi", _LBF / _INCH**2),
+        "angle": ("deg", 1.0),
+        "frequency": ("Hz", 1.0),
+        "speed": ("rpm", 1 / 60.0),
+        "share": ("%", 0.01),
+    },
 }
-_SYMBOLS = {quantity: symbol for quantity, (symbol, _) in UNITS.items()}
+#: The system in use, which `use_units` sets.
+UNITS = dict(SYSTEMS["si"])
+
+
+def use_units(system: str) -> None:
+    """Choose the units in which people read: "si" or "us"; what is computed and stored stays SI."""
+    if system not in SYSTEMS:
+        raise BadInputError(f"--units: {system!r} is not known. Use one of {', '.join(SYSTEMS)}.")
+    UNITS.update(SYSTEMS[system])
+
+
+def symbol(quantity: str) -> str:
+    """Symbol of the unit in which a quantity is shown."""
+    return UNITS[quantity][0]
+
+
+def size(quantity: str) -> float:
+    """Size of that unit in SI (of angles in degrees, of frequencies and speeds in Hz)."""
+    return UNITS[quantity][1]
 
 
 class Column(NamedTuple):
@@ -35,7 +78,7 @@ class Column(NamedTuple):
     @property
     def heading(self) -> str:
         """Title with the unit."""
-        return self.title.format_map(_SYMBOLS)
+        return self.title.format_map({quantity: unit for quantity, (unit, _) in UNITS.items()})
 
     def cell(self, value: Any) -> str:
         """Write a value of this column: a number, several, words, or None."""
@@ -44,10 +87,10 @@ class Column(NamedTuple):
         if isinstance(value, str):
             return value
         quantity = self.quantity or self.title.partition("{")[2].partition("}")[0]
-        size = UNITS[quantity][1] if quantity else 1.0
+        unit = size(quantity) if quantity else 1.0
         if callable(self.form):
-            return self.form(*(number / size for number in value))
-        return format(value / size, self.form)
+            return self.form(*(number / unit for number in value))
+        return format(value / unit, self.form)
 
 
 def words(*titles: str) -> list[Column | str]:
@@ -55,11 +98,42 @@ def words(*titles: str) -> list[Column | str]:
     return [Column(title, words=True) for title in titles]
 
 
-def amount(value: float, quantity: str) -> str:
+def per(quantity: str) -> float:
+    """Factor that makes of a value in SI one in the unit that people read."""
+    return 1.0 / size(quantity)
+
+
+def amount(value: float, quantity: str, form: str = ".6g") -> str:
     """A quantity with its unit, in a sentence.
 
     >>> amount(2500.0, "load")
     '2.5 kN'
     """
-    symbol, size = UNITS[quantity]
-    return f"{value / size:g} {symbol}"
+    return f"{value / size(quantity):{form}} {symbol(quantity)}"
+
+
+def spinning(speed: float) -> str:
+    """A shaft speed [Hz] with both its units.
+
+    >>> spinning(22.0)
+    '22 Hz (1320 rpm)'
+    """
+    return f"{speed:.6g} Hz ({60 * speed:.6g} rpm)"
+
+
+def degrees(celsius: float) -> str:
+    """A temperature [degC] in the degrees that people read.
+
+    >>> degrees(40.0)
+    '40 °C'
+    """
+    return f"{celsius:.4g} °C" if symbol("length") != "mil" else f"{1.8 * celsius + 32:.4g} °F"
+
+
+def place_of(load: float, excitation: float) -> str:
+    """Load [N] and excitation [Hz] of an operating point.
+
+    >>> place_of(5000.0, 25.0)
+    '5 kN, 25 Hz'
+    """
+    return f"{amount(load, 'load')}, {excitation:g} Hz"

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.columns import UNITS
 from tpjb_ident.schema import KINDS, POINT_COLUMNS
 
 if TYPE_CHECKING:
@@ -16,9 +17,8 @@ if TYPE_CHECKING:
 
 #: Rows of a table in a notebook.
 _MOST_ROWS = 30
-#: Unit in a column's name: the unit that people read, and its size.
-_DISPLAYED = {**{kind.suffix: (kind.display_unit, kind.display_scale) for kind in KINDS.values()}, "N": ("kN", 1e3),
-              "m": ("µm", 1e-6)}  # fmt: skip
+#: Unit in a column's name: the quantity whose unit people read.
+_DISPLAYED = {**{kind.suffix: kind.quantity for kind in KINDS.values()}, "N": "load", "m": "length"}
 _WITH_UNIT = re.compile(rf"(.+?)_({'|'.join(_DISPLAYED)}|deg|Hz|K)(_lo|_hi|_se|_predicted)?")
 _COEFFICIENT = re.compile(r"[kc](?:xx|xy|yx|yy)_")
 _FOR_PEOPLE = re.compile(
@@ -65,7 +65,7 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
     for name in names:
         match = _WITH_UNIT.fullmatch(name)
         words, unit, end = (match[1], match[2], match[3] or "") if match else (name, "", "")
-        label, scale = _DISPLAYED.get(unit, (unit, 1.0))
+        label, scale = UNITS.get(_DISPLAYED.get(unit, ""), (unit, 1.0))
         values = frame[name]
         if pd.api.types.is_float_dtype(values):
             values = (values / scale).map("{:.4g}".format)

@@ -10,6 +10,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from tpjb_ident.columns import size, symbol
+
 ENTRIES = ("xx", "xy", "yx", "yy")
 
 
@@ -21,9 +23,17 @@ class Coefficient:
     quantity: str
     suffix: str
     unit: str
-    display_unit: str
-    display_scale: float
     meaning: str
+
+    @property
+    def display_unit(self) -> str:
+        """Symbol of the unit that people read."""
+        return symbol(self.quantity)
+
+    @property
+    def display_scale(self) -> float:
+        """Its size in SI."""
+        return size(self.quantity)
 
     def column(self, entry: str) -> str:
         """Name of the column of one entry, ``"xx"`` to ``"yy"``."""
@@ -35,9 +45,9 @@ class Coefficient:
         return tuple(self.column(entry) for entry in ENTRIES)
 
 
-STIFFNESS = Coefficient("k", "stiffness", "N_per_m", "N/m", "MN/m", 1e6, "Re h at the excitation frequency")
-DAMPING = Coefficient("c", "damping", "Ns_per_m", "N s/m", "kN s/m", 1e3, "Im h / omega at the excitation frequency")
-MASS = Coefficient("m", "mass", "kg", "kg", "kg", 1.0, "apparent mass of K - omega^2 M")
+STIFFNESS = Coefficient("k", "stiffness", "N_per_m", "N/m", "Re h at the excitation frequency")
+DAMPING = Coefficient("c", "damping", "Ns_per_m", "N s/m", "Im h / omega at the excitation frequency")
+MASS = Coefficient("m", "mass", "kg", "kg", "apparent mass of K - omega^2 M")
 KINDS = {kind.symbol: kind for kind in (STIFFNESS, DAMPING, MASS)}
 #: Columns of K and C, row by row.
 COEFFICIENT_COLUMNS = (*STIFFNESS.columns, *DAMPING.columns)

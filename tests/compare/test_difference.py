@@ -73,7 +73,7 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
     apart = difference_of(side("a", TRUE), side("b", TRUE, load=6000.0))
     first, *more = difference_sentences(apart)
     assert first == "a and b have no operating point in common."
-    assert more[-1].startswith("Without a partner: a: 5 kN at -90°, 22 Hz shaft speed, 25 Hz; b: 6 kN")
+    assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
 
 
 def test_one_in_twenty_of_many_equal_points_is_no_change():

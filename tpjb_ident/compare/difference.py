@@ -14,6 +14,7 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from tpjb_ident.columns import amount, place_of, size, spinning, symbol
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
@@ -100,7 +101,7 @@ class Difference:
         """Matched points with a flag that forbids trust, in words."""
         rows = self.points.to_dict("records")
         return [
-            f"{side.name}, {row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz: {row[f'quality_{end}']}"
+            f"{side.name}, {place_of(row['static_load_N'], row['excitation_Hz'])}: {row[f'quality_{end}']}"
             for row in rows
             for end, side in (("a", self.a), ("b", self.b))
             if any(flag in ERRORS for flag in str(row.get(f"quality_{end}", "ok")).split("; "))
@@ -150,8 +151,8 @@ def _matched(a: pd.DataFrame, b: pd.DataFrame) -> IntArray:
 def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
     rest = side.coefficients.drop(index=side.coefficients.index[used])
     return tuple(
-        f"{side.name}: {row['static_load_N'] / 1e3:g} kN at {row['static_load_direction_deg']:g}°, "
-        f"{row['shaft_speed_Hz']:g} Hz shaft speed, {row['excitation_Hz']:g} Hz"
+        f"{side.name}: {amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°, "
+        f"shaft at {spinning(row['shaft_speed_Hz'])}, {row['excitation_Hz']:g} Hz"
         for row in rest.to_dict("records")
     )
 
@@ -332,7 +333,7 @@ def _largest_change(points: pd.DataFrame) -> str:
                 continue
             best = abs(share)
             size = f"{shown_difference(row, name, kind.display_scale)} {kind.display_unit}"
-            place = f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
+            place = place_of(row["static_load_N"], row["excitation_Hz"])
             words = f"{name[:3]} at {place}: {percent(share)} of the mean direct coefficient ({size})"
     return words
 
@@ -340,9 +341,9 @@ def _largest_change(points: pd.DataFrame) -> str:
 def _sentences_beside(difference: Difference) -> tuple[str, ...]:
     """Pivots, clearances, what cancels, and points without a partner."""
     sentences = []
-    for words, frame, name, scale, unit in (
-        ("Pivot stiffness", difference.pivots, TANGENT, 1e6, "MN/m"),
-        ("Clearance", difference.clearance, "clearance_m", 1e-6, "µm"),
+    for words, frame, name, quantity in (
+        ("Pivot stiffness", difference.pivots, TANGENT, "stiffness"),
+        ("Clearance", difference.clearance, "clearance_m", "length"),
     ):
         if frame.empty:
             sentences.append(f"{words} is not compared: one of the two has no such tests.")
@@ -351,8 +352,8 @@ def _sentences_beside(difference: Difference) -> tuple[str, ...]:
         parts = []
         for pad, rows in changed.groupby("pad"):
             row = rows.iloc[-1].to_dict()
-            at = f" at {row['force_N'] / 1e3:.2g} kN" if "force_N" in frame else ""
-            parts.append(f"pad #{pad:g} by {shown_difference(row, name, scale)} {unit}{at}")
+            at = f" at {amount(row['force_N'], 'load', '.3g')}" if "force_N" in frame else ""
+            parts.append(f"pad #{pad:g} by {shown_difference(row, name, size(quantity))} {symbol(quantity)}{at}")
         sentences.append(
             f"{words} changed: {'; '.join(parts)}." if parts else f"{words}: no pad changed beyond its interval."
         )

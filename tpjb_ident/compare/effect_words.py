@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from model.effects import EffectKind, EffectWords, Parameter, known_effects
+from tpjb_ident.columns import UNITS
 from tpjb_ident.rounding import fixed, plain, with_interval
 
 
@@ -21,21 +22,23 @@ class Estimate:
     unit: str = "1"
 
 
-#: SI unit: what people read, and its size in SI.
-UNITS = {
-    "m": ("µm", 1e-6),
-    "N/m": ("MN/m", 1e6),
+#: SI unit: the quantity whose unit people read.
+_QUANTITIES = {"m": "length", "N/m": "stiffness", "N s/m": "damping", "Pa": "pressure", "kg": "mass"}
+#: SI unit: what people read in every system, and its size in SI.
+_UNITS = {
     "m/N": ("µm/kN", 1e-9),
-    "N s/m": ("kN s/m", 1e3),
     "N m/rad": ("kN m/rad", 1e3),
     "s": ("ms", 1e-3),
     "rad": ("°", math.radians(1.0)),
     "K": ("K", 1.0),
-    "kg": ("kg", 1.0),
-    "Pa": ("MPa", 1e6),
     "W/m^2/K": ("W/m²/K", 1.0),
     "1": ("%", 0.01),
 }
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """What people read in place of an SI unit, and its size in SI."""
+    return UNITS[_QUANTITIES[unit]] if unit in _QUANTITIES else _UNITS.get(unit, (unit, 1.0))
 
 
 def label_in_words(name: str) -> str:
@@ -46,7 +49,7 @@ def label_in_words(name: str) -> str:
 
 def amount(estimate: Estimate) -> str:
     """A parameter with half its interval in the units that people read."""
-    unit, scale = UNITS.get(estimate.unit, (estimate.unit, 1.0))
+    unit, scale = shown_unit(estimate.unit)
     return f"{with_interval(estimate.value, estimate.lo, estimate.hi, scale)} {unit}".replace(" °", "°")
 
 

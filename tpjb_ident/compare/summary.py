@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.effects import kind_of
+from tpjb_ident.columns import amount, per, size, symbol
 from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
@@ -153,7 +154,7 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
     low, high = min(ratios, key=lambda k: ratios[k]), max(ratios, key=lambda k: ratios[k])
     load = 0.8 * comparison.curves[0].valid_to
     return [
-        f"At {load / 1e3:.1f} kN the measured pivots have {100 * ratios[low]:.0f} % (pad #{low}) to "
+        f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * ratios[low]:.0f} % (pad #{low}) to "
         f"{100 * ratios[high]:.0f} % (pad #{high}) of the stiffness that the printed formula gives."
     ]
 
@@ -167,11 +168,13 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
         return []
     pad = int(np.nanargmax(np.abs(off)))
     if abs(off[pad]) < _AS_DRAWN:
-        return [f"The measured clearance is that of the drawing, within {1e6 * abs(off[pad]):.1g} µm at every pad."]
-    median, worst = signed(1e6 * float(np.nanmedian(off))), signed(1e6 * float(off[pad]))
+        within = amount(abs(off[pad]), "length", ".1g")
+        return [f"The measured clearance is that of the drawing, within {within} at every pad."]
+    digits, unit = (1, symbol("length")) if size("length") < 1e-5 else (3, symbol("length"))
+    median, worst = (signed(per("length") * float(v), digits) for v in (np.nanmedian(off), off[pad]))
     return [
-        f"The measured clearance differs from the drawing by {worst} µm at pad #{pad + 1}, where it differs most "
-        f"(median of all pads {median} µm)."
+        f"The measured clearance differs from the drawing by {worst} {unit} at pad #{pad + 1}, where it differs most "
+        f"(median of all pads {median} {unit})."
     ]
 
 
@@ -181,7 +184,7 @@ def _locus_sentence(comparison: Comparison) -> list[str]:
     if not finite:
         return []
     parts = ", ".join(
-        f"{1e6 * d:.1f} µm with {name.capitalize() if name.startswith('kirk') else name} pivots"
+        f"{amount(d, 'length', '.2g')} with {name.capitalize() if name.startswith('kirk') else name} pivots"
         for name, d in finite.items()
     )
     return [f"The predicted shaft centre locus is off the measured one by (root mean square) {parts}."]

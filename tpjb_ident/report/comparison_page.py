@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.columns import amount, place_of, size, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
@@ -208,7 +209,7 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
             cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
-        label = f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
+        label = place_of(row["static_load_N"], row["excitation_Hz"])
         rows.append([label, VARIANT_LABEL[row["pivots"]], *cells, remark or ""])
     columns = ["point", "pivots"]
     for name in _DIRECT:
@@ -247,7 +248,7 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
     """Tangent stiffness of every pad at two loads beside the printed formula's."""
     columns = ["pad", "law"]
     for load in _PIVOT_LOADS:
-        columns += [f"at {load / 1e3:g} kN, MN/m", "of Kirk's tangent"]
+        columns += [f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}", "of Kirk's tangent"]
     rows = []
     for curve in curves:
         cells = []
@@ -255,21 +256,23 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
             value = float(curve.stiffness(load))
             low, high = (float(v) for v in curve.stiffness_band(load))
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
-            cells.append(with_interval(value, low, high, 1e6) + remark)
+            cells.append(with_interval(value, low, high, size("stiffness")) + remark)
             cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
         rows.append([f"#{curve.pad}", curve.law.name, *cells])
     return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))
 
 
 def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
-    """Clearance per pad beside the drawing's, in µm."""
-    rows = []
+    """Clearance per pad beside the drawing's."""
+    rows, unit = [], size("length")
     for k, drawing in enumerate(drawn):
         value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]
         rows.append([
-            f"#{k + 1}", fixed(1e6 * drawing), with_interval(value, value - half, value + half, 1e-6),
-            signed(1e6 * (value - drawing)),
-            fixed(1e6 * polygon.clearance_pushed[k], 2),
+            f"#{k + 1}", f"{drawing / unit:.4g}", with_interval(value, value - half, value + half, unit),
+            signed((value - drawing) / unit, 1 if unit < 1e-5 else 3),
+            f"{polygon.clearance_pushed[k] / unit:.4g}",
         ])  # fmt: skip
-    columns = ["pad", "drawing, µm", "measured, µm", "difference, µm", f"under {polygon.push_load:.0f} N, µm"]
+    name = symbol("length")
+    under = f"under {amount(polygon.push_load, 'force', '.3g')}, {name}"
+    columns = ["pad", f"drawing, {name}", f"measured, {name}", f"difference, {name}", under]
     return Table("Assembled clearance, cold, 95 %", columns, rows)

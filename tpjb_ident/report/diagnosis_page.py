@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tpjb_ident.compare.effect_words import UNITS, finding, label_in_words, words_of
+from tpjb_ident.compare.effect_words import finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.drawing.residual_frame import residual_frame
@@ -199,6 +199,6 @@ def _left_sentences(verdict: Verdict) -> list[str]:
 def _row(one: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
     values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
-    unit, scale = UNITS.get(one.unit, (one.unit, 1.0))
+    unit, scale = shown_unit(one.unit)
     fitted = ", ".join(signed(v / scale) for v in values)
     return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}"]

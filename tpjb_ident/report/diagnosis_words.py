@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tpjb_ident.compare.effect_words import UNITS, amount, finding, label_in_words, words_of
+from tpjb_ident.columns import size, symbol
+from tpjb_ident.compare.effect_words import amount, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.rounding import MINUS, percent
 
 if TYPE_CHECKING:
@@ -109,7 +110,8 @@ def place(range_text: str) -> str:
     """A range of operating points in words and in kN, Hz and degrees."""
 
     def kilo(match: re.Match[str]) -> str:
-        return f"{' to '.join(f'{float(v) / 1e3:g}' for v in match[1].split('-'))} kN"
+        ends = [f"{float(end) / size('load'):.6g}" for end in match[1].split("-")]
+        return f"{' to '.join(ends)} {symbol('load')}"
 
     text = re.sub(r"((?:\d+(?:\.\d+)?)(?:-\d+(?:\.\d+)?)?) N\b(?!/| s)", kilo, range_text)
     text = text.replace("static_load_direction", "load direction").replace("static_load", "static load")
@@ -127,7 +129,7 @@ def in_words(text: str) -> str:
 
 
 def _read(number: re.Match[str]) -> str:
-    unit, scale = UNITS[number[2]]
+    unit, scale = shown_unit(number[2])
     return f"{float(number[1]) / scale:.4g} {unit}".replace("-", MINUS)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, place_of, size, symbol
 from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
 from tpjb_ident.report.drawing.colours import INK, LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures, shrink
@@ -51,21 +52,28 @@ def _sections(difference: Difference) -> list[Section]:
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
         sections.append(Section("Coefficients", panels=[panel("difference", title, drawing, "")], tables=tables))
     if not difference.pivots.empty:
-        rows = [_row(row, TANGENT, 1e6, f"{row['force_N'] / 1e3:.2f}") for row in difference.pivots.to_dict("records")]
-        columns = ["pad", "load, kN", "first, MN/m", "second, MN/m", "difference", "changed"]
+        rows = [
+            _row(row, TANGENT, "stiffness", f"{row['force_N'] * per('load'):.3g}")
+            for row in difference.pivots.to_dict("records")
+        ]
+        columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
         table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows, frozenset({0, 5}))
         sections.append(Section("Pivots", tables=[table]))
     if not difference.clearance.empty:
-        rows = [_row(row, "clearance_m", 1e-6) for row in difference.clearance.to_dict("records")]
-        columns = ["pad", "first, µm", "second, µm", "difference", "changed"]
+        rows = [_row(row, "clearance_m", "length") for row in difference.clearance.to_dict("records")]
+        columns = ["pad", *_columns("length")]
         table = Table("Assembled clearance at zero push load", columns, rows, frozenset({0, 4}))
         sections.append(Section("Clearance", tables=[table]))
     return sections
 
 
-def _row(row: Mapping[Any, Any], name: str, scale: float, *place: str) -> list[str]:
-    values = [f"{row[f'{name}_{side}'] / scale:.4g}" for side in "ab"]
-    difference = shown_difference(row, name, scale)
+def _columns(quantity: str) -> list[str]:
+    return [f"{side}, {symbol(quantity)}" for side in ("first", "second", "difference")] + ["changed"]
+
+
+def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[str]:
+    values = [f"{row[f'{name}_{side}'] * per(quantity):.4g}" for side in "ab"]
+    difference = shown_difference(row, name, size(quantity))
     return [f"#{row['pad']:g}", *place, *values, difference, row[f"{name.partition('_')[0]}_changed"]]
 
 
@@ -89,7 +97,7 @@ def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
 
 
 def _place(row: Mapping[Any, Any]) -> str:
-    return f"{row['static_load_N'] / 1e3:g} kN, {row['excitation_Hz']:g} Hz"
+    return place_of(row["static_load_N"], row["excitation_Hz"])
 
 
 def _drawn(points: pd.DataFrame) -> Figure:
@@ -98,7 +106,9 @@ def _drawn(points: pd.DataFrame) -> Figure:
     place = np.arange(len(points), dtype=float)
     for axes, kind in ((left, STIFFNESS), (right, DAMPING)):
         label(
-            axes, "operating point: load in kN, excitation in Hz", f"difference of {kind.quantity}, {kind.display_unit}"
+            axes,
+            f"operating point: load in {symbol('load')}, excitation in Hz",
+            f"difference of {kind.quantity}, {kind.display_unit}",
         )
         axes.axhline(0.0, color=INK, linewidth=1.0)
         for k, (entry, colour, marker) in enumerate(_MARKS):
@@ -109,7 +119,9 @@ def _drawn(points: pd.DataFrame) -> Figure:
             axes.plot(x, value, marker, color=LIGHT[colour], markerfacecolor=LIGHT["paper"], markersize=5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
             axes.plot(x[changed], value[changed], marker, color=LIGHT[colour], markersize=5)
-        texts = [f"{row['static_load_N'] / 1e3:g}\n{row['excitation_Hz']:g}" for row in points.to_dict("records")]
+        texts = [
+            f"{row['static_load_N'] * per('load'):.4g}\n{row['excitation_Hz']:g}" for row in points.to_dict("records")
+        ]
         axes.set_xticks(place, texts)
         shrink(axes, bottom=_SECOND_LINE)
     add_legend(left, across=True)

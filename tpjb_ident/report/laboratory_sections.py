@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.problem import RigDataError
+from tpjb_ident.columns import UNITS, amount, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
@@ -30,13 +31,11 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.dynamic.results.identification import Identification
 
-#: SI unit of a calibrated quantity, what people read, and its size in SI.
+#: Calibrated quantities whose unit changes with the system, and those that people read in one unit everywhere.
+_SHOWN = {"displacement": "length", "force": "force", "pressure": "pressure"}
 _SENSITIVITY = {
-    "displacement": ("µm", 1e-6),
-    "force": ("N", 1.0),
     "acceleration": ("m/s²", 1.0),
     "temperature": ("K", 1.0),
-    "pressure": ("MPa", 1e6),
     "speed": ("rad/s", 1.0),
 }
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
@@ -63,9 +62,10 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     """Channels with their calibration."""
     rows = []
     for channel in channels:
-        if channel.quantity not in _SENSITIVITY:
+        if channel.quantity not in (*_SENSITIVITY, *_SHOWN):
             continue
-        unit, scale = _SENSITIVITY[channel.quantity]
+        shown = _SHOWN.get(channel.quantity)
+        unit, scale = UNITS[shown] if shown else _SENSITIVITY[channel.quantity]
         axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
         place = axis if channel.pad is None else f"pad #{channel.pad}"
         uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
@@ -87,15 +87,15 @@ def _bearing_table(comparison: Comparison) -> Table:
     bearing = comparison.bearing
     pad, oil = bearing.pads[0], bearing.oil
     rows = [
-        ["journal diameter", f"{1e3 * bearing.journal_diameter:.5g} mm"],
-        ["pad length", f"{1e3 * bearing.length:.4g} mm"],
+        ["journal diameter", amount(bearing.journal_diameter, "size")],
+        ["pad length", amount(bearing.length, "size", ".4g")],
         ["pads", f"{len(bearing.pads)}, {math.degrees(pad.arc):.3g}° of arc, pivots at "
                  + ", ".join(f"{math.degrees(p.pivot_angle):g}°" for p in bearing.pads)],
-        ["assembled clearance (radial)", f"{1e6 * pad.assembled_clearance:.4g} µm"],
-        ["pad clearance (radial)", f"{1e6 * pad.pad_clearance:.4g} µm, preload {pad.preload:.3g}"],
+        ["assembled clearance (radial)", amount(pad.assembled_clearance, "length", ".4g")],
+        ["pad clearance (radial)", f"{amount(pad.pad_clearance, 'length', '.4g')}, preload {pad.preload:.3g}"],
         ["pivots", bearing.pivot.kind],
-        ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at 40 °C, supplied at "
-                f"{oil.supply_temperature:g} °C"],
+        ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at {degrees(40.0)}, "
+                f"supplied at {degrees(oil.supply_temperature)}"],
         ["oil, at 40 °C", f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
     ]  # fmt: skip
     return Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))
@@ -108,12 +108,21 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         p = run.point
         several = run.kind in {"locus", "dry_pivot"}
         key = (
-            _KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load / 1e3:g}" if p.static_load else "–",
-            "several" if several else f"{p.static_load_direction_deg:g}", f"{p.shaft_speed_hz:g}",
+            _KINDS_IN_WORDS.get(run.kind, run.kind), f"{p.static_load * per('load'):.6g}" if p.static_load else "–",
+            "several" if several else f"{p.static_load_direction_deg:g}",
+            f"{p.shaft_speed_hz:g} ({60 * p.shaft_speed_hz:.6g})",
             f"{p.excitation_hz:g}" if p.excitation else "–", f"{run.sample_rate:g}",
         )  # fmt: skip
         counted[key] = counted.get(key, 0) + 1
-    columns = ["kind", "load, kN", "load direction, °", "shaft speed, Hz", "excitation, Hz", "rate, Hz", "runs"]
+    columns = [
+        "kind",
+        f"load, {symbol('load')}",
+        "load direction, °",
+        "shaft speed, Hz (rpm)",
+        "excitation, Hz",
+        "rate, Hz",
+        "runs",
+    ]
     return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()], frozenset({0}))
 
 
@@ -160,8 +169,8 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         panels.append(panel("h-over-frequency", title, functools.partial(frf, result), _EVIDENCE))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
-        title = (f"Dynamic stiffness h over the band, {key['static_load_N'] / 1e3:g} kN, "
-                 f"{key['shaft_speed_Hz']:g} Hz shaft speed, {key['excitation']}")  # fmt: skip
+        title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
+                 f"shaft at {spinning(key['shaft_speed_Hz'])}, {key['excitation']}")  # fmt: skip
         panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), _EVIDENCE))
     return panels
 
@@ -175,8 +184,8 @@ def budget_table(result: Identification) -> Table:
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
         for entry, name in enumerate(ENTRIES):
             row = [point_label(p), name]
-            for kind, i, per in ((STIFFNESS, entry, 1.0), (DAMPING, 4 + entry, 1 / p.stiffness.omega)):
-                scale = per / kind.display_scale
+            for kind, i, factor in ((STIFFNESS, entry, 1.0), (DAMPING, 4 + entry, 1 / p.stiffness.omega)):
+                scale = factor / kind.display_scale
                 value = float(p.stiffness.vector[i])
                 row.append(with_interval(value, value - half[i], value + half[i], 1 / scale))
                 row += [fixed(scale * float(deviations[n][i]), 3) if n in deviations else "–" for n in sources]

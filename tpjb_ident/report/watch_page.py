@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from tpjb_ident.columns import amount, per, size, spinning, symbol
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
@@ -69,7 +70,9 @@ def _group(status: RunStatus) -> str:
     run, p = status.run, status.run.point
     if run.kind != "dynamic":
         return _KINDS[run.kind]
-    set_point = f"{p.static_load / 1e3:g} kN, {p.static_load_direction_deg:g} deg, shaft {p.shaft_speed_hz:g} Hz"
+    set_point = (
+        f"{amount(p.static_load, 'load')}, {p.static_load_direction_deg:g} deg, shaft {spinning(p.shaft_speed_hz)}"
+    )
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
@@ -83,13 +86,17 @@ def _sections(snapshot: Snapshot) -> list[Section]:
         panels = _panels(snapshot)
         sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
     if measured.curves:
-        rows = [[f"#{c.pad}", f"{c.valid_to / 1e3:.2f}", _pivot(c)] for c in measured.curves]
-        table = Table("Tangent stiffness of the pivots at the highest load", ["pad", "load, kN", "MN/m"], rows)
+        rows = [[f"#{c.pad}", f"{c.valid_to * per('load'):.3g}", _pivot(c)] for c in measured.curves]
+        table = Table(
+            "Tangent stiffness of the pivots at the highest load",
+            ["pad", f"load, {symbol('load')}", symbol("stiffness")],
+            rows,
+        )
         sections.append(Section("Pivots so far", tables=[table]))
     if measured.polygon is not None:
-        c, se = 1e6 * measured.polygon.clearance, 1e6 * measured.polygon.clearance_se
+        c, se = (per("length") * part for part in (measured.polygon.clearance, measured.polygon.clearance_se))
         rows = [[f"#{i + 1}", with_interval(c[i], c[i] - 1.96 * se[i], c[i] + 1.96 * se[i])] for i in range(len(c))]
-        table = Table("Assembled clearance by pad, from the sweep", ["pad", "\N{MICRO SIGN}m"], rows)
+        table = Table("Assembled clearance by pad, from the sweep", ["pad", symbol("length")], rows)
         sections.append(Section("Clearance", tables=[table]))
     sections.append(Section("Records", tables=[_records_table(snapshot)]))
     waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
@@ -103,7 +110,7 @@ def _sections(snapshot: Snapshot) -> list[Section]:
 def _pivot(curve: object) -> str:
     load = curve.valid_to  # type: ignore[attr-defined]
     low, high = (float(v) for v in curve.stiffness_band(load))  # type: ignore[attr-defined]
-    return with_interval(float(curve.stiffness(load)), low, high, 1e6)  # type: ignore[attr-defined]
+    return with_interval(float(curve.stiffness(load)), low, high, size("stiffness"))  # type: ignore[attr-defined]
 
 
 def _panels(snapshot: Snapshot) -> list[Panel]:
@@ -128,14 +135,17 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
     rows = []
     for p in points:
         half, omega = p.stiffness.half_width(), p.stiffness.omega
+        k, c = size("stiffness"), size("damping")
         cells, why = [], lacking(p)
-        for i, scale in ((0, 1e6), (3, 1e6), (4, 1e3 * omega), (7, 1e3 * omega)):
+        for i, scale in ((0, k), (3, k), (4, c * omega), (7, c * omega)):
             value = p.stiffness.vector[i]
             cells.append("–" if why else with_interval(value, value - half[i], value + half[i], scale))
         flags = why or ", ".join(q.sentence() for q in p.quality)
-        place = [f"{p.point.static_load / 1e3:g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
+        place = [f"{p.point.static_load * per('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
         rows.append([*place, *cells, flags])
-    columns = ["load, kN", "excitation, Hz", "records", "kxx, MN/m", "kyy, MN/m", "cxx, kN s/m", "cyy, kN s/m", "flags"]
+    k, c = symbol("stiffness"), symbol("damping")
+    direct = [f"kxx, {k}", f"kyy, {k}", f"cxx, {c}", f"cyy, {c}"]
+    columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]
     return Table("Direct coefficients so far, 95 % intervals", columns, rows, frozenset({7}))
 
 

@@ -106,8 +106,11 @@ def _show(c: Command, static: StaticTests, bearing: Bearing, name: str, refused:
         for k, pad in enumerate(bearing.pads):
             measured = (polygon.clearance[k], 1.96 * polygon.clearance_se[k], polygon.clearance_pushed[k])
             rows.append([f"#{k + 1}", pad.assembled_clearance, *measured])
-        columns = [*words("pad"), Column("drawing", ".1f", quantity="length")]
-        columns += [Column(title, ".2f", quantity="length") for title in ("measured", "± (95 %)", "pushed")]
+        columns = [*words("pad"), Column("drawing", ".4g", quantity="length")]
+        columns += [
+            Column(title, form, quantity="length")
+            for title, form in (("measured", ".4g"), ("± (95 %)", ".2g"), ("pushed", ".4g"))
+        ]
         c.show(f"{name}: clearance, {UNITS['length'][0]}", columns, rows)
     printed: tuple[str, ...] = ()
     if static.locus is not None:

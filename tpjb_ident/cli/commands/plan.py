@@ -89,11 +89,11 @@ def _data_sets(c: Command, setup: Setup, tests: Layout) -> dict[str, CampaignPla
 
 def _detected_from(size: float, parameter: Parameter) -> str:
     """The size from which an effect is seen; a factor as its distance from one."""
-    from tpjb_ident.compare.effect_words import UNITS
+    from tpjb_ident.compare.effect_words import shown_unit
 
     if math.isnan(size):
         return "never"
-    unit, scale = UNITS.get(parameter.unit, (parameter.unit, 1.0))
+    unit, scale = shown_unit(parameter.unit)
     if unit == "%" and parameter.neutral == 1.0:
         return f"{signed(100 * (size - 1.0))} %"
     return f"{float(f'{size / scale:.3g}'):g} {unit}".replace(" °", "°")

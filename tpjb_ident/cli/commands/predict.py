@@ -60,13 +60,13 @@ MOST_ROWS = 20
 COLUMNS: dict[str, Column | str] = {
     "static_load_N": Column("load {load}", words=True),
     "static_load_direction_deg": "dir {angle}",
-    "shaft_speed_Hz": "speed {frequency}",
+    "shaft_speed_Hz": "speed {speed}",
     "excitation_Hz": "exc. {frequency}",
     "kxx_N_per_m": Column("kxx {stiffness}", ".1f"),
     "kyy_N_per_m": Column("kyy {stiffness}", ".1f"),
     "cxx_Ns_per_m": Column("cxx {damping}", ".1f"),
     "cyy_Ns_per_m": Column("cyy {damping}", ".1f"),
-    "min_film_m": Column("h_min {length}", ".1f"),
+    "min_film_m": Column("h_min {length}", ".3g"),
 }
 
 

@@ -11,7 +11,7 @@ import typer
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.options import BearingOption
 from tpjb_ident.cli.common.quantities import parse_amount
-from tpjb_ident.columns import Column
+from tpjb_ident.columns import Column, place_of
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 
@@ -190,7 +190,7 @@ def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> st
     from tpjb_ident.watch.next_steps import lacking
 
     records = counted(point.n_records, "record")
-    line += f"; {point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz, {records}: "
+    line += f"; {place_of(point.point.static_load, point.point.excitation_hz)}, {records}: "
     if reason := lacking(point):
         return line + reason
     half, v = point.stiffness.half_width(), point.stiffness.vector

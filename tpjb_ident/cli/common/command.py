@@ -27,11 +27,12 @@ import typer
 
 from rigdata.problem import RigError
 from tpjb_ident.cli.common.terminal import Terminal
+from tpjb_ident.columns import SYSTEMS, UNITS, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.documents import TABLE_SCHEMA
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import sha256, versions
-from tpjb_ident.runtime.tables import write_table, write_text
+from tpjb_ident.runtime.tables import safe_for_spreadsheets, write_table, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -140,6 +141,10 @@ class Command(Terminal):
     def table(self, name: str, frame: pd.DataFrame) -> None:
         """Write a table of the results as CSV and Parquet."""
         write_table(self.folder, name, frame)
+        if SYSTEMS["us"] == UNITS:
+            from tpjb_ident.us_table import us_table
+
+            write_text(self.folder / f"{name}_us.csv", safe_for_spreadsheets(us_table(frame)).to_csv(index=False))
 
     def json(self, name: str, document: Mapping[str, Any]) -> None:
         """Write a JSON file of the results."""
@@ -154,6 +159,7 @@ class Command(Terminal):
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = self._show_warning  # type: ignore[assignment]
+                use_units(self.options.get("units", "si"))
                 function(self, **options)
         except NotTrustedError as error:
             self.error("not to be trusted", str(error))
@@ -171,6 +177,8 @@ class Command(Terminal):
                 return _BUG
             self.error("error", message)
             return _BAD_INPUT
+        finally:
+            use_units("si")
         return 0
 
     def _show_warning(
@@ -219,12 +227,16 @@ def command(
             "as_json": Annotated[
                 bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")
             ],
+            "units": Annotated[str, typer.Option("--units", help="Units of what is printed and drawn: si or us.")],
             "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")],
         }
 
         @functools.wraps(function)
-        def run(out: Path | None = None, as_json: bool = False, quiet: bool = False, **options: Any) -> None:
+        def run(
+            out: Path | None = None, as_json: bool = False, units: str = "si", quiet: bool = False, **options: Any
+        ) -> None:
             recorded = {key: options[key] for key in own if key not in _UNRECORDED}
+            recorded |= {"units": units} if units != "si" else {}
             c = Command(name, recorded, out, as_json, quiet)
             exit_code = c.run(function, options)
             if as_json:

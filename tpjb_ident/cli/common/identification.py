@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command
 from tpjb_ident.cli.common.options import refuse_unknown
-from tpjb_ident.columns import UNITS, Column, amount, words
+from tpjb_ident.columns import UNITS, Column, amount, size, symbol, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
@@ -35,7 +35,7 @@ def with_half(value: float, half: float) -> str:
 
 
 _LOAD = Column("load {load}")
-_POINT: tuple[Column | str, ...] = (_LOAD, "dir. {angle}", "speed {frequency}", "exc. {frequency}")
+_POINT: tuple[Column | str, ...] = (_LOAD, "dir. {angle}", "speed {speed}", "exc. {frequency}")
 #: Entries of (kxx, kxy, kyx, kyy, cxx, .. cyy).
 _DIRECT, _CROSS = (0, 3, 4, 7), (1, 2, 5, 6)
 _COEFFICIENTS = [
@@ -188,7 +188,7 @@ def _show_frequency_fits(c: Command, result: Identification) -> None:
     for group in result.frequency_fits():
         load = group.points[0].point.static_load
         if group.supported not in group.fits:
-            rejecting.append(f"{load / 1e3:g}")
+            rejecting.append(f"{load / size('load'):.6g}")
         for name, fit in group.fits.items():
             verdict = _verdict(name == group.supported, fit.refused)
             rows.append([load, name, fit.chi_square, fit.dof, fit.probability, fit.misfit, verdict])
@@ -199,8 +199,8 @@ def _show_frequency_fits(c: Command, result: Identification) -> None:
     if rejecting:
         more = f" and {len(rejecting) - 6} more loads" if len(rejecting) > 6 else ""
         c.print(
-            f"note: at {', '.join(rejecting[:6])} kN{more} the data refuse K-C and K-C-M; use the coefficients of each "
-            "excitation frequency"
+            f"note: at {', '.join(rejecting[:6])} {symbol('load')}{more} the data refuse K-C and K-C-M; use the "
+            "coefficients of each excitation frequency"
         )
 
 
@@ -221,7 +221,7 @@ def _show_bands(c: Command, result: Identification) -> None:
             cells = [pairs[i] for i in (*_DIRECT, 8, 11)]
             models.append([load, name, *cells, _verdict(name == band.supported, model.refused)])
         if band.models and band.supported == "raw H":
-            rejecting.append(f"{load / 1e3:g}")
+            rejecting.append(f"{load / size('load'):.6g}")
         half = band.half_width()
         step = max(1, (len(band.lines) - 1) // (_MOST_LINES - 1))
         for k in range(0, len(band.lines), step)[:_MOST_LINES]:
@@ -239,5 +239,6 @@ def _show_bands(c: Command, result: Identification) -> None:
         c.show(f"dynamic stiffness over the band, {UNITS['stiffness'][0]}", columns, lines, file="frf.csv")
     if rejecting:
         c.print(
-            f"note: at {', '.join(rejecting[:6])} kN the lines refuse K-C and K-C-M; use h over frequency (frf.csv)"
+            f"note: at {', '.join(rejecting[:6])} {symbol('load')} the lines refuse K-C and K-C-M; "
+            "use h over frequency (frf.csv)"
         )

@@ -118,7 +118,7 @@ _HEADINGS = {
     "Tests": "plan locus dry push temperatures repeats noise fault",
     "Options": "",
     "Running": "workers scheduler seed",
-    "Output": "name layout plain keep_r window data_sets out as_json quiet help",
+    "Output": "name layout plain keep_r window data_sets out as_json units quiet help",
 }
 
 

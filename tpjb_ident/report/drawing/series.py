@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.columns import amount, place_of, size, spinning, symbol
 from tpjb_ident.schema import STATIC_COLUMNS
 
 if TYPE_CHECKING:
@@ -15,12 +16,19 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
-AXES = {
-    "load": ("static_load_N", 1e3, "static load, kN"),
-    "frequency": ("excitation_Hz", 1.0, "excitation frequency, Hz"),
+#: Column that a series runs over, its quantity and its name.
+_AXES = {
+    "load": ("static_load_N", "load", "static load"),
+    "frequency": ("excitation_Hz", "frequency", "excitation frequency"),
 }
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
+
+
+def axis_of(over: str) -> tuple[str, float, str]:
+    """Column that a series runs over, the size of its unit and its label."""
+    column, quantity, name = _AXES[over]
+    return column, size(quantity), f"{name}, {symbol(quantity)}"
 
 
 def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
@@ -32,7 +40,7 @@ def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
 
 def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
     """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies."""
-    column = AXES[axis][0]
+    column = _AXES[axis][0]
     fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_COLUMNS[1:]]
     best, length = None, 1
     for _, group in table.groupby(fixed, sort=True):
@@ -44,13 +52,13 @@ def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
 def constant_along(series: pd.DataFrame, axis: str) -> str:
     """What is constant along a series, in words."""
     first = series.iloc[0]
-    fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else f"{first.static_load_N / 1e3:g} kN"
-    return f"{fixed}, {first.shaft_speed_Hz:g} Hz shaft speed"
+    fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else amount(first.static_load_N, "load")
+    return f"{fixed}, shaft at {spinning(first.shaft_speed_Hz)}"
 
 
 def point_label(p: PointResult) -> str:
     """Load and excitation of a point, in words."""
-    return f"{p.point.static_load / 1e3:g} kN, {p.point.excitation_hz:g} Hz"
+    return place_of(p.point.static_load, p.point.excitation_hz)
 
 
 def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:

@@ -12,6 +12,7 @@ from matplotlib.patches import Ellipse
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
 
@@ -60,9 +61,9 @@ def clearance_and_locus(
     named = {} if polygons is None else polygons if isinstance(polygons, Mapping) else {"measured": polygons}
     if not named and locus is None and not predicted and drawing is None:
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
-    figure, axes = new_picture("x, µm", "y, µm", title=title, width=5.2, height=5.4)
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=5.2, height=5.4)
     if drawing is not None:
-        axes.plot(*(1e6 * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
+        axes.plot(*(per("length") * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
                   linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip
     for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
         _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
@@ -70,8 +71,8 @@ def clearance_and_locus(
         _draw_numbers(axes, next(iter(named.values())))
     for name, places in (predicted or {}).items():
         colour, dashes, _ = VARIANT_STYLE.get(name, ("green", (0, (4, 1, 1, 1)), ""))
-        axes.plot(*(1e6 * _closed(np.asarray(places))).T, color=LIGHT[colour], linestyle=dashes, linewidth=1.5,
-                  label=VARIANT_LABEL.get(name, name))  # fmt: skip
+        axes.plot(*(per("length") * _closed(np.asarray(places))).T, color=LIGHT[colour],
+                  linestyle=dashes, linewidth=1.5, label=VARIANT_LABEL.get(name, name))  # fmt: skip
     if locus is not None:
         _draw_locus(axes, locus)
     axes.set_aspect("equal", adjustable="datalim")
@@ -84,9 +85,9 @@ def _draw_polygon(axes: Axes, name: str, polygon: ClearancePolygon, colour: str,
     if not np.isfinite(polygon.corners).all():
         return
     text = "clearance, measured" if name == "measured" else f"clearance, {name}"
-    axes.plot(*(1e6 * _closed(polygon.corners)).T, color=colour, linestyle=dashes, linewidth=1.5, label=text)
+    axes.plot(*(per("length") * _closed(polygon.corners)).T, color=colour, linestyle=dashes, linewidth=1.5, label=text)
     pushed = _closed(corners(polygon.fitted_angle, polygon.clearance_pushed))
-    axes.plot(*(1e6 * pushed).T, color=colour, linestyle=dashes, linewidth=0.6)
+    axes.plot(*(per("length") * pushed).T, color=colour, linestyle=dashes, linewidth=0.6)
 
 
 def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
@@ -95,8 +96,8 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
         if np.isfinite(clearance):
             toward = np.array([np.cos(angle), np.sin(angle)])
             axes.annotate(
-                f"#{k}", tuple(1e6 * clearance * toward), xytext=tuple(-10.0 * toward), textcoords="offset points",
-                ha="center", va="center", fontsize=FONT_SIZE - 1, color=INK,
+                f"#{k}", tuple(per("length") * clearance * toward), xytext=tuple(-10.0 * toward),
+                textcoords="offset points", ha="center", va="center", fontsize=FONT_SIZE - 1, color=INK,
             )  # fmt: skip
 
 
@@ -108,12 +109,13 @@ def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
         for point in locus.points:
             size, turn = np.linalg.eigh(point.covariance)
             axes.add_patch(Ellipse(
-                tuple(1e6 * point.position), *(2e6 * _TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
+                tuple(per("length") * point.position),
+                *(2.0 * per("length") * _TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
                 angle=float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))), color=INK, alpha=0.25,
                 linewidth=0,
             ))  # fmt: skip
     if len(places):
-        axes.plot(*(1e6 * places).T, linestyle="none", marker="o", markersize=4.0, color=INK,
+        axes.plot(*(per("length") * places).T, linestyle="none", marker="o", markersize=4.0, color=INK,
                   label="locus, measured")  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.drawing.series import AXES, DIRECT, longest_series, with_errors
+from tpjb_ident.report.drawing.series import DIRECT, axis_of, longest_series, with_errors
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def coefficient(
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
     kind = KINDS[name[0]]
     scale, key = kind.display_scale, coefficient_column(name)
-    column, axis_scale, axis_label = AXES[over]
+    column, axis_scale, axis_label = axis_of(over)
     figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
     for variant in dict.fromkeys(series["pivots"]):
         rows = series[series["pivots"] == variant].sort_values(column)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import INK, LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
 from tpjb_ident.report.drawing.series import as_table
@@ -42,7 +43,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     unexplained = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
     width = max(5.2, 0.36 * len(rows) + 1.2)
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=3.4)
-    label(axes, "static load, kN, and excitation, Hz", "1 - coherence")
+    label(axes, f"static load, {symbol('load')}, and excitation, Hz", "1 - coherence")
     shrink(axes, bottom=0.25)
     low = unexplained > 1.0 - _FLAGGED
     at = np.arange(len(rows))
@@ -54,7 +55,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
     axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
-    ticks = [f"{w / 1e3:g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
+    ticks = [f"{w * per('load'):.4g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
     axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.5)
     axes.grid(axis="x", visible=False)
     add_legend(axes)

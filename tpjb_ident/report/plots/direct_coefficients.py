@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.drawing.series import AXES, as_table, longest_series, with_errors
+from tpjb_ident.report.drawing.series import as_table, axis_of, longest_series, with_errors
 from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def direct_coefficients(
         When no bearing was measured at two loads or frequencies.
     """
     kind = KINDS[part]
-    column, axis_scale, axis_label = AXES[over]
+    column, axis_scale, axis_label = axis_of(over)
     figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
     drawn = False
     for (name, source), colour in zip(bearings.items(), _BEARING_COLOURS * len(bearings), strict=False):

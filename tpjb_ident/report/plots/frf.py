@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import longest_series, with_errors
@@ -68,8 +69,8 @@ def frf(
     if over_band and table[[*STATIC_COLUMNS, "excitation"]].nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
-    for axes, part, name in ((real, "real", "Re h, MN/m"), (imag, "imag", "Im h, MN/m")):
-        label(axes, "frequency, Hz", name)
+    for axes, part, name in ((real, "real", "Re h"), (imag, "imag", "Im h")):
+        label(axes, "frequency, Hz", f"{name}, {symbol('stiffness')}")
         for entry in entries:
             _draw_measured(axes, table, f"h{entry}_{part}_N_per_m", entry)
             _draw_model(axes, model, entry, part, label=entry == entries[0])
@@ -151,5 +152,5 @@ def _draw_model(axes: Axes, model: _FittedModel | None, entry: str, part: str, l
     f = np.linspace(*model.band, 200)
     i, j = ("xy".index(letter) for letter in entry)
     h = model.h(2 * np.pi * f)[:, i, j]
-    values = (h.real if part == "real" else h.imag) / 1e6
+    values = (h.real if part == "real" else h.imag) * per("stiffness")
     axes.plot(f, values, color=LIGHT[_FRF_STYLE[entry][0]], linewidth=1.4, label=model.name if label else None)

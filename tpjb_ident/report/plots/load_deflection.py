@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import INK, PAPER, style_of_pad
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 
@@ -44,7 +45,9 @@ def load_deflection(
     chosen = list(curves) if isinstance(curves, Sequence) else [curves]
     if not chosen:
         raise ValueError("curves must hold at least one PivotCurve")
-    figure, axes = new_picture("radial deflection, µm", "load on the pad, kN", title=title)
+    figure, axes = new_picture(
+        f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}", title=title
+    )
     for curve in chosen:
         _draw_law(axes, curve, up_to or curve.valid_to, level)
         _draw_steps(axes, curve)
@@ -58,19 +61,20 @@ def load_deflection(
 def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
     colour, _, marker = style_of_pad(curve.pad)
     steps = curve.steps
+    deflection, load = per("length") * steps.deflection, per("load") * steps.load
     for mask, face, name in (
         ((steps.weight > 0) & (steps.branch > 0), colour, f"pad #{curve.pad}, {curve.law.name}"),
         ((steps.weight > 0) & (steps.branch < 0), PAPER, f"pad #{curve.pad}, unloading"),
     ):
         if mask.any():
             axes.errorbar(
-                1e6 * steps.deflection[mask], steps.load[mask] / 1e3, xerr=1.96e6 * steps.deflection_se[mask],
+                deflection[mask], load[mask], xerr=1.96 * per("length") * steps.deflection_se[mask],
                 fmt=marker, color=colour, markerfacecolor=face, markersize=4.5, linewidth=0.9, capsize=0, label=name,
                 zorder=4,
             )  # fmt: skip
     bad = steps.weight == 0
     if bad.any():
-        axes.plot(1e6 * steps.deflection[bad], steps.load[bad] / 1e3, linestyle="none", marker="x", markersize=6,
+        axes.plot(deflection[bad], load[bad], linestyle="none", marker="x", markersize=6,
                   color=INK, label="step left out", zorder=5)  # fmt: skip
 
 
@@ -78,12 +82,12 @@ def _draw_law(axes: Axes, curve: PivotCurve, top: float, level: float) -> None:
     """The law, its band, and the way into contact."""
     colour, _, _ = style_of_pad(curve.pad)
     load = np.linspace(0.0, top, _LAW_POINTS)[1:]
-    reading, low, high = (1e6 * part for part in curve.reading_band(load, level))
+    reading, low, high = (per("length") * part for part in curve.reading_band(load, level))
     measured = ~curve.is_extrapolated(load)
-    axes.fill_betweenx(load / 1e3, low, high, color=colour, alpha=0.25, linewidth=0)
-    deflection = 1e6 * curve.deflection(load)
-    axes.plot(deflection, load / 1e3, color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
-    axes.plot(np.where(measured, deflection, np.nan), load / 1e3, color=colour, linewidth=1.5)
+    axes.fill_betweenx(load * per("load"), low, high, color=colour, alpha=0.25, linewidth=0)
+    deflection = per("length") * curve.deflection(load)
+    axes.plot(deflection, load * per("load"), color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
+    axes.plot(np.where(measured, deflection, np.nan), load * per("load"), color=colour, linewidth=1.5)
     if curve.law.contact:
         coming = load <= max(curve.onset_load, load[0])
-        axes.plot(reading[coming], load[coming] / 1e3, color=colour, linewidth=0.7)
+        axes.plot(reading[coming], load[coming] * per("load"), color=colour, linewidth=0.7)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import BLUE, GREY
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 
@@ -36,8 +37,8 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
     good = np.isfinite(path).all(axis=1)
     if good.sum() < 2:
         raise ValueError(f"run {run.id} has no displacements to draw")
-    path = 1e6 * (path - np.median(path[good], axis=0))
-    figure, axes = new_picture("x, µm", "y, µm", title=title, width=4.6, height=4.6)
+    path = per("length") * (path - np.median(path[good], axis=0))
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.6)
     shown = path[:_MOST_SAMPLES]
     axes.plot(shown[:, 0], shown[:, 1], color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import GREY, INK, style_of_pad
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures
 
@@ -43,12 +44,12 @@ def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) ->
     for curve in curves:
         steps = curve.steps
         used = steps.weight > 0
-        load, across_load = steps.load[used] / 1e3, steps.across_load[used] / 1e3
-        move, across = 1e6 * steps.deflection[used], 1e6 * steps.across_deflection[used]
+        load, across_load = steps.load[used] * per("load"), steps.across_load[used] * per("load")
+        move, across = per("length") * steps.deflection[used], per("length") * steps.across_deflection[used]
         _draw_vectors(forces, curve, load, across_load, curve.load_direction.angle)
         _draw_vectors(places, curve, move, across, curve.displacement_direction.angle)
-    label(forces, "horizontal load, kN", "vertical load, kN", "static load")
-    label(places, "x, µm", "y, µm", "displacement, shaft against housing")
+    label(forces, f"horizontal load, {symbol('load')}", f"vertical load, {symbol('load')}", "static load")
+    label(places, f"x, {symbol('length')}", f"y, {symbol('length')}", "displacement, shaft against housing")
     for axes in (forces, places):
         reach = 1.45 * max(float(np.max(np.abs(line.get_xydata()))) for line in axes.get_lines()) / 1.12
         axes.set_xlim(-reach, reach)

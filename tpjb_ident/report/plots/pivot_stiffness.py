@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import INK, style_of_pad
 from tpjb_ident.report.drawing.picture import add_legend, mark_extrapolated, new_picture
 
@@ -58,30 +59,32 @@ def pivot_stiffness(
     top = max(curve.valid_to for curve in curves)
     grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
     kind = "secant" if secant else "tangent"
-    figure, axes = new_picture("load on the pad, kN", f"{kind} stiffness, MN/m", title=title)
+    figure, axes = new_picture(
+        f"load on the pad, {symbol('load')}", f"{kind} stiffness, {symbol('stiffness')}", title=title
+    )
     for curve in curves:
         _draw_stiffness(axes, curve, grid, secant, level)
     if formula is not None:
-        printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) / 1e6
-        axes.plot(grid / 1e3, printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
-        axes.plot(grid / 1e3, printed[:, 0], color=INK, linewidth=1.3, linestyle=(0, (5, 2)),
+        printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
+        axes.plot(grid * per("load"), printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
+        axes.plot(grid * per("load"), printed[:, 0], color=INK, linewidth=1.3, linestyle=(0, (5, 2)),
                   label="Kirk, printed")  # fmt: skip
     axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, float(grid[-1]) / 1e3)
-    mark_extrapolated(axes, top / 1e3)
+    axes.set_xlim(0.0, float(grid[-1]) * per("load"))
+    mark_extrapolated(axes, top * per("load"))
     add_legend(axes)
     return figure
 
 
 def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray, secant: bool, level: float) -> None:
     colour, dashes, _ = style_of_pad(curve.pad)
-    value = (curve.secant(grid) if secant else curve.stiffness(grid)) / 1e6
+    value = (curve.secant(grid) if secant else curve.stiffness(grid)) * per("stiffness")
     band = curve.secant_band(grid, level) if secant else curve.stiffness_band(grid, level)
     outside = curve.is_extrapolated(grid)
-    low, high = (np.where(outside, np.nan, b / 1e6) for b in band)
-    axes.fill_between(grid / 1e3, low, high, color=colour, alpha=0.2, linewidth=0)
-    axes.plot(grid / 1e3, np.where(outside, np.nan, value), color=colour, linestyle=dashes, linewidth=1.7,
+    low, high = (np.where(outside, np.nan, b * per("stiffness")) for b in band)
+    axes.fill_between(grid * per("load"), low, high, color=colour, alpha=0.2, linewidth=0)
+    axes.plot(grid * per("load"), np.where(outside, np.nan, value), color=colour, linestyle=dashes, linewidth=1.7,
               label=f"pad #{curve.pad}")  # fmt: skip
     # one point of overlap, so that the two lines meet
     extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
-    axes.plot(grid / 1e3, extrapolated, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)
+    axes.plot(grid * per("load"), extrapolated, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import DIVERGING, INK, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import (
     FONT_SIZE,
@@ -70,17 +71,17 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: list[tuple[float, float]]
     for entry, load, frequency, z in frame[["entry", "static_load_N", "excitation_Hz", "z"]].to_numpy():
         table[_ENTRIES.index(entry), column[load, frequency]] = z
     size = float(np.sqrt(np.nanmean(table**2)))
-    label(axes, "static load, kN, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
+    label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
     shrink(axes, bottom=0.25)
     image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
     axes.grid(False)
     axes.set_yticks(range(len(_ENTRIES)), _ENTRIES)
-    axes.set_xticks(range(len(points)), [f"{w / 1e3:g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.5)
+    axes.set_xticks(range(len(points)), [f"{w * per('load'):.4g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.0)
     axes.axhline(3.5, color=INK, linewidth=0.8)
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):
             strong = abs(norm(z) - 0.5) > 0.3
-            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 2.5,
+            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 1.0,
                       color="white" if strong else _ON_COLOUR)  # fmt: skip
     add_colour_bar(axes, image, "(measured - predicted) / sigma")
     bar = axes.figure.axes[-1]

@@ -12,7 +12,7 @@ from tpjb_ident.report.drawing.picture import (
     add_legend,
     new_picture,
 )
-from tpjb_ident.report.drawing.series import AXES
+from tpjb_ident.report.drawing.series import axis_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,8 +53,8 @@ def residual_series(
         When nothing varies over `over`.
     """
     frame = residual_frame(source)
-    column, scale, text = AXES[over]
-    fixed_column = AXES["frequency" if over == "load" else "load"][0]
+    column, scale, text = axis_of(over)
+    fixed_column = axis_of("frequency" if over == "load" else "load")[0]
     counts = frame.groupby(fixed_column)[column].nunique()
     if frame.empty or counts.max() < 2:
         raise ValueError(f"there are no two points that differ in {over} alone")

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rigdata.survey.spectrum import amplitude_spectrum
+from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from rigdata.run import Run
 
 #: Quantity, how its amplitude is named, and its display unit in SI.
-_ROWS = (("displacement", "displacement, µm", 1e-6), ("force", "force, N", 1.0))
+_ROWS = (("displacement", "length"), ("force", "force"))
 
 _AXIS_STYLE: tuple[tuple[str, str, Any], ...] = (("horizontal", "blue", "-"), ("vertical", "red", (0, (5, 2))))
 
@@ -47,11 +48,11 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     drive = run.point.excitation_hz if run.point.excitation else None
     top = up_to or (4.0 * drive if drive else 0.5 * run.sample_rate)
     figure, grid = new_pictures(2, 1, title=title, height=2.3)
-    for (axes,), (quantity, name, unit) in zip(grid, _ROWS, strict=True):
-        label(axes, "frequency, Hz", name)
+    for (axes,), (quantity, unit) in zip(grid, _ROWS, strict=True):
+        label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
         largest = 0.0
         for values, (axis, colour, dashes) in zip(run.vector(quantity).values.T, _AXIS_STYLE, strict=True):
-            frequency, amplitude = amplitude_spectrum(values / unit, run.sample_rate)
+            frequency, amplitude = amplitude_spectrum(values * per(unit), run.sample_rate)
             shown = (frequency <= top) & (np.arange(len(frequency)) >= _DRIFT)
             if not shown.any():
                 raise ValueError(f"run {run.id} has no spectrum of {quantity} up to {top:g} Hz")

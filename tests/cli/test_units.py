@@ -1,0 +1,78 @@
+"""`--units us` changes what people see, and nothing that is computed or stored."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
+from tpjb_ident.compare.effect_words import shown_unit
+from tpjb_ident.report.drawing.series import axis_of
+from tpjb_ident.schema import DAMPING, STIFFNESS, TABLES
+from tpjb_ident.us_table import us_table
+
+
+@pytest.fixture
+def us():
+    """Pounds and inches, and back."""
+    use_units("us")
+    yield
+    use_units("si")
+
+
+def test_both_systems_know_the_same_quantities():
+    assert SYSTEMS["si"].keys() == SYSTEMS["us"].keys()
+
+
+@pytest.mark.usefixtures("us")
+def test_words_axes_and_coefficients_follow():
+    assert amount(4448.2216152605, "load") == "1000 lbf"
+    assert amount(25.4e-6, "length") == "1 mil"
+    assert degrees(40.0) == "104 °F"
+    assert place_of(2224.11, 25.0) == "500 lbf, 25 Hz"
+    assert axis_of("load")[2] == "static load, lbf"
+    assert (STIFFNESS.display_unit, DAMPING.display_unit) == ("lbf/in", "lbf s/in")
+    assert STIFFNESS.display_scale == pytest.approx(175.126835)
+    assert shown_unit("N/m")[0] == "lbf/in"
+
+
+def test_a_table_is_converted_by_the_units_in_its_names():
+    frame = pd.DataFrame(
+        {"temperature_1_K": [313.15], "max_pressure_Pa": [6894.757293], "x_m_se": [25.4e-6], "quality": ["ok"]}
+    )
+    assert us_table(frame).round(6).to_dict("list") == {
+        "temperature_1_degF": [104.0], "max_pressure_psi": [1.0], "x_mil_se": [1.0], "quality": ["ok"],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("table", sorted(TABLES))
+def test_no_two_columns_of_a_table_become_one(table):
+    names = [c.name.replace("{e}", "xx").replace("padN", "pad1").replace("_N_K", "_1_K") + e
+             for c in TABLES[table] for e in ("", *c.endings)]  # fmt: skip
+    converted = us_table(pd.DataFrame(np.ones((1, len(names))), columns=names))
+    assert len(set(converted.columns)) == len(names)
+    assert not [name for name in converted.columns if re.search(r"_(N|m|Pa|K|per_mil)(_|$)", name)]
+
+
+def test_an_unknown_system_is_refused():
+    result = tpjb("check", "nowhere", "--units", "imperial")
+    assert result.exit_code == 2
+    assert "--units: 'imperial' is not known. Use one of si, us." in result.output
+
+
+@pytest.mark.slow
+def test_a_prediction_is_printed_in_pounds_and_written_in_both(tmp_path):
+    words = ("predict", "model/bearings/rocker.toml", "--thermal", "isothermal", "--pivots", "rigid")
+    result = tpjb(*words, "--units", "us", "--out", tmp_path / "o")
+    assert result.exit_code == 0, result.output
+    assert "load lbf" in result.output
+    assert "kxx lbf/in" in result.output
+    si, us = (pd.read_csv(tmp_path / "o" / f"prediction{end}.csv") for end in ("", "_us"))
+    assert us["kyy_lbf_per_in"].iloc[0] == pytest.approx(si["kyy_N_per_m"].iloc[0] / 175.126835)
+    assert us["shaft_speed_rpm"].iloc[0] == 60 * si["shaft_speed_Hz"].iloc[0]
+    again = tpjb(*words, "--out", tmp_path / "p")
+    assert "load kN" in again.output
