@@ -10,6 +10,7 @@ import numpy as np
 
 from tpjb_ident.columns import amount, per, size, spinning, symbol
 from tpjb_ident.conditions import untrusted
+from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.page import Page, Section, Table, render_page
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
@@ -143,8 +144,7 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
         flags = why or ", ".join(q.sentence() for q in p.quality)
         place = [f"{p.point.static_load * per('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
         rows.append([*place, *cells, flags])
-    k, c = symbol("stiffness"), symbol("damping")
-    direct = [f"kxx, {k}", f"kyy, {k}", f"cxx, {c}", f"cyy, {c}"]
+    direct = [f"{name}, {symbol('stiffness' if name[0] == 'k' else 'damping')}" for name in DIRECT]
     columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]
     return Table("Direct coefficients so far, 95 % intervals", columns, rows, frozenset({7}))
 
