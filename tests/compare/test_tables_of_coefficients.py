@@ -10,7 +10,8 @@ import pytest
 
 from model.bearing_file import load_bearing
 from tests.command_line import tpjb
-from tpjb_ident.compare.comparison import CompareSettings, compare_table, comparison_frame
+from tpjb_ident.compare.comparison import CompareSettings, comparison_frame
+from tpjb_ident.compare.from_table import compare_table
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
 from tpjb_ident.diagnosis.observations.from_table import observe_table
 

@@ -312,8 +312,8 @@ def table_target(folder: Path) -> Target:
         frame = read_table(path)
         with contextlib.suppress(BadInputError):
             for row in read_coefficients(path, 0.05):
-                assert 0 < row.load < math.inf
-                assert 0 < row.speed < math.inf
+                assert 0 < row.point.static_load < math.inf
+                assert 0 < row.point.shaft_speed < math.inf
                 assert all(math.isfinite(v) and 0 <= e < math.inf for v, e in row.coefficients.values())
         for point in static_points(frame).points:
             assert (point.frequency >= 0).all()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,22 +14,21 @@ from model.effects import Effect
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice, measured_laws
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     PointPrediction,
     Progress,
+    TablePoint,
     coefficient_names,
     point_columns,
     predict_points,
 )
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.identification import Identification, coefficient_columns
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
-from tpjb_ident.schema import ENTRIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,10 +94,10 @@ class CompareSettings:
 
 @dataclass(frozen=True)
 class Variant:
-    """Predictions with one pivot model."""
+    """Predictions with one pivot model, or another program's, under the name of its table."""
 
     name: str
-    points: tuple[PointPrediction, ...] = field(repr=False)
+    points: tuple[PointPrediction | TablePoint, ...] = field(repr=False)
     locus: tuple[PointPrediction, ...] = field(repr=False, default=())
 
 
@@ -111,7 +109,8 @@ class Comparison(Presented):
     ----------
     campaign : Campaign or TableSource
         What was measured: records, or a table of coefficients.
-    bearing : Bearing
+    bearing : Bearing or None
+        None where tables of other programs alone stand beside a table.
     settings : CompareSettings
     identification : Identification
     curves : tuple of PivotCurve
@@ -130,7 +129,7 @@ class Comparison(Presented):
     """
 
     campaign: Campaign | TableSource
-    bearing: Bearing = field(repr=False)
+    bearing: Bearing | None = field(repr=False)
     settings: CompareSettings
     identification: Identification = field(repr=False)
     curves: tuple[PivotCurve, ...] = field(repr=False)
@@ -250,7 +249,7 @@ def model_side(
         points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
-    names, remarks = _possible_variants(settings.variants, static.curves, bearing)
+    names, remarks = possible_variants(settings.variants, static.curves, bearing)
     stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
     wanted = tuple(dict.fromkeys(points + stations))
     predicted = {}
@@ -262,7 +261,7 @@ def model_side(
     return ModelSide(static, tuple(remarks), predicted)
 
 
-def _possible_variants(
+def possible_variants(
     variants: tuple[str, ...], curves: tuple[PivotCurve, ...], bearing: Bearing
 ) -> tuple[list[str], list[str]]:
     """Pivot models that a campaign and a bearing allow, and remarks about the others."""
@@ -379,7 +378,7 @@ def comparison_frame(comparison: Comparison) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _row(variant: Variant, measured: PointResult, predicted: PointPrediction) -> dict[str, Any]:
+def _row(variant: Variant, measured: PointResult, predicted: PointPrediction | TablePoint) -> dict[str, Any]:
     row: dict[str, Any] = {"pivots": variant.name, **point_columns(measured.point)}
     row["static_load_measured_N"] = measured.static_load_measured
     values = coefficient_columns(measured.stiffness)
@@ -390,61 +389,12 @@ def _row(variant: Variant, measured: PointResult, predicted: PointPrediction) ->
         row[f"{name}_predicted"] = model[name]
         row[f"{name}_difference"] = model[name] - values[name]
         row[f"{name}_ratio"] = model[name] / values[name] if low * high > 0 else np.nan
-    p = predicted.prediction
     row.update(
-        x_m_predicted=p.position[0],
-        y_m_predicted=p.position[1],
-        converged=p.converged,
-        pivot_extrapolated=pivot_extrapolated(predicted),
+        x_m_predicted=predicted.position[0],
+        y_m_predicted=predicted.position[1],
+        converged=predicted.converged,
+        pivot_extrapolated=predicted.extrapolated,
         quality="; ".join(str(c) for c in measured.quality) or "ok",
-        status="; ".join(p.status),
+        status="; ".join(predicted.status),
     )
     return row
-
-
-def pivot_extrapolated(predicted: PointPrediction) -> bool:
-    """Whether a pad that carries presses its pivot harder than the dry test did."""
-    p = predicted.prediction
-    loads = zip(p.setup.pivots, p.pad_load, strict=True)
-    return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
-
-
-_METHOD = "table"
-
-
-def compare_table(
-    path: Path,
-    bearing: Bearing,
-    settings: CompareSettings | None = None,
-    reading_error: float | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
-) -> Comparison:
-    """Predict the operating points of a table of coefficients with every pivot model but measured ones."""
-    settings = settings or CompareSettings()
-    points = tuple(_point(row) for row in read_coefficients(path, reading_error))
-    names, remarks = _possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
-    if "measured" in settings.variants:
-        remarks.append("Measured pivots are left out: a table holds no dry tests.")
-    variants = []
-    for name in names:
-        model = ModelSettings(name, settings.thermal, settings.effects)
-        predictions = predict_points(bearing, [p.point for p in points], model, progress)
-        variants.append(Variant(name, predictions))
-    identification = Identification(path.stem, _METHOD, points, np.zeros((0, 8 * len(points))))
-    source = TableSource(path.stem)
-    return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
-
-
-def _point(row: TableRow) -> PointResult:
-    """A row as if it had been identified; what it does not hold is NaN."""
-    value, error = np.full(8, np.nan), np.full(8, np.nan)
-    for j, entry in enumerate(ENTRIES):
-        value[j], error[j] = row.coefficients.get(f"k{entry}", (np.nan, np.nan))
-        value[4 + j], error[4 + j] = row.omega * np.array(row.coefficients.get(f"c{entry}", (np.nan, np.nan)))
-    h = (value[:4] + 1j * value[4:]).reshape(2, 2)
-    stiffness = DynamicStiffness(h, row.omega, np.diag(error**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
-    nothing = np.full(2, np.nan)
-    point = OperatingPoint(row.load, row.direction, row.speed, row.omega)
-    return PointResult(
-        point, stiffness, {_METHOD: stiffness}, row.load, nothing, nothing, {}, 0, 0, 0.0, np.nan, np.nan, (), (), ()
-    )

@@ -54,6 +54,40 @@ class PointPrediction:
         """(2, 2) damping [N s/m]."""
         return np.asarray(self.prediction.c[self.index])
 
+    @property
+    def position(self) -> tuple[float, float]:
+        """Of the shaft centre [m]."""
+        return float(self.prediction.position[0]), float(self.prediction.position[1])
+
+    @property
+    def converged(self) -> bool:
+        """Whether the model's solution did."""
+        return self.prediction.converged
+
+    @property
+    def status(self) -> tuple[str, ...]:
+        """Named conditions of the solution."""
+        return self.prediction.status
+
+    @property
+    def extrapolated(self) -> bool:
+        """Whether a pad that carries presses its pivot harder than the dry test did."""
+        loads = zip(self.prediction.setup.pivots, self.prediction.pad_load, strict=True)
+        return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
+
+
+@dataclass(frozen=True)
+class TablePoint:
+    """What a table gives for one operating point; NaN where it gives nothing. Stands where a `PointPrediction` does."""
+
+    point: OperatingPoint
+    k: np.ndarray = field(repr=False)  #: (2, 2) [N/m]
+    c: np.ndarray = field(repr=False)  #: (2, 2) [N s/m]
+    position: tuple[float, float] = (math.nan, math.nan)
+    converged: bool = True
+    status: tuple[str, ...] = ()
+    extrapolated: bool = False
+
 
 def predict_points(
     bearing: Bearing,
@@ -173,9 +207,9 @@ def _pad_columns(p: Prediction, number: int) -> dict[str, float]:
 Formula = Callable[[int, float], tuple[float, float]]
 
 
-def printed_formula(bearing: Bearing) -> Formula | None:
-    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid."""
-    if bearing.pivot.kind == "rigid":
+def printed_formula(bearing: Bearing | None) -> Formula | None:
+    """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid, or unknown."""
+    if bearing is None or bearing.pivot.kind == "rigid":
         return None
     printed = formula_pivot(bearing.pivot, secant_vibrations=True)
     return lambda pad, load: (printed.vibration_stiffness(load), printed.stiffness(load))

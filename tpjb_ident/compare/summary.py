@@ -30,6 +30,10 @@ _PIVOTS_IN_WORDS = {
 }
 
 
+def _in_words(variant: str) -> str:
+    return _PIVOTS_IN_WORDS.get(variant, f"the table {variant}")
+
+
 @dataclass(frozen=True)
 class Deviation:
     """How one pivot model does on one direct coefficient."""
@@ -90,18 +94,15 @@ def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, .
     worst = max(best_deviations, key=lambda d: abs(d.median))
     if worth_a_diagnosis(all_deviations):
         who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
-        return (
-            f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with "
-            f"{_PIVOTS_IN_WORDS[best]}."
-        )
+        return f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with {_in_words(best)}."
     agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
-    return f"{name}: prediction and measurement {agrees} with {_PIVOTS_IN_WORDS[best]}."
+    return f"{name}: prediction and measurement {agrees} with {_in_words(best)}."
 
 
 def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     """Say that effects took part, and what that means for the agreement."""
     effects = comparison.settings.effects
-    if not effects:
+    if not effects or comparison.bearing is None:
         return ()
     pads = len(comparison.bearing.pads)
     listed = []
@@ -125,12 +126,12 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         best_deviations = [d for d in all_deviations if d.pivots == best]
         worst = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
         sentences.append(
-            f"The prediction comes closest with {_PIVOTS_IN_WORDS[best]}: {_medians(best_deviations)} (median over "
+            f"The prediction comes closest with {_in_words(best)}: {_medians(best_deviations)} (median over "
             f"{max(d.n for d in best_deviations)} points); the largest single deviation is {percent(worst.worst)} in "
             f"{worst.coefficient}."
         )
     sentences += [
-        f"With {_PIVOTS_IN_WORDS[v.name]}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
+        f"With {_in_words(v.name)}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
         for v in comparison.variants
         if v.name != best
     ]
@@ -160,7 +161,7 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
 
 
 def _clearance_sentence(comparison: Comparison) -> list[str]:
-    if comparison.clearance is None:
+    if comparison.clearance is None or comparison.bearing is None:
         return []
     drawn = np.array([pad.assembled_clearance for pad in comparison.bearing.pads])
     off = comparison.clearance.clearance - drawn

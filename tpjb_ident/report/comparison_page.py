@@ -73,7 +73,7 @@ def write_report(
     described = f": {campaign.description}" if campaign.description else ""
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
-        subtitle=f"{bearing.name}{described}",
+        subtitle=f"{campaign.id if bearing is None else bearing.name}{described}",
         answer=answer,
         more=more,
         then=then,
@@ -110,7 +110,7 @@ def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
         compared = [by_name[name] for name in names]
         cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in compared]
         inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
-        rows.append([VARIANT_LABEL[variant], *cells, f"{inside} of {n}"])
+        rows.append([VARIANT_LABEL.get(variant, variant), *cells, f"{inside} of {n}"])
     return Table(
         "Predicted against measured: median deviation (largest single one)",
         ["", *names, "inside the 95 % interval"],
@@ -165,10 +165,8 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
 
 
 def _position_sections(comparison: Comparison) -> list[Section]:
-    drawn = (
-        np.array([pad.pivot_angle for pad in comparison.bearing.pads]),
-        np.array([pad.assembled_clearance for pad in comparison.bearing.pads]),
-    )
+    pads = () if comparison.bearing is None else comparison.bearing.pads
+    drawn = (np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads]))
     predicted = {v.name: predicted_locus(comparison, v) for v in comparison.variants if len(v.locus)}
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
     if not panels:
@@ -210,7 +208,7 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
         label = place_of(row["static_load_N"], row["excitation_Hz"])
-        rows.append([label, VARIANT_LABEL[row["pivots"]], *cells, remark or ""])
+        rows.append([label, VARIANT_LABEL.get(row["pivots"], row["pivots"]), *cells, remark or ""])
     columns = ["point", "pivots"]
     for name in _DIRECT:
         columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]

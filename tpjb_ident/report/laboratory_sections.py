@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,12 +47,12 @@ def set_up_section(comparison: Comparison) -> Section:
     """Sensors with their calibration, bearing and oil, and what was run."""
     campaign = comparison.campaign
     if isinstance(campaign, TableSource):
-        return Section("Set-up", tables=[_bearing_table(comparison)])
+        return Section("Set-up", tables=_bearing_tables(comparison.bearing))
     return Section(
         "Set-up",
         tables=[
             _sensor_table(tuple(campaign.channels.values())),
-            _bearing_table(comparison),
+            *_bearing_tables(comparison.bearing),
             _run_matrix(campaign.runs),
         ],
     )
@@ -82,9 +82,10 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
 
 
-def _bearing_table(comparison: Comparison) -> Table:
-    """Geometry of the bearing, its pivots and its oil, as the bearing file states them."""
-    bearing = comparison.bearing
+def _bearing_tables(bearing: Any) -> list[Table]:
+    """Geometry of the bearing, its pivots and its oil, as the bearing file states them; none without one."""
+    if bearing is None:
+        return []
     pad, oil = bearing.pads[0], bearing.oil
     rows = [
         ["journal diameter", amount(bearing.journal_diameter, "size")],
@@ -98,7 +99,7 @@ def _bearing_table(comparison: Comparison) -> Table:
                 f"supplied at {degrees(oil.supply_temperature)}"],
         ["oil, at 40 °C", f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
     ]  # fmt: skip
-    return Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))
+    return [Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))]
 
 
 def _run_matrix(runs: Sequence[Run]) -> Table:

@@ -30,8 +30,17 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", r
 _NOTHING = ("", "nan", "NaN")
 _INFINITE = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf}
 _TRUTH = {"True": True, "False": False, "": None}
-#: Name, column of the schema, and ending.
-_Header = list[tuple[str, Column | None, str]]
+#: Ends of columns in US units: the same in SI, and the size of the unit in it.
+_US = {
+    "_lbf_s_per_in": ("_Ns_per_m", 4.4482216152605 / 0.0254),
+    "_lbf_per_in": ("_N_per_m", 4.4482216152605 / 0.0254),
+    "_lbf": ("_N", 4.4482216152605),
+    "_mil": ("_m", 25.4e-6),
+    "_rpm": ("_Hz", 1.0 / 60.0),
+}
+_US_NAME = re.compile(rf"(\w+?)({'|'.join(_US)})(_lo|_hi|_se|)")
+#: Name, column of the schema, ending, and the size of its unit.
+_Header = list[tuple[str, Column | None, str, float]]
 
 
 def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str] | None = None) -> pd.DataFrame:
@@ -47,6 +56,7 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
         raise BadInputError(f"{path.name}: is empty. Give a table with a line of names.")
     header = _header(path, number, names, needed, misspelt)
     cells: list[list[object]] = [[] for _ in names]
+    names = [name for name, *_ in header]
     lines: list[int] = []
     for number, row in rows:
         place = f"{path.name}, line {number}"
@@ -54,8 +64,9 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
             remedy = "A delimiter at a line's end counts as one; save the table again"
             raise BadInputError(f"{place}: has {len(row)} cells, the names are {len(names)}. {remedy}.")
         values = {}
-        for column, (name, known, ending), cell in zip(cells, header, row, strict=True):
-            values[name] = _value(cell.strip(), known, ending, f"{place}, {name}")
+        for column, (name, known, ending, size), cell in zip(cells, header, row, strict=True):
+            value = _value(cell.strip(), known, ending, f"{place}, {name}")
+            values[name] = size * value if isinstance(value, float) else value
             column.append(values[name])
         _check_intervals(values, place)
         lines.append(number)
@@ -89,25 +100,35 @@ def _is_content(line: str) -> bool:
 def _header(
     path: Path, line: int, names: list[str], needed: Sequence[str], misspelt: re.Pattern[str] | None
 ) -> _Header:
-    """What each column is by the schema; the names are stripped in place."""
-    names[:] = [name.strip() for name in names]
+    """What each column is by the schema, by its name in SI."""
     place = f"{path.name}, line {line}"
-    for index, name in enumerate(names):
+    si = [_in_si(name.strip()) for name in names]
+    for index, (name, _) in enumerate(si):
         if not name:
             raise BadInputError(f"{place}: column {index + 1} has no name. Delete the delimiter, or name the column.")
-        if name in names[:index]:
+        if any(name == before for before, _ in si[:index]):
             raise BadInputError(f"{place}: column {name!r} is there twice. Delete one of them.")
+    known_names = [name for name, _ in si]
     for name in needed:
-        if name not in names:
-            near = nearest_name(name, names)
+        if name not in known_names:
+            near = nearest_name(name, known_names)
             hint = f"; {near!r} is not it" if near else ""
             raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
-    header = [(name, *column_of(name, path.stem)) for name in names]
-    for name, known, _ in header:
+    header = [(name, *column_of(name, path.stem), size) for name, size in si]
+    for name, known, _, _ in header:
         if known is None and misspelt is not None and misspelt.fullmatch(name):
             near = nearest_name(name, _coefficient_names())
             raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}?")
     return header
+
+
+def _in_si(name: str) -> tuple[str, float]:
+    """Name of a column in SI, and the size of its unit there; US units are known by their ends."""
+    match = _US_NAME.fullmatch(name)
+    if match is None:
+        return name, 1.0
+    unit, size = _US[match[2]]
+    return match[1] + unit + match[3], size
 
 
 @functools.cache

@@ -39,9 +39,16 @@ Pivots = Annotated[
 ]
 
 
+Predictions = Annotated[
+    list[Path] | None,
+    typer.Option("--prediction", metavar="TABLE.csv", help="Another program's K and C as well; may be repeated."),
+]
+
+
 @command(
     f"tpjb compare {DEMO}",
     f'tpjb compare {DEMO} --pivots "kirk, measured" --thermal tehd',
+    f"tpjb compare {DEMO} --prediction xltrc.csv --prediction sheet.csv",
     "tpjb compare before.h5 after.h5",
 )
 def compare(
@@ -56,16 +63,20 @@ def compare(
     reading_error: ReadingError = None,
     method: Method = "mm-eiv",
     norm: Norm = None,
+    prediction: Predictions = None,
 ) -> None:
     """Compare prediction and measurement, or two campaigns, with a report.
 
     With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
-    pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG.
+    pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG. Tables of other programs
+    stand beside these where their points meet; none is interpolated.
 
     Two campaigns of one rig (before and after an overhaul), or their folders of results: writes difference,
     pivot_difference, clearance_difference and report.html.
     """
     if campaign is not None and other is not None:
+        if prediction:
+            raise BadInputError("--prediction: belongs to one campaign, not to two. Leave it or the second one out.")
         _compare_two(c, (campaign, other), bearing, method, norm)
         return
     variants = _variants(pivots)
@@ -73,20 +84,22 @@ def compare(
     model = model_settings(c, "kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, comparison_frame, model_side
     from tpjb_ident.compare.measured_pivots import counts_from_measured
+    from tpjb_ident.compare.other_programs import read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
-    source, drawing = open_source(c, campaign, coefficients, bearing)
+    tables = read_predictions([c.file(path) for path in prediction or ()])
+    source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
     refuse_impossible(settings.effects, effects, drawing)
     typed = str(campaign or f"--coefficients {coefficients}")
     with c.results() as folder:
         if coefficients is not None:
-            from tpjb_ident.compare.comparison import compare_table
+            from tpjb_ident.compare.from_table import compare_table
             from tpjb_ident.report.comparison_page import write_report
 
             with c.progress("comparing") as show:
                 error = parse_share(reading_error, "--reading-error")
-                result = compare_table(coefficients, drawing, settings, error, show)
+                result = with_predictions(compare_table(coefficients, drawing, settings, error, show), tables)
             c.table("comparison", comparison_frame(result))
             following = next_command(result, typed, bearing)
             write_report(folder, result, c.options, c.inputs, following)
@@ -95,7 +108,7 @@ def compare(
                 from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
 
                 settings = replace(settings, identify=identify_settings(c, source, method, norm))
-                result = compare_campaign(source, drawing, settings, show, ahead)
+                result = with_predictions(compare_campaign(source, drawing, settings, show, ahead), tables)
                 following = next_command(result, typed, bearing)
                 show("writing tables", 0, 2)
                 write_comparison(c, result)
@@ -226,6 +239,8 @@ def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
     from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
 
     if worth_a_diagnosis(deviations(result)):
+        if result.bearing is None:
+            return ""
         return f"tpjb diagnose {source}" + (f" --bearing {bearing}" if bearing else "")
     return f"tpjb export {source} --to ross" if not source.startswith("--") else ""
 
@@ -238,7 +253,7 @@ def refuse_comparison(result: Comparison) -> None:
         refuse_untrusted(result.identification)
     bad = []
     for variant in result.variants:
-        points = [p for p in variant.points if not p.prediction.converged]
+        points = [p for p in variant.points if not p.converged]
         bad += [f"{variant.name}, {amount(p.point.static_load, 'load')}" for p in points]
     if bad:
         raise NotTrustedError(f"the model did not converge at {len(bad)} points ({'; '.join(bad[:5])}).")

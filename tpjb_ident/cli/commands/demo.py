@@ -26,7 +26,7 @@ def demo(c: Command) -> None:
     printed formula, recorded with noise and glitches.
     """
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
-    from tpjb_ident.compare.predictions import prediction_frame
+    from tpjb_ident.compare.predictions import PointPrediction, prediction_frame
     from tpjb_ident.runtime.executors import background_job
 
     path = _sample("demo.h5")
@@ -42,7 +42,8 @@ def demo(c: Command) -> None:
             summary = check_summary(c, campaign.id, check_campaign(path), campaign)
             c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
-            c.table("prediction", prediction_frame(result.variant("measured").points))
+            measured = result.variant("measured").points
+            c.table("prediction", prediction_frame([p for p in measured if isinstance(p, PointPrediction)]))
             show("writing tables", 0, 2)
             write_comparison(c, result)
             show("drawing figures", 1, 2)

@@ -109,8 +109,8 @@ def _typed(parameters: list[Any], entry: Mapping[str, Any], folder: Path) -> lis
         if parameter.name in _OURS:
             continue
         value = options.get(parameter.name)
-        if parameter.name in places:
-            value = str(folder / str(places[parameter.name]))
+        if files := [str(folder / str(p)) for key, p in places.items() if key.partition(".")[0] == parameter.name]:
+            value = files
         if value is None or value is False:
             flags += [parameter.secondary_opts[0]] if value is False and parameter.secondary_opts else []
         elif parameter.param_type_name == "argument":

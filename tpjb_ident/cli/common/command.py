@@ -348,14 +348,21 @@ def write_record(
 
 
 def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]) -> dict[str, str]:
-    """Where files and folders among `settings` are, as seen from the output folder; only those that exist."""
+    """Where files and folders among `settings` are, as seen from the output folder; only those that exist.
+
+    Several of one option are numbered: ``prediction.0``.
+    """
     places = {}
     for name, value in settings.items():
-        # a word may name a file in place of a choice, as of --pivots
-        path = Path(value) if isinstance(value, str) and Path(value).name in inputs else value
-        if isinstance(path, Path) and path.exists():
-            with contextlib.suppress(ValueError):  # another drive: there is no relative way
-                places[name] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
+        numbered = (
+            {f"{name}.{i}": v for i, v in enumerate(value)} if isinstance(value, (list, tuple)) else {name: value}
+        )
+        for key, item in numbered.items():
+            # a word may name a file in place of a choice, as of --pivots
+            path = Path(item) if isinstance(item, str) and Path(item).name in inputs else item
+            if isinstance(path, Path) and path.exists():
+                with contextlib.suppress(ValueError):  # another drive: there is no relative way
+                    places[key] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
     return places
 
 

@@ -71,10 +71,12 @@ def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects
     return ModelSettings(pivots, thermal, load_effects(c.file(effects)))
 
 
-def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing) -> None:
+def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing | None) -> None:
     """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks."""
     if path is None:
         return
+    if bearing is None:
+        raise BadInputError("--effects: effects are of a bearing. Add --bearing FILE, or leave them out.")
     from model.effects import EffectError, apply_effects
     from model.pivots import pivot_laws
     from model.setup import Setup
@@ -85,8 +87,13 @@ def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bea
         raise BadInputError(f"--effects {path.name}: {error}") from error
 
 
-def open_source(c: Command, campaign: Path | None, table: Path | None, bearing: Path | None) -> tuple[Any, Bearing]:
-    """Open a campaign with its bearing, or in its place a `TableSource` of coefficients with the bearing file."""
+def open_source(
+    c: Command, campaign: Path | None, table: Path | None, bearing: Path | None, predicted: bool = False
+) -> tuple[Any, Any]:
+    """Open a campaign with its bearing, or in its place a `TableSource` of coefficients with the bearing file.
+
+    A table whose points another program has predicted needs no bearing.
+    """
     if table is None and campaign is not None:
         source = c.open(campaign)
         return source, c.bearing_of(source, bearing)
@@ -97,9 +104,9 @@ def open_source(c: Command, campaign: Path | None, table: Path | None, bearing: 
     c.file(table)
     if not table.is_file():
         raise BadInputError(f"{table}: no such file. Give the table of coefficients as CSV.")
-    if bearing is None:
+    if bearing is None and not predicted:
         raise BadInputError(f"{c.name} --coefficients: a table names no bearing. Add --bearing FILE.")
-    return TableSource(table.stem), c.bearing(bearing)
+    return TableSource(table.stem), None if bearing is None else c.bearing(bearing)
 
 
 def parse_share(text: str | None, option: str) -> float | None:

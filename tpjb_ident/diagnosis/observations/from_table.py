@@ -20,15 +20,12 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
     rows: list[tuple[Element, float, float, float]] = []
     tests: dict[tuple[float, float, float], list[float]] = {}
     for entry in read_coefficients(path, reading_error):
-        tests.setdefault((entry.load, entry.direction, entry.speed), []).append(entry.omega)
-        where = (
-            ("load", entry.load),
-            ("direction", entry.direction),
-            ("speed", entry.speed),
-            ("excitation", entry.omega),
-        )
+        point = entry.point
+        static = (point.static_load, point.static_load_direction, point.shaft_speed)
+        tests.setdefault(static, []).append(point.excitation)
+        where = tuple(zip(("load", "direction", "speed", "excitation"), (*static, point.excitation), strict=True))
         for part in "kc":
-            factor = entry.omega if part == "c" else 1.0
+            factor = point.excitation if part == "c" else 1.0
             part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
             direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
             scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))

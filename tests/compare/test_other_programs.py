@@ -1,0 +1,165 @@
+"""`compare --prediction`: tables of other programs beside ours, met point by point, never interpolated."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident.compare.comparison import comparison_frame
+from tpjb_ident.compare.from_table import compare_table
+from tpjb_ident.compare.other_programs import read_predictions, with_predictions
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.table_reader import read_table
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
+
+MEASURED = """static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m
+2500,-90,22,10,7e7,1.1e8,6e5
+2500,-90,22,25,6e7,1.0e8,7e5
+5000,-90,22,25,8e7,2.0e8,9e5
+"""
+
+
+@pytest.fixture
+def measured(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text(MEASURED, encoding="utf-8")
+    return path
+
+
+def compared(measured, *files):
+    return with_predictions(compare_table(measured, None, reading_error=0.05), read_predictions(files))
+
+
+def written(tmp_path, text, name="theirs.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_rows_meet_points_by_load_direction_speed_and_excitation_and_gaps_stay_gaps(tmp_path, measured):
+    rows = "2510,22.05,25.1,1.2e8,1e-6,-2e-5\n5000,22,25,2.2e8,,\n5000,22,40,2.5e8,,\n"
+    theirs = written(tmp_path, f"static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m,x_m,y_m\n{rows}")
+    result = compared(measured, theirs)
+    frame = comparison_frame(result).set_index(["static_load_N", "excitation_Hz"])
+    assert set(frame["pivots"]) == {"theirs"}
+    assert frame["kyy_N_per_m_predicted"].to_dict() == pytest.approx(
+        {(2500.0, 10.0): math.nan, (2500.0, 25.0): 1.2e8, (5000.0, 25.0): 2.2e8}, nan_ok=True
+    )
+    assert frame["kyy_N_per_m_ratio"][5000.0, 25.0] == pytest.approx(1.1)
+    assert frame["y_m_predicted"][2500.0, 25.0] == -2e-5
+    assert frame["kxx_N_per_m_predicted"].isna().all()
+    (remark,) = result.remarks
+    assert "predicts 2 of 3 points (load within 1 %" in remark
+    assert "without a row: 2500 N at -90 deg, shaft 22 Hz, excited at 10 Hz" in remark
+    assert "rows that meet no point: line 4 (5000 N at -90 deg, shaft 22 Hz, excited at 40 Hz)" in remark
+
+
+@pytest.mark.parametrize(
+    ("change", "meets"),
+    [
+        ({"load": 2524.0}, True), ({"load": 2526.0}, False),
+        ({"direction": -89.1}, True), ({"direction": -88.9}, False), ({"direction": 270.0}, True),
+        ({"speed": 22.1}, True), ({"speed": 22.12}, False),
+        ({"excitation": 25.12}, True), ({"excitation": 25.13}, False),
+        ({"rotation": "counter-clockwise"}, True), ({"rotation": "clockwise"}, False),
+    ],
+)  # fmt: skip
+def test_tolerances_are_those_that_are_stated(tmp_path, measured, change, meets):
+    row = {"load": 2500.0, "direction": -90.0, "speed": 22.0, "excitation": 25.0, "rotation": ""} | change
+    head = "static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,rotation,kyy_N_per_m"
+    theirs = written(tmp_path, f"{head}\n{','.join(map(str, row.values()))},1.2e8\n")
+    if meets:
+        frame = comparison_frame(compared(measured, theirs))
+        assert frame["kyy_N_per_m_predicted"].notna().tolist() == [False, True, False]
+    else:
+        with pytest.raises(BadInputError, match="no row meets an operating point"):
+            compared(measured, theirs)
+
+
+def test_the_nearest_of_several_rows_is_taken(tmp_path, measured):
+    theirs = written(tmp_path, "static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m\n"
+                               "2490,22,25,1e8\n2501,22,25,2e8\n2515,22,25,3e8\n")  # fmt: skip
+    result = compared(measured, theirs)
+    assert comparison_frame(result)["kyy_N_per_m_predicted"].tolist()[1] == 2e8
+    assert "line 2" in result.remarks[0]
+    assert "line 4" in result.remarks[0]
+
+
+def test_us_units_are_known_by_the_ends_of_columns(tmp_path):
+    pound, inch = 4.4482216152605, 0.0254
+    path = written(tmp_path, "static_load_lbf\tshaft_speed_rpm\texcitation_rpm\tkxx_lbf_per_in\tkxx_lbf_per_in_lo"
+                             "\tkxx_lbf_per_in_hi\tcyy_lbf_s_per_in\tx_mil\tnote\n"
+                             "1124\t1320\t1500\t4e5\t3e5\t5e5\t5e3\t-0.2\tinitial_lbf\n")  # fmt: skip
+    (row,) = read_table(path).to_dict("records")
+    assert row == {
+        "static_load_N": pytest.approx(1124 * pound), "shaft_speed_Hz": pytest.approx(22.0),
+        "excitation_Hz": pytest.approx(25.0), "kxx_N_per_m": pytest.approx(4e5 * pound / inch),
+        "kxx_N_per_m_lo": pytest.approx(3e5 * pound / inch), "kxx_N_per_m_hi": pytest.approx(5e5 * pound / inch),
+        "cyy_Ns_per_m": pytest.approx(5e3 * pound / inch), "x_m": pytest.approx(-0.2 * 25.4e-6), "note": "initial_lbf",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("shaft_speed_Hz,kyy_N_per_m\n22,1e8\n", "column static_load_N is missing"),
+        ("static_load_N,shaft_speed_Hz,kyy_lbs_per_in\n2500,22,1e8\n", "is no coefficient"),
+        ("static_load_N,static_load_lbf,shaft_speed_Hz,kyy_N_per_m\n1,2,22,1e8\n", "is there twice"),
+        ("static_load_N,shaft_speed_Hz,rotation,kyy_N_per_m\n2500,22,left,1e8\n", "'left' is not known"),
+        ("static_load_N,shaft_speed_Hz,note\n2500,22,x\n", "holds no coefficient"),
+        ("static_load_N,shaft_speed_rpm,excitation_Hz,kyy_N_per_m\n2500,22,25,1e8\n", "Check units and signs"),
+    ],
+)
+def test_a_table_that_cannot_stand_beside_is_refused_with_file_and_remedy(tmp_path, measured, text, says):
+    with pytest.raises(BadInputError, match=says) as error:
+        compared(measured, written(tmp_path, text))
+    assert "theirs.csv" in str(error.value)
+
+
+def test_two_tables_of_one_name_are_refused_and_a_pivot_model_keeps_its_own(tmp_path):
+    row = "static_load_N,shaft_speed_Hz,kyy_N_per_m\n2500,22,1e8\n"
+    (tmp_path / "b").mkdir()
+    first, second = written(tmp_path, row), written(tmp_path / "b", row)
+    with pytest.raises(BadInputError, match="Rename one of the files"):
+        read_predictions([first, second])
+    (table,) = read_predictions([written(tmp_path, row, "rigid.csv")])
+    assert table.name == "rigid.csv"
+
+
+@pytest.mark.slow
+def test_five_programs_stand_on_one_page_without_a_bearing(tmp_path, measured):
+    rows = {"ross": 1.0, "xltrc": 1.02, "dyrobes": 0.97, "spreadsheet": 1.1, "prediction": 0.99}
+    frame = read_table(measured)
+    for name, factor in rows.items():
+        theirs = frame.copy()
+        for column in set(theirs) & set(COEFFICIENT_COLUMNS):
+            theirs[column] *= factor
+        theirs.to_csv(tmp_path / f"{name}.csv", index=False)
+    options = [part for name in rows for part in ("--prediction", tmp_path / f"{name}.csv")]
+    out = tmp_path / "out"
+    result = tpjb("compare", "--coefficients", measured, "--reading-error", "5%", *options, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "tpjb diagnose" not in result.output
+    comparison = pd.read_csv(out / "comparison.csv")
+    for name, factor in rows.items():
+        ratios = comparison[comparison["pivots"] == name]["kyy_N_per_m_ratio"]
+        assert np.allclose(ratios, factor)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert all(name in page for name in rows)
+    record = json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]["compare"]
+    assert {f"prediction.{i}" for i in range(5)} <= set(record["inputs_at"])
+    assert tpjb("rerun", out / "run.json").exit_code == 0
+
+
+def test_a_prediction_that_did_not_converge_ends_with_three(tmp_path, measured):
+    theirs = written(tmp_path, MEASURED.replace("cyy_Ns_per_m\n", "cyy_Ns_per_m,converged\n")
+                     .replace("e5\n", "e5,False\n"))  # fmt: skip
+    result = tpjb("compare", "--coefficients", measured, "--reading-error", "5%", "--prediction", theirs,
+                  "--out", tmp_path / "o")  # fmt: skip
+    assert result.exit_code == 3, result.output
+    assert "did not converge at 3 points" in " ".join(result.output.split())

@@ -1,0 +1,75 @@
+"""A table of coefficients in the place of a campaign: its points, and what the model predicts for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from model.bearing import Bearing
+from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
+from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant, possible_variants
+from tpjb_ident.compare.predictions import ModelSettings, predict_points
+from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.results.identification import Identification
+from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.schema import ENTRIES
+
+_METHOD = "table"
+
+
+def compare_table(
+    path: Path,
+    bearing: Bearing | None,
+    settings: CompareSettings | None = None,
+    reading_error: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Comparison:
+    """Predict the operating points of a table of coefficients with every pivot model but measured ones.
+
+    Without a bearing nothing is predicted here: tables of other programs are put beside it.
+    """
+    settings = settings or CompareSettings()
+    points = tuple(_point(row) for row in read_coefficients(path, reading_error))
+    variants: list[Variant] = []
+    remarks: list[str] = []
+    if bearing is not None:
+        names, remarks = possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
+        if "measured" in settings.variants:
+            remarks.append("Measured pivots are left out: a table holds no dry tests.")
+        for name in names:
+            model = ModelSettings(name, settings.thermal, settings.effects)
+            predictions = predict_points(bearing, [p.point for p in points], model, progress)
+            variants.append(Variant(name, predictions))
+    identification = Identification(path.stem, _METHOD, points, np.zeros((0, 8 * len(points))))
+    source = TableSource(path.stem)
+    return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
+
+
+def _point(row: TableRow) -> PointResult:
+    """A row as if it had been identified; what it does not hold is NaN."""
+    value, error, omega = np.full(8, np.nan), np.full(8, np.nan), row.point.excitation
+    for j, entry in enumerate(ENTRIES):
+        value[j], error[j] = row.coefficients.get(f"k{entry}", (np.nan, np.nan))
+        value[4 + j], error[4 + j] = omega * np.array(row.coefficients.get(f"c{entry}", (np.nan, np.nan)))
+    h = (value[:4] + 1j * value[4:]).reshape(2, 2)
+    stiffness = DynamicStiffness(h, omega, np.diag(error**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
+    nothing = np.full(2, np.nan)
+    return PointResult(
+        row.point,
+        stiffness,
+        {_METHOD: stiffness},
+        row.point.static_load,
+        nothing,
+        nothing,
+        {},
+        0,
+        0,
+        0.0,
+        np.nan,
+        np.nan,
+        (),
+        (),
+        (),
+    )
