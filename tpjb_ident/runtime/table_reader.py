@@ -33,6 +33,7 @@ _TRUTH = {"True": True, "False": False, "": None}
 #: Ends of columns in US units: the same in SI, and the size of the unit in it.
 _US = {
     "_lbf_s_per_in": ("_Ns_per_m", 4.4482216152605 / 0.0254),
+    "_lbfs_per_in": ("_Ns_per_m", 4.4482216152605 / 0.0254),  # as our own tables in US units have it
     "_lbf_per_in": ("_N_per_m", 4.4482216152605 / 0.0254),
     "_lbf": ("_N", 4.4482216152605),
     "_mil": ("_m", 25.4e-6),

@@ -28,7 +28,8 @@ from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
+    from model.bearing import Bearing
+    from tpjb_ident.compare.comparison import CompareSettings, Comparison
     from tpjb_ident.compare.difference import Difference, Side
 
 Other = Annotated[
@@ -67,20 +68,16 @@ def compare(
 ) -> None:
     """Compare prediction and measurement, or two campaigns, with a report.
 
-    With rigid, Kirk and measured pivots: writes report.html, comparison, coefficients, estimators, windows,
-    pivot_curves, locus and clearance tables, pivots.toml, and the figures as SVG and PNG. Tables of other programs
-    stand beside these where their points meet; none is interpolated.
-
-    Two campaigns of one rig (before and after an overhaul), or their folders of results: writes difference,
-    pivot_difference, clearance_difference and report.html.
+    With rigid, Kirk and measured pivots: report.html, tables of comparison, coefficients, estimators, windows, pivot
+    curves, locus and clearance, pivots.toml, figures. Two campaigns of one rig (before and after an overhaul), or
+    their folders of results: difference, pivot_difference, clearance_difference and report.html.
     """
     if campaign is not None and other is not None:
         if prediction:
-            raise BadInputError("--prediction: belongs to one campaign, not to two. Leave it or the second one out.")
+            raise BadInputError("--prediction: belongs to one campaign. Leave it or the second campaign out.")
         _compare_two(c, (campaign, other), bearing, method, norm)
         return
-    variants = _variants(pivots)
-    c.options["pivots"] = list(variants)
+    c.options["pivots"] = variants = _variants(pivots)
     model = model_settings(c, "kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, comparison_frame, model_side
     from tpjb_ident.compare.measured_pivots import counts_from_measured
@@ -94,15 +91,12 @@ def compare(
     typed = str(campaign or f"--coefficients {coefficients}")
     with c.results() as folder:
         if coefficients is not None:
-            from tpjb_ident.compare.from_table import compare_table
             from tpjb_ident.report.comparison_page import write_report
 
-            with c.progress("comparing") as show:
-                error = parse_share(reading_error, "--reading-error")
-                result = with_predictions(compare_table(coefficients, drawing, settings, error, show), tables)
+            result = with_predictions(_table_compared(c, coefficients, drawing, settings, reading_error), tables)
             c.table("comparison", comparison_frame(result))
             following = next_command(result, typed, bearing)
-            write_report(folder, result, c.options, c.inputs, following)
+            write_report(folder, result, named(c.options), c.inputs, following)
         else:
             with background_job(model_side, source, drawing, settings) as ahead, c.progress("comparing") as show:
                 from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
@@ -117,6 +111,15 @@ def compare(
     show_comparison(c, result, following)
     c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
+
+
+def _table_compared(
+    c: Command, path: Path, drawing: Bearing | None, settings: CompareSettings, reading_error: str | None
+) -> Comparison:
+    from tpjb_ident.compare.from_table import compare_table
+
+    with c.progress("comparing") as show:
+        return compare_table(path, drawing, settings, parse_share(reading_error, "--reading-error"), show)
 
 
 def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
