@@ -13,6 +13,8 @@ import numpy as np
 from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 _STANDARD_GRAVITY = 9.80665
+#: Full scales that cells are sold with [N].
+_CELL_SIZES = (20e3, 50e3, 100e3, 200e3, 500e3)
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,11 @@ class Sensor:
         return cls(name, "displacement", "V", 7.78e3, axis, -1, gap_voltage, calibration=sensitivity, uncertainty=0.005)
 
     @classmethod
-    def load_cell(cls, name: str, axis: float) -> Sensor:
-        """Strain-gauge cell of 20 kN in a bridge: 2 mV/V at full scale, supplied with 5 V."""
-        calibration = (("sensitivity", "2.0 mV/V"), ("full_scale", "20 kN"), ("excitation", "5 V"))
-        return cls(name, "force", "mV", 10.0 / 20e3, axis, calibration=calibration, uncertainty=0.002)
+    def load_cell(cls, name: str, axis: float, load: float = 0.0) -> Sensor:
+        """Strain-gauge cell in a bridge: 2 mV/V at full scale, supplied with 5 V; 20 kN, or more for a `load` [N]."""
+        full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
+        calibration = (("sensitivity", "2.0 mV/V"), ("full_scale", f"{full_scale / 1e3:g} kN"), ("excitation", "5 V"))
+        return cls(name, "force", "mV", 10.0 / full_scale, axis, calibration=calibration, uncertainty=0.002)
 
     @classmethod
     def accelerometer(cls, name: str, axis: float) -> Sensor:
@@ -105,8 +108,8 @@ class Instruments:
             raise VirtualRigError("the housing's true mass and cell_stiffness must not be negative")
 
     @classmethod
-    def like_paper(cls, n_pads: int = 5, seed: int | None = None) -> Instruments:
-        """Two probes at 45 and 135 deg, cells and accelerometers at 0 and 90 deg, a Pt100 per pad, a tacho.
+    def like_paper(cls, n_pads: int = 5, seed: int | None = None, load: float = 0.0) -> Instruments:
+        """Two probes at 45 and 135 deg, cells (for a `load` [N]) and accelerometers at 0 and 90 deg, Pt100s, a tacho.
 
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
         are at 8 V and everything else is at zero.
@@ -121,8 +124,8 @@ class Instruments:
             (
                 Sensor.probe("X1A", radians(45.0), gaps[0]),
                 Sensor.probe("X1B", radians(135.0), gaps[1]),
-                Sensor.load_cell("L1H", 0.0),
-                Sensor.load_cell("L1V", quarter),
+                Sensor.load_cell("L1H", 0.0, load),
+                Sensor.load_cell("L1V", quarter, load),
                 Sensor.accelerometer("A1H", 0.0).with_error(offset=gravity[0]),
                 Sensor.accelerometer("A1V", quarter).with_error(offset=gravity[1]),
                 *thermometers,

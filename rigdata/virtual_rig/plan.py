@@ -102,22 +102,22 @@ class RigPlan:
     timing: Timing = Timing()
 
     @classmethod
-    def like_paper(cls) -> RigPlan:
-        """Six loads at 25 Hz, six frequencies at 5 kN, 20 locus directions, five dry tests, one sweep."""
+    def like_paper(cls, pads: int = 5) -> RigPlan:
+        """Six loads at 25 Hz, six frequencies at 5 kN, 20 locus directions, a dry test a pad, one sweep."""
         loads = (2500.0, 3750.0, 5000.0, 6250.0, 7500.0, 8750.0)
         points = {(load, 25.0) for load in loads} | {(5000.0, f) for f in (10.0, 20.0, 30.0, 40.0, 50.0)}
         return cls(
             dynamic=operating_points(sorted(points)),
             locus=locus_points(20),
-            dry=tuple(DryTest(pad) for pad in range(1, 6)),
+            dry=tuple(DryTest(pad) for pad in range(1, pads + 1)),
             clearance=(ClearanceSweep(),),
         )
 
     @classmethod
-    def short(cls) -> RigPlan:
-        """Three loads at 25 Hz, ten locus directions, five dry tests, one sweep: a campaign for a demo."""
+    def short(cls, pads: int = 5) -> RigPlan:
+        """Three loads at 25 Hz, ten locus directions, a dry test a pad, one sweep: a campaign for a demo."""
         dynamic = operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)])
-        return replace(cls.like_paper(), dynamic=dynamic, locus=locus_points(10))
+        return replace(cls.like_paper(pads), dynamic=dynamic, locus=locus_points(10))
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""

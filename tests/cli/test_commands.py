@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
+from collections import Counter
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ import pytest
 
 from model.growth import Growth
 from model.options import Options
+from rigdata.campaign import load_campaign
 from tests.command_line import tpjb
 from tpjb_ident.cli.commands.predict import parse_physics
 from tpjb_ident.errors import BadInputError
@@ -226,6 +229,24 @@ def test_export_from_results(identified, tmp_path, form):
 
 
 @pytest.mark.slow
+def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, tmp_path):
+    text = rocker_file.read_text(encoding="utf-8")
+    angles = 'pivot_angles = ["-135 deg", "-45 deg", "45 deg", "135 deg"]'
+    four = tmp_path / "four.toml"
+    four.write_text(
+        re.sub("pivot_angles = .*", angles, text).replace('arc = "60 deg"', 'arc = "72 deg"'), encoding="utf-8"
+    )
+    words = ("--plan", "short", "--speed", "3000 rpm", "--load", "20 kN", "--thermal", "isothermal", "-q")
+    result = tpjb("simulate", four, *words, "--out", tmp_path / "o")
+    assert result.exit_code == 0, result.output
+    campaign = load_campaign(tmp_path / "o" / "campaign.h5")
+    kinds = Counter(run.kind for run in campaign.runs)
+    assert kinds["dry_pivot"] == 4
+    turning = {round(run.point.shaft_speed_hz, 9) for run in campaign.runs if run.kind in ("dynamic", "locus")}
+    assert turning == {50.0}
+    assert tpjb("check", tmp_path / "o" / "campaign.h5", "--out", tmp_path / "c").exit_code == 0  # no cell at its limit
+
+
 def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
     arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
     for name in "ab":

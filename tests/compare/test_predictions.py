@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from model.predict import predict
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame, printed_formula
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
+from tpjb_ident.compare.summary import _extrapolation_sentence
 
 HZ = 2 * math.pi
 DOWN = -math.pi / 2
@@ -96,3 +98,22 @@ def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
     off = rig_truth(bearing, ModelSettings("kirk", "isothermal", (Effect("pad_offset", pad=2, radial_offset=3e-6),)))
     assert hot.clearance == pytest.approx([80e-6] * 5)
     assert off.clearance == pytest.approx([80e-6, 83e-6, 80e-6, 80e-6, 80e-6])
+
+
+def test_the_summary_says_where_pivots_are_pressed_harder_than_in_their_dry_tests():
+    curves = [SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0)]
+    laws = (SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0))
+
+    def pressed(*loads):
+        setup = SimpleNamespace(pivots=laws)
+        return SimpleNamespace(prediction=SimpleNamespace(setup=setup, pad_load=np.array(loads)))
+
+    variants = [
+        SimpleNamespace(name="rigid", points=(pressed(9e3, 9e3),)),
+        SimpleNamespace(name="measured", points=(pressed(4e3, 4e3), pressed(4e3, 12e3))),
+    ]
+    (sentence,) = _extrapolation_sentence(SimpleNamespace(variants=variants, curves=curves))
+    assert sentence.startswith("At 1 of 2 points the measured pivots are extrapolated")
+    assert "12 kN, the dry tests went to 4.8 kN" in sentence
+    inside = SimpleNamespace(variants=[SimpleNamespace(name="measured", points=variants[1].points[:1])], curves=curves)
+    assert _extrapolation_sentence(inside) == []

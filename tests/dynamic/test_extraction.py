@@ -325,3 +325,14 @@ def test_a_window_of_its_own_clock_has_its_mean_and_noise():
     np.testing.assert_allclose(found.mean[0], [700.0, -30.0], atol=5e-3)
     np.testing.assert_allclose(found.scale[0], 0.01, rtol=0.2)
     assert found.lost[0].tolist() == [pytest.approx(1 / 500), 0.0]
+
+
+@pytest.mark.parametrize("slow", [0.02, 0.3, 2.0])
+def test_a_line_that_does_not_turn_once_in_a_window_leaves_its_mean_alone(slow):
+    length = 250
+    time = np.arange(length) / RATE
+    rows = (7.0 + np.cos(2 * np.pi * 25.0 * time) + 1e-3 * np.random.default_rng(0).standard_normal(length))[None, None]
+    frequencies = np.array([25.0, slow])
+    even = LineFitter(length, RATE, frequencies).fit(rows, np.zeros(1))
+    assert even.mean[0, 0] == pytest.approx(7.0, abs=1e-3)
+    assert fit_uneven(rows[0], time, frequencies, 0.0).mean[0, 0] == pytest.approx(7.0, abs=1e-3)

@@ -197,6 +197,12 @@ def test_faint_lines_are_those_of_the_whole_record_unless_they_stand_out():
     assert known_lines((66.0,), 22.0, 1000.0).conditions == ("3X on excitation line",)
 
 
+def test_what_film_and_shaft_make_at_next_to_no_frequency_is_the_mean():
+    names = [line.name for line in known_lines((25.0,), 50.02, 1000.0, duration=2.0).whole]
+    assert "2f-X" not in names
+    assert "2f-X" in [line.name for line in known_lines((25.0,), 47.0, 1000.0, duration=2.0).whole]
+
+
 @pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (600.0,), (25.0, 460.0)])
 def test_excitations_outside_the_band_are_refused(frequencies):
     with pytest.raises(ValueError, match="between 0 and 450 Hz"):

@@ -235,7 +235,7 @@ def test_the_toml_reaches_from_next_to_nothing_to_far_beyond():
     loads = table_loads(curve())
     assert loads[0] == 0.0
     assert loads[1] == pytest.approx(2.5)
-    assert loads[-1] == pytest.approx(12_500.0)
+    assert 50_000.0 < loads[-1] < 75_000.0
     np.testing.assert_allclose(loads[2:] / loads[1:-1], loads[2] / loads[1], rtol=1e-12)
     pad = tomllib.loads(pivots_text([curve()], "x"))["pads"][0]
     lengths = {len(pad[name]) for name in ("force_N", "deflection_m", "stiffness_N_per_m", "stiffness_relative_se")}

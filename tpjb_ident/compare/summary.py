@@ -10,7 +10,7 @@ import numpy as np
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
+from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance, pivot_extrapolated
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.rounding import percent, signed
@@ -136,7 +136,8 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         if v.name != best
     ]
     sentences[:0] = [_verdict_sentence(comparison, all_deviations), *_effects_sentences(comparison)]
-    sentences += _pivot_sentence(comparison) + _clearance_sentence(comparison) + _locus_sentence(comparison)
+    sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
+    sentences += _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
 
 
@@ -157,6 +158,20 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
     return [
         f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * ratios[low]:.0f} % (pad #{low}) to "
         f"{100 * ratios[high]:.0f} % (pad #{high}) of the stiffness that the printed formula gives."
+    ]
+
+
+def _extrapolation_sentence(comparison: Comparison) -> list[str]:
+    """Say where the model asks more of a measured pivot than the dry tests told."""
+    points = [point for v in comparison.variants if v.name == "measured" for point in v.points]
+    beyond = [point for point in points if pivot_extrapolated(point)]
+    if not beyond or not comparison.curves:
+        return []
+    largest = max(float(np.max(point.prediction.pad_load)) for point in beyond)
+    tested = min(curve.valid_to for curve in comparison.curves)
+    return [
+        f"At {len(beyond)} of {len(points)} points the measured pivots are extrapolated: pads press them with up to "
+        f"{amount(largest, 'load', '.3g')}, the dry tests went to {amount(tested, 'load', '.3g')}."
     ]
 
 

@@ -113,6 +113,7 @@ class LineFitter:
         self.design = even_design(length, rate, self.frequencies, drift_order)
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
         self._gram_inverse = np.linalg.pinv(_products(self.design, self.design), rcond=1e-12, hermitian=True)
+        self._level = _level(self.design, self.frequencies, length / rate)
         in_blocks = length >= 2 * BLOCK and drift_order == 1
         self._blocks = WaveBlocks(length, rate, self.frequencies) if in_blocks else None
         # The scale of the residual needs no more than a few hundred samples.
@@ -145,7 +146,7 @@ class LineFitter:
             coefficients[k, i], scale[k, i], lost[k, i] = robust
             remainder = rows[k, i] - offset[k, i] - self.design @ coefficients[k, i]
             residual[k, i] = np.where(np.abs(remainder) <= BAD_LIMIT * scale[k, i], remainder, 0.0)
-        mean = coefficients[:, :, 2 * len(self.frequencies)] + offset
+        mean = coefficients @ self._level + offset
         z = _phasors(coefficients, self.frequencies, start)
         return WindowFit(z, *(np.ascontiguousarray(values.T) for values in (mean, scale, lost))), residual
 
@@ -234,6 +235,16 @@ def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArra
     return np.ascontiguousarray((local * turn).transpose(1, 2, 0))
 
 
+def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:
+    """What the coefficients make of a window's mean, (n_columns,): a line that does not turn once in it is part of it.
+
+    A constant and such a line can be told apart by their sum alone.
+    """
+    weights = np.asarray(design.mean(axis=0))
+    weights[: 2 * len(frequencies)][np.repeat(frequencies * duration >= 1.0, 2)] = 0.0
+    return weights
+
+
 def usual_scale(scale: FloatArray) -> FloatArray:
     """Median over the windows with a scale; infinite where none has; `scale` (n_windows, q)."""
     if len(scale) and np.isfinite(scale).all():
@@ -264,7 +275,7 @@ def fit_uneven(rows: FloatArray, time: FloatArray, frequencies: FloatArray, orig
     design = line_design(time - time[0], frequencies)
     fits = [robust_fit(design, row, np.inf) for row in rows - offset]
     coefficients = np.array([[fit.coefficients] for fit in fits])
-    mean = coefficients[:, 0, 2 * len(frequencies)] + offset[:, 0]
+    mean = coefficients[:, 0] @ _level(design, frequencies, float(time[-1] - time[0])) + offset[:, 0]
     scale, lost = np.array([fit.scale for fit in fits]), np.array([fit.lost for fit in fits])
     z = _phasors(coefficients, frequencies, np.array([time[0] - origin]))
     return WindowFit(z, mean[None], scale[None], lost[None])

@@ -108,8 +108,9 @@ def known_lines(
         elif _is_apart(line, nuisance, 0.0 if line.name == "found" else apart):
             nuisance.append(line)
     resolved: list[Line] = []
+    level = Line("level", 0.0)
     for line in faint:
-        if _is_apart(line, [*driven, *nuisance, *resolved], 2 * apart):
+        if _is_apart(line, [level, *driven, *nuisance, *resolved], 2 * apart):
             resolved.append(line)
     return LineSet(driven, tuple(nuisance), tuple(conditions), speed, tuple(resolved))
 

@@ -140,14 +140,15 @@ def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
 
 
 _SCHEMA = "tpjb-pivots/1"
-_TOML_ROWS = 160
-_SMALLEST = 5e-4  # first load of the table, as a share of the largest measured one
-_EXTRAPOLATE_TO = 2.5
+#: Loads of the table as shares of the largest measured one: the first, and the last in 160 and in all steps. Pads of a
+#: loaded bearing press their pivots harder than a dry test does; beyond the table a pivot has the last stiffness.
+_SMALLEST, _EXTRAPOLATE_TO, _STEPS, _ALL_STEPS = 5e-4, 2.5, 160, 190
 
 
 def table_loads(curve: PivotCurve) -> FloatArray:
     """Loads of the table [N]: zero, then geometric steps (n,)."""
-    return np.r_[0.0, np.geomspace(_SMALLEST * curve.valid_to, _EXTRAPOLATE_TO * curve.valid_to, _TOML_ROWS)]
+    growth = (_EXTRAPOLATE_TO / _SMALLEST) ** (np.arange(_ALL_STEPS) / (_STEPS - 1))
+    return np.r_[0.0, _SMALLEST * curve.valid_to * growth]
 
 
 def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:

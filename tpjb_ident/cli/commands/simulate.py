@@ -62,13 +62,15 @@ def simulate(
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
     refuse_impossible(settings.effects, effects, drawing)
+    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats)
+    largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(
         truth=rig_truth(drawing, settings, bearing.read_text(encoding="utf-8-sig")),
-        instruments=erring_instruments(Instruments.like_paper(len(drawing.pads), seed), settings.effects),
+        instruments=erring_instruments(Instruments.like_paper(len(drawing.pads), seed, largest), settings.effects),
         noise=Noise.like_samples().scaled(noise) if noise > 0 else Noise.none(),
         seed=seed,
         campaign=name,
-        plan=replace(_plan(plan, load, excitation, speed), repeats=repeats),
+        plan=tests,
         faults=tuple(Fault(**_fault_arguments(text)) for text in fault or ()),
     )
     file = "campaign.h5" if layout == "hdf5" else "campaign"
@@ -80,16 +82,19 @@ def simulate(
     c.print(f"Results: {c.target / file}, the truth in {c.target / 'truth.json'}")
 
 
-def _plan(plan: str, load: str | None, excitation: str | None, speed: str) -> RigPlan:
+def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed: str) -> RigPlan:
+    """The plan with the tests asked for, every run with a shaft that turns at the speed asked for."""
     from rigdata.virtual_rig import RigPlan
 
     if plan not in PLANS:
         raise BadInputError(f"--plan: {plan!r} is not known. Use {' or '.join(PLANS)}.")
-    rig_plan = RigPlan.like_paper() if plan == "paper" else RigPlan.short()
+    rig_plan = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
+    points = tuple(operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz"))
+    turning = points[0].shaft_speed
+    locus = tuple(replace(point, shaft_speed=turning) for point in rig_plan.locus)
     if load is None and excitation is None:
-        return rig_plan
-    points = operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz")
-    return replace(rig_plan, dynamic=tuple(points))
+        points = tuple(replace(point, shaft_speed=turning) for point in rig_plan.dynamic)
+    return replace(rig_plan, dynamic=points, locus=locus)
 
 
 def _fault_arguments(text: str) -> dict[str, Any]:
