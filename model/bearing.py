@@ -23,6 +23,8 @@ class Material:
     conductivity: float
 
 
+#: Senses in which a shaft turns, with X to the right and Y up; the first is the default.
+ROTATIONS = ("counter-clockwise", "clockwise")
 STEEL = Material(206e9, 0.3, 12e-6, 54.0)
 BABBITT = Material(40e9, 0.3, 24e-6, 26.0)
 
@@ -183,6 +185,9 @@ class Bearing:
         Pad #1 first.
     pivot : Pivot
     oil : Oil
+    rotation : str
+        Sense of turning that the drawing states, ``"counter-clockwise"`` or ``"clockwise"``: a pad's leading edge is
+        where that shaft comes from. Empty: either, the edge is where the shaft comes from.
     tolerances : tuple of (str, float)
         Name and value of every line of ``[tolerances]``: how well the drawing is known, one standard deviation, SI.
 
@@ -199,6 +204,7 @@ class Bearing:
     pads: tuple[Pad, ...]
     pivot: Pivot
     oil: Oil
+    rotation: str = ""
     source: str = field(default="", compare=False)
     tolerances: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
@@ -230,6 +236,19 @@ class Bearing:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
+
+    def stated_for(self, rotation: str) -> Bearing:
+        """Return a copy whose leading edges are those of a sense of turning, unless its file states one.
+
+        Parameters
+        ----------
+        rotation : {"counter-clockwise", "clockwise"}
+
+        Returns
+        -------
+        Bearing
+        """
+        return self if self.rotation else replace(self, rotation=rotation)
 
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
         """Return a copy with other pads.

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from model.bearing import BABBITT, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
 from model.toml_text import parse_toml
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
@@ -20,7 +20,12 @@ _MATERIAL_KEYS = {
 _KEYS: dict[str, dict[str, str]] = {
     "": {"schema": "text", "name": "text"},
     "journal": {"diameter": "length"},
-    "bearing": {"length": "length", "assembled_clearance": "length", "pad_clearance": "length"},
+    "bearing": {
+        "length": "length",
+        "assembled_clearance": "length",
+        "pad_clearance": "length",
+        "rotation": "text",
+    },
     "pads": {
         "pivot_angles": "angle",
         "arc": "angle",
@@ -55,7 +60,7 @@ _KEYS: dict[str, dict[str, str]] = {
     },
 }
 _OPTIONAL = {
-    "schema", "name", "grade", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
+    "schema", "name", "grade", "rotation", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
     "contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter", "youngs_modulus", "poissons_ratio",
     "pads.backing", "pads.babbitt", "tolerances",
 }  # fmt: skip
@@ -123,7 +128,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
     pivot = values["pivot"]
     kind = pivot.pop("kind")
     _check_pivot(kind, pivot, name)
-    oil = values["oil"]
+    oil, rotation = values["oil"], values["bearing"].get("rotation", "")
     bearing = Bearing(
         name=values[""].get("name", name),
         journal_diameter=values["journal"]["diameter"],
@@ -140,6 +145,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
             supply_temperature=oil["supply_temperature"],
             grade=oil.get("grade", ""),
         ),
+        rotation=rotation,
         source=name,
         tolerances=tuple(values["tolerances"].items()),
     )
@@ -233,7 +239,12 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
     offset = per_pad(pads.get("pivot_offset", 0.5), "[pads] pivot_offset")
     cb = per_pad(bearing["assembled_clearance"], "[bearing] assembled_clearance")
     cp = per_pad(bearing["pad_clearance"], "[bearing] pad_clearance")
-    _check_arcs(angles, arc, offset, name)
+    rotation = bearing.get("rotation", "")
+    if rotation not in ("", *ROTATIONS):
+        choices = hint(rotation, ROTATIONS, "Use one of")
+        raise BearingError(f"{name}, [bearing] rotation: {rotation!r} is no sense of turning. {choices}")
+    from_lower_edge = tuple(1.0 - f for f in offset) if rotation == ROTATIONS[1] else offset
+    _check_arcs(angles, arc, from_lower_edge, name)
     thickness = pads["thickness"]
     elastic = pads.get("elastic_thickness", thickness)
     lining = pads.get("babbitt_thickness", 0.0)

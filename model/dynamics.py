@@ -17,6 +17,7 @@ from model.conditions import named
 from model.film.following_heat import heat_impedance
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
+from model.mirror import MIRROR
 from model.pad.bending import AxialTilt, force_weights
 from model.setup import Setup
 from model.statics.axial_tilt import axial_tilt_of
@@ -286,14 +287,15 @@ def _axial_inertia(setup: Setup, film: PadFilm) -> float:
 
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
-    """h(omega) of the bearing inside the measured displacement, effects of the structure included."""
+    """h(omega) in the rig's frame of the bearing inside the measured displacement, with effects of the structure."""
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
     added = None
     if setup.options.perturbed_heat and setup.thermal != "isothermal":
         added = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
     elif setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
         added = [_shape_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
-    return with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
+    h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
+    return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
 
 def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:

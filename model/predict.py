@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from model.bearing import Bearing
+from model.bearing import ROTATIONS, Bearing
 from model.dynamics import bearing_impedance, friction_regimes
 from model.effects import Effect, apply_effects
-from model.errors import ModelError, OptionError
+from model.errors import ModelError, OptionError, check_known
 from model.growth import grown
+from model.mirror import MIRROR, mirrored, rotation_of, seen_by_shaft
 from model.options import Options
 from model.pivots import pivot_laws
 from model.possible import check_possible
@@ -47,6 +48,7 @@ def predict(
     mesh: Mesh | tuple[int, int] | None = None,
     start: Prediction | None = None,
     options: Options | None = None,
+    rotation: str = "",
 ) -> Prediction:
     """Predict a bearing's coefficients, position and fields at one operating point.
 
@@ -72,6 +74,8 @@ def predict(
         A neighbouring prediction to start from.
     options : Options, optional
         Physics beyond the paper's model: heat into pads and journal, thermal growth, cavitation.
+    rotation : {"counter-clockwise", "clockwise"}, optional
+        Sense of turning; default: the bearing's, else counter-clockwise. All results are in the rig's own frame.
 
     Returns
     -------
@@ -95,10 +99,17 @@ def predict(
     check_possible(bearing)
     plain = Setup(bearing, pivot_laws(pivots, bearing), thermal, _mesh(mesh), options=options or Options())
     setup = apply_effects(plain, effects)
+    rotation = rotation or bearing.rotation or ROTATIONS[0]
+    check_known("rotation", rotation, ROTATIONS)
     speed_si = _number(speed, "speed", "speed")
+    if not speed_si > 0.0:
+        raise _OperatingPointError(
+            f"speed must be positive [rad/s], got {speed_si!r}; `rotation` says which way the shaft turns"
+        )
     omega = speed_si if excitation is None else _in_si(excitation, "speed", "excitation")
     force, direction = _number(load, "force", "load"), _number(load_direction, "angle", "load_direction")
-    return predict_setup(setup, force, direction, speed_si, omega, start.equilibrium if start is not None else None)
+    spin = -speed_si if rotation == ROTATIONS[1] else speed_si
+    return predict_setup(setup, force, direction, spin, omega, start.equilibrium if start is not None else None)
 
 
 def _mesh(mesh: Any) -> Mesh:
@@ -130,7 +141,7 @@ def _in_si(value: Any, dimension: str, name: str) -> Any:
 def predict_setup(
     setup: Setup, load: float, load_direction: float, speed: float, excitation: Any, start: Equilibrium | None = None
 ) -> Prediction:
-    """Predict for a `Setup` (effects applied); SI floats only, see `predict`."""
+    """Predict for a `Setup` (effects applied); SI floats only, see `predict`; `speed` about +z, negative: clockwise."""
     try:
         omega = np.asarray(excitation, float)
     except TypeError as error:
@@ -139,23 +150,27 @@ def predict_setup(
     # A load near the smallest float is none: its quotients would not be numbers.
     pushing = load if load > _NO_LOAD else 0.0
     force = pushing * np.array([math.cos(load_direction), math.sin(load_direction)])
-    setup, equilibrium = solve_as_it_runs(setup, force, speed, start)
+    running, equilibrium = solve_as_it_runs(setup, force, speed, start)
     lines = np.atleast_1d(omega)
-    h, regimes = _impedance(setup, equilibrium, lines)
+    h, regimes = _impedance(running, equilibrium, lines)
+    setup = mirrored(running) if running.mirrored else running
     instruments = setup.instruments
     films = equilibrium.films
+    position = in_rig(running, equilibrium.position)
+    tilt = np.array([f.tilt for f in films])
     shape = (2, 2) if omega.ndim == 0 else (len(lines), 2, 2)
     return Prediction(
         load=load,
         load_direction=load_direction,
-        speed=speed,
+        speed=abs(speed),
+        rotation=rotation_of(speed),
         excitation=float(omega) if omega.ndim == 0 else omega,
         h=instruments.shown_stiffness(h, lines).reshape(shape),
         bearing_h=h.reshape(shape),
-        position=instruments.shown_position(equilibrium.position + setup.structure @ force),
-        bearing_position=equilibrium.position,
+        position=instruments.shown_position(position + setup.structure @ force),
+        bearing_position=position,
         load_reading=instruments.shown_load(force),
-        tilt=np.array([f.tilt for f in films]),
+        tilt=-tilt if running.mirrored else tilt,
         deflection=np.array([f.deflection for f in films]),
         pad_load=np.array([f.forces.force[0] if f.forces is not None else 0.0 for f in films]),
         status=(*equilibrium.status, *regimes),
@@ -176,16 +191,27 @@ def _impedance(setup: Setup, equilibrium: Equilibrium, lines: FloatArray) -> tup
 def solve_as_it_runs(
     setup: Setup, force: FloatArray, speed: float, start: Equilibrium | None = None
 ) -> tuple[Setup, Equilibrium]:
-    """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N]."""
+    """Find the equilibrium with the clearances that belong to its own temperatures: `force` (2,) [N].
+
+    `speed` [rad/s] is about +z. Both results are in the frame where the shaft turns counter-clockwise, see
+    `model.mirror`; so is `start`.
+    """
+    setup = seen_by_shaft(setup, speed)
+    force = in_rig(setup, force)
     growth = setup.growth
     if growth is not None and growth.journal is not None:
         grown_bearing = grown(setup.bearing, growth, setup.inlet_temperature, growth.journal)
         setup = setup.change(bearing=grown_bearing, grown=True)
-    equilibrium = solve_equilibrium(setup, force, speed, start)
+    equilibrium = solve_equilibrium(setup, force, abs(speed), start)
     if setup.growth is not None:
         running = setup.bearing.with_pads(tuple(f.pad for f in equilibrium.films))
         setup = setup.change(bearing=running, grown=True)
     return setup, equilibrium
+
+
+def in_rig(setup: Setup, vector: FloatArray) -> FloatArray:
+    """A vector (2,) of a set-up's frame in the rig's frame, and the other way round."""
+    return np.asarray(MIRROR @ vector) if setup.mirrored else vector
 
 
 def _check_point(load: float, direction: float, speed: float, omega: FloatArray) -> None:
@@ -195,8 +221,8 @@ def _check_point(load: float, direction: float, speed: float, omega: FloatArray)
         )
     if not math.isfinite(direction):
         raise _OperatingPointError(f"load_direction must be finite [rad], got {direction!r}")
-    if not (math.isfinite(speed) and speed > 0):
-        raise _OperatingPointError(f"speed must be positive [rad/s] (the shaft turns counter-clockwise), got {speed!r}")
+    if not (math.isfinite(speed) and speed != 0.0):
+        raise _OperatingPointError(f"speed must be a number of rad/s other than zero, got {speed!r}")
     if omega.ndim > 1 or omega.size == 0 or not np.all((omega > 0) & (omega < _FASTEST)):
         raise _OperatingPointError(
             f"excitation must be a positive number below {_FASTEST:g} rad/s or a 1-D array of them, "

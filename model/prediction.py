@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from model.bearing import ROTATIONS
 from model.dynamics import PadMatrices, pad_matrices
 from model.setup import Setup
 from model.statics.conditions import largest_reynolds
@@ -36,6 +37,8 @@ class Prediction:
         Static load [N] and where it pushes the shaft [rad].
     speed : float
         [rad/s]
+    rotation : {"counter-clockwise", "clockwise"}
+        Which way the shaft turns.
     excitation : float or (n,) ndarray
         [rad/s]
     h : (2, 2) or (n, 2, 2) complex ndarray
@@ -43,10 +46,11 @@ class Prediction:
     position : (2,) ndarray
         Journal from the bearing centre [m].
     tilt, deflection, pad_load : (n_pads,) ndarray
-        [rad], [m], [N]
+        [rad] (counter-clockwise), [m], [N]
     status : tuple of Condition
         Named conditions, which compare and print like strings; empty when all is well.
     equilibrium : Equilibrium
+        In the frame where the shaft turns counter-clockwise, see `model.mirror`.
     setup : Setup
     solver : callable
         `model.predict.predict_setup`, which made it: a coarser mesh is solved with the same.
@@ -61,6 +65,7 @@ class Prediction:
     load: float
     load_direction: float
     speed: float
+    rotation: str
     excitation: float | FloatArray
     h: ComplexArray
     bearing_h: ComplexArray = field(repr=False)
@@ -119,6 +124,7 @@ class Prediction:
             "static_load_N": self.load,
             "static_load_direction_deg": math.degrees(self.load_direction),
             "shaft_speed_Hz": self.speed / (2 * math.pi),
+            "rotation": self.rotation,
             "excitation_Hz": self._frequencies,
         }
         for values, kind, unit in ((self.k, "k", "N_per_m"), (self.c, "c", "Ns_per_m")):
@@ -252,7 +258,13 @@ class Prediction:
     def attitude_angle(self) -> float:
         """Angle from the load's direction to that of the journal [rad], positive with rotation, within +-pi."""
         x, y = self.bearing_position
-        return (math.atan2(y, x) - self.load_direction + math.pi) % (2.0 * math.pi) - math.pi
+        turn = self._sense * (math.atan2(y, x) - self.load_direction)
+        return (turn + math.pi) % (2.0 * math.pi) - math.pi
+
+    @property
+    def _sense(self) -> float:
+        """Of the speed about +z."""
+        return -1.0 if self.rotation == ROTATIONS[1] else 1.0
 
     @property
     def _clearance(self) -> float:
@@ -284,7 +296,7 @@ class Prediction:
 
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
-        """Full matrices of the pads that carry, Eq. (11) and (12)."""
+        """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
         matrices = (pad_matrices(self.setup, f) for f in self.equilibrium.films)
         return tuple(m for m in matrices if m is not None)
 
@@ -297,7 +309,7 @@ class Prediction:
         """
         coarse = self.solver(
             self.setup.change(mesh=self.setup.mesh.coarser()),
-            self.load, self.load_direction, self.speed, self.excitation,
+            self.load, self.load_direction, self._sense * self.speed, self.excitation,
         )  # fmt: skip
         if not (coarse.converged and self.converged):
             return math.nan

@@ -93,6 +93,8 @@ class Setup:
         Change of Cb in running conditions only [m]: dry tests are cold.
     grown : bool
         The bearing's clearances are the running ones, and grow no more.
+    mirrored : bool
+        All that the solver sees is a mirror image of the rig, see `model.mirror`.
     """
 
     bearing: Bearing
@@ -119,6 +121,7 @@ class Setup:
     clearance_change: float = 0.0
     accuracy: float = 1e-7
     grown: bool = False
+    mirrored: bool = False
 
     def __post_init__(self) -> None:
         check_known("thermal", self.thermal, _THERMAL)

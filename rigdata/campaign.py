@@ -319,7 +319,7 @@ def _assembled(
         run = Run(
             id=entry.id,
             kind=entry.kind,
-            point=entry.point,
+            point=replace(entry.point, rotation=entry.rotation or manifest.rotation),
             excitation_direction=entry.excitation_direction,
             pad=entry.pad,
             branch=entry.branch,
@@ -328,7 +328,6 @@ def _assembled(
             reader=reader,
             excitation_kind=entry.excitation,
             band=entry.band,
-            rotation=entry.rotation or manifest.rotation,
             temperature=entry.temperature,
         )
         runs.append(run)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+#: Senses in which a shaft turns, with X to the right and Y up; the first is the default.
+ROTATIONS = ("counter-clockwise", "clockwise")
+
 
 @dataclass(frozen=True, order=True)
 class OperatingPoint:
@@ -20,6 +23,8 @@ class OperatingPoint:
         [rad/s]; zero in dry tests.
     excitation : float
         Excitation frequency [rad/s]; zero where nothing is excited.
+    rotation : {"counter-clockwise", "clockwise"}
+        Which way the shaft turns.
 
     Examples
     --------
@@ -31,15 +36,37 @@ class OperatingPoint:
     static_load_direction: float = -math.pi / 2
     shaft_speed: float = 0.0
     excitation: float = 0.0
+    rotation: str = ROTATIONS[0]
 
     def __repr__(self) -> str:
         return f"<OperatingPoint: {self}>"
 
     def __str__(self) -> str:
         parts = [f"{self.static_load:g} N at {self.static_load_direction_deg:g} deg"]
-        parts += [f"shaft {self.shaft_speed_hz:g} Hz"] if self.shaft_speed else ["shaft at rest"]
+        parts.append(f"shaft {self.speed_words}" if self.shaft_speed else "shaft at rest")
         parts += [f"excited at {self.excitation_hz:g} Hz"] if self.excitation else []
         return ", ".join(parts)
+
+    @property
+    def speed_words(self) -> str:
+        """Shaft speed with its sense, where that is not the usual one."""
+        sense = f" {self.rotation}" if self.rotation != ROTATIONS[0] else ""
+        return f"{self.shaft_speed_hz:g} Hz{sense}"
+
+    @property
+    def spin(self) -> float:
+        """Shaft speed about +z [rad/s]: negative where the shaft turns clockwise."""
+        return -self.shaft_speed if self.rotation == ROTATIONS[1] else self.shaft_speed
+
+    @property
+    def static_key(self) -> tuple[float, float, float, str]:
+        """What tells static points apart: load [N], its direction [deg], shaft speed [Hz], sense of turning."""
+        return self.static_load, self.static_load_direction_deg, self.shaft_speed_hz, self.rotation
+
+    @property
+    def key(self) -> tuple[float, float, float, str, float]:
+        """What tells operating points apart: the static point's, and the excitation frequency [Hz]."""
+        return *self.static_key, self.excitation_hz
 
     @property
     def shaft_speed_hz(self) -> float:

@@ -29,7 +29,7 @@ class Run:
     id, kind : str
         Kind is ``"dynamic"``, ``"dry_pivot"``, ``"locus"``, ``"clearance"`` or ``"baseline"``.
     point : OperatingPoint
-        Set points, SI.
+        Set points, SI, with the sense of turning.
     excitation_direction : float or None
         [rad]
     pad : int or None
@@ -44,8 +44,6 @@ class Run:
         ``"sine"``, ``"multisine"``, ``"sweep"``, ``"random"`` or ``"impact"``.
     band : (float, float) or None
         Lowest and highest frequency excited [Hz].
-    rotation : str
-        Sense of turning, ``"counter-clockwise"`` or ``"clockwise"``.
     temperature : float or None
         At the probes, as stated [K]; `mean_temperature` also asks the thermometers.
 
@@ -69,12 +67,16 @@ class Run:
     reader: RunReader = field(repr=False, compare=False)
     excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
-    rotation: str = "counter-clockwise"
     temperature: float | None = None
 
     def __repr__(self) -> str:
         towards = "" if self.pad is None else f", pad #{self.pad}"
         return f"<Run {self.id}: {self.kind}{towards}, {self.point}>"
+
+    @property
+    def rotation(self) -> str:
+        """Sense of turning, ``"counter-clockwise"`` or ``"clockwise"``."""
+        return self.point.rotation
 
     @property
     def file(self) -> str:

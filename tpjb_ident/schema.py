@@ -54,6 +54,9 @@ COEFFICIENT_COLUMNS = (*STIFFNESS.columns, *DAMPING.columns)
 #: Columns that say which operating point a row is about: static point first.
 STATIC_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz")
 POINT_COLUMNS = (*STATIC_COLUMNS, "excitation_Hz")
+#: The same with the sense of turning: the values of `OperatingPoint.static_key` and `key`.
+STATIC_KEY = (*STATIC_COLUMNS, "rotation")
+POINT_KEY = (*STATIC_KEY, "excitation_Hz")
 #: Of pivot curves: tangent and secant.
 TANGENT, SECANT = f"stiffness_{STIFFNESS.suffix}", f"secant_{STIFFNESS.suffix}"
 
@@ -124,6 +127,7 @@ _STATIC = (
     Column("static_load_N", "force", "N", "static load, set point, per bearing"),
     Column("static_load_direction_deg", "angle", "deg", "where it pushes the shaft, counter-clockwise from x"),
     Column("shaft_speed_Hz", "frequency", "Hz", "set point of the shaft speed"),
+    Column("rotation", "text", "", "which way the shaft turns: counter-clockwise or clockwise"),
 )
 _POINT = (*_STATIC, Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"))
 _MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")
@@ -189,7 +193,7 @@ _CLEARANCE = (
     Column("pad_angle_deg", "angle", "deg", "where the pad stands by the bearing file"),
     Column("fitted_angle_deg", "angle", "deg", "where its side of the polygon stands", ("_se",)),
     Column("push_load_N", "force", "N", "load of the sweep"),
-    _STATIC[2],
+    *_STATIC[2:],
     Column("temperature_K", "temperature", "K", "mean temperature during the sweep"),
     _RUN,
 )

@@ -10,6 +10,7 @@ from typing import Any
 
 from rigdata.calibration import DIMENSIONS, UNCALIBRATED
 from rigdata.near_names import hint
+from rigdata.operating_point import ROTATIONS
 from rigdata.problem import Problem, Severity
 from rigdata.units import UnitError, parse_quantity
 
@@ -27,7 +28,6 @@ KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
 #: How a dynamic run is excited.
 _EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 _BRANCHES = ("up", "down", "cycle")
-_ROTATIONS = ("counter-clockwise", "clockwise")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
 _RAW = ("table", "tables", "list", "sign", "calibration")
@@ -77,7 +77,7 @@ TOP = (
     Field("channels", "table", "", ""),
     Field("runs", "table", "", ""),
 )
-SHAFT = (Field("rotation", "choice", "sense of turning", '"clockwise"', default=_ROTATIONS[0], choices=_ROTATIONS),)
+SHAFT = (Field("rotation", "choice", "sense of turning", '"clockwise"', default=ROTATIONS[0], choices=ROTATIONS),)
 HOUSING = (
     Field("mass", "mass", "stator mass between oil film and load cells", '"30 kg"', default=math.nan, low=0.0),
     Field("mass_uncertainty", "mass", "of the mass", '"0.5 kg"', default=0.0, low=0.0),
@@ -153,7 +153,7 @@ RUN = (
     Field("pad", "whole", "number of the pad that a dry test loads, without quotes", "1", low=1, high=100),
     Field("branch", "choice", "of a dry test's load", '"cycle"', default="up", choices=_BRANCHES),
     Field("sample_rate", "frequency", "of this run", '"500 Hz"', above=0.0),
-    Field("rotation", "choice", "of this run; default the shaft's", '"clockwise"', choices=_ROTATIONS),
+    Field("rotation", "choice", "of this run; default the shaft's", '"clockwise"', choices=ROTATIONS),
     Field("temperature", "temperature", "at the probes; else the mean of the thermometers", '"46 degC"', low=0.0),
 )
 _TABLES = {

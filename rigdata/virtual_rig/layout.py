@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 
+from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.plan import DryTest, PlannedRun
@@ -111,7 +112,10 @@ def manifest_text(
     if layout.time_name is not None:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
     blocks += [_channel(sensor) for sensor in instruments.sensors]
-    blocks += [_run(run, layout, common, faults) for run in runs]
+    rotation = next((run.point.rotation for run in runs if run.point is not None), ROTATIONS[0])
+    if rotation != ROTATIONS[0]:
+        blocks.append(_table("[shaft]", {"rotation": rotation}))
+    blocks += [_run(run, layout, common, faults, rotation) for run in runs]
     return "\n".join(blocks)
 
 
@@ -147,7 +151,7 @@ def _channel(sensor: Sensor) -> str:
     return _table(f"[channels.{sensor.name}]", entries)
 
 
-def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Fault, ...]) -> str:
+def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Fault, ...], rotation: str) -> str:
     noted = _as_noted(run, faults)
     entries: dict[str, object] = {"id": run.id}
     if isinstance(layout, CsvLayout):
@@ -162,6 +166,8 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
         entries["shaft_speed"] = f"{noted.point.shaft_speed_hz:.10g} Hz"
         entries["static_load"] = f"{noted.point.static_load / 1e3:.10g} kN"
         entries["static_load_direction"] = _degrees(noted.point.static_load_direction)
+        if noted.point.rotation != rotation:
+            entries["rotation"] = noted.point.rotation
         if noted.kind == "dynamic":
             entries["excitation_frequency"] = f"{noted.point.excitation_hz:.10g} Hz"
             entries["excitation_direction"] = _degrees(noted.direction or 0.0)

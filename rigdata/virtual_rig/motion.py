@@ -80,7 +80,7 @@ class _SteadyMotion:
     load: FloatArray
     lines: tuple[MotionLine, ...]
     temperature: FloatArray  #: (n_pads,), degC
-    speed: float  #: rad/s
+    speed: float  #: rad/s, about +z
     surface: ComplexArray  #: (n_orders,), runout of 1X, 2X, ... [m]
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
@@ -150,7 +150,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     forces = _actuator_forces(run, noise, rng)
     unbalance = noise.shaft.unbalance * actual.shaft_speed**2
     if unbalance:
-        turning = unbalance * np.array([1.0, -1j]) * np.exp(1j * shaft_angle)
+        turning = unbalance * np.array([1.0, -1j * np.sign(actual.spin)]) * np.exp(1j * shaft_angle)
         forces.append((actual.shaft_speed, turning))
     # the surface is the same in the whole campaign
     runout = np.array(noise.shaft.runout, dtype=float)
@@ -166,7 +166,7 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
         load=load_vector(actual),
         lines=tuple(lines),
         temperature=truth.temperatures(steady),
-        speed=actual.shaft_speed,
+        speed=actual.spin,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
     )
     time = np.arange(round(run.seconds * run.rate)) / run.rate

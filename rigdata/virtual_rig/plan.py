@@ -119,6 +119,11 @@ class RigPlan:
         dynamic = operating_points([(2500.0, 25.0), (5000.0, 25.0), (8750.0, 25.0)])
         return replace(cls.like_paper(pads), dynamic=dynamic, locus=locus_points(10))
 
+    def turning(self, rotation: str) -> RigPlan:
+        """The same tests with the shaft turning ``"counter-clockwise"`` or ``"clockwise"``."""
+        dynamic, locus = (tuple(replace(p, rotation=rotation) for p in points) for points in (self.dynamic, self.locus))
+        return replace(self, dynamic=dynamic, locus=locus)
+
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
         runs = (*self._dynamic_runs(), *self._locus_runs(), *self._static_runs(pivot_angles))
@@ -190,8 +195,8 @@ class RigPlan:
         name = _load_name(point)
         if len({p.static_load_direction for p in self.dynamic}) > 1:
             name += f"-w{point.static_load_direction_deg:g}"
-        if len({p.shaft_speed for p in self.dynamic}) > 1:
-            name += f"-n{point.shaft_speed_hz:g}"
+        if len({p.spin for p in self.dynamic}) > 1:
+            name += f"-n{point.shaft_speed_hz:g}" + ("-cw" if point.spin < 0.0 else "")
         return name
 
 
@@ -208,7 +213,7 @@ def locus_points(count: int, load: float = 5000.0) -> tuple[OperatingPoint, ...]
 
 
 def _unexcited(point: OperatingPoint) -> tuple[float, float, float]:
-    return point.static_load, point.static_load_direction, point.shaft_speed
+    return point.static_load, point.static_load_direction, point.spin
 
 
 def _load_name(point: OperatingPoint) -> str:

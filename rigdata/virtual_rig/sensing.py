@@ -60,7 +60,7 @@ def _sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vecto
     if sensor.quantity == "temperature":
         return np.full(n, physics.motion.temperature[(sensor.pad or 1) - 1])
     if sensor.quantity == "speed" or vector is None or sensor.axis is None:
-        return np.full(n, physics.motion.speed)
+        return np.full(n, abs(physics.motion.speed))
     value = vector @ felt_direction(sensor, instruments)
     if sensor.quantity == "displacement":
         late = physics.time - sensor.error.delay

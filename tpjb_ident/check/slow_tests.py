@@ -204,9 +204,8 @@ def check_locus(runs: Sequence[Observation]) -> None:
     for observation in runs:
         measured = len(observation.pick("displacement")) == 2 and len(observation.pick("force")) >= 2
         if observation.lines is not None and measured and "force" not in observation.report.doubts:
-            groups.setdefault((observation.run.point.static_load, observation.run.point.shaft_speed), []).append(
-                observation
-            )
+            point = observation.run.point
+            groups.setdefault((point.static_load, point.spin), []).append(observation)
     for group in groups.values():
         loads: list[FloatArray] = []
         places: list[FloatArray] = []

@@ -92,6 +92,7 @@ class Locus(Presented):
                 "static_load_N": [p.point.static_load for p in self.points],
                 "static_load_direction_deg": [p.point.static_load_direction_deg for p in self.points],
                 "shaft_speed_Hz": [p.point.shaft_speed_hz for p in self.points],
+                "rotation": [p.point.rotation for p in self.points],
                 "static_load_measured_N": [p.load for p in self.points],
                 "static_load_direction_measured_deg": [math.degrees(p.load_direction) for p in self.points],
                 "x_m": place[:, 0],
@@ -168,7 +169,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
         points.append(
             LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
         )
-    points.sort(key=lambda p: (p.point.static_load, p.point.shaft_speed, _from_down(p.point.static_load_direction)))
+    points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
     return Locus(tuple(points), np.asarray(centre), drift, (*_status(points, polygon, drift), *refused))
 
 
@@ -280,7 +281,7 @@ def _drift(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
     turn = abs(math.remainder(first.static_load_direction - second.static_load_direction, 2 * math.pi))
-    same = first.static_load == second.static_load and first.shaft_speed == second.shaft_speed
+    same = first.static_load == second.static_load and first.spin == second.spin
     return same and turn < _SAME_DIRECTION
 
 

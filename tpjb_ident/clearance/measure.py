@@ -108,6 +108,7 @@ class ClearancePolygon(Presented):
                 "fitted_angle_deg_se": np.degrees(self.fitted_angle_se),
                 "push_load_N": self.push_load,
                 "shaft_speed_Hz": self.point.shaft_speed_hz,
+                "rotation": self.point.rotation,
                 "temperature_K": self.temperature,
                 "run": self.run,
             }
@@ -346,7 +347,7 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
         light, heavy = sorted((base, polygon), key=lambda p: p.push_load)
         # one speed and one temperature, or nobody knows better
         warmer = abs(base.temperature - polygon.temperature) > _SAME_TEMPERATURE
-        same = base.point.shaft_speed == polygon.point.shaft_speed and not warmer
+        same = base.point.spin == polygon.point.spin and not warmer
         columns: dict[str, object] = {
             "run": polygon.run,
             "against": base.run,

@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rigdata.operating_point import OperatingPoint
+from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
 
 HZ = 2.0 * math.pi
-#: How a shaft turns; a table that does not say means the first.
-ROTATIONS = ("counter-clockwise", "clockwise")
 _NEEDED = ("static_load_N", "shaft_speed_Hz")
 #: A column that looks like a coefficient: misspelt, it would be silently left out.
 _COEFFICIENT = re.compile(r"[A-Za-z]{1,5}_[A-Za-z_]*per_(?:m|in)(_se|_lo|_hi|)")
@@ -36,7 +34,6 @@ class TableRow:
 
     line: int
     point: OperatingPoint
-    rotation: str
     coefficients: dict[str, tuple[float, float]]
     position: tuple[float, float]  #: [m], NaN where the table has none
     converged: bool
@@ -63,15 +60,15 @@ def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[T
 def read_rows(path: Path) -> tuple[TableRow, ...]:
     """Read a table of coefficients, measured or predicted; rows that hold none are left out."""
     rows: list[TableRow] = []
-    places: set[tuple[OperatingPoint, str]] = set()
+    places: set[OperatingPoint] = set()
     frame = read_table(path, _NEEDED, _COEFFICIENT)
     for line, cells in zip(frame.attrs["lines"], frame.to_dict("records"), strict=True):
         row = _row(cells, line, f"{path.name}, line {line}")
         if not row.coefficients:
             continue
-        if (row.point, row.rotation) in places:
+        if row.point in places:
             raise BadInputError(f"{path.name}, line {line}: a second row for the same point. Keep one of them.")
-        places.add((row.point, row.rotation))
+        places.add(row.point)
         rows.append(row)
     if not rows:
         raise BadInputError(f"{path.name}: holds no coefficient. Name columns as in coefficients.csv: kxx_N_per_m, ...")
@@ -83,17 +80,18 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     if not (load > 0.0 and speed > 0.0):
         raise BadInputError(f"{place}: static_load_N and shaft_speed_Hz must be positive numbers.")
     direction, excitation = cells.get("static_load_direction_deg", math.nan), cells.get("excitation_Hz", math.nan)
+    rotation = cells.get("rotation") or ROTATIONS[0]
+    if rotation not in ROTATIONS:
+        raise BadInputError(f"{place}: rotation {rotation[:40]!r} is not known. Write {' or '.join(ROTATIONS)}.")
     point = OperatingPoint(
         load,
         math.radians(-90.0 if math.isnan(direction) else direction),
         speed,
         speed if math.isnan(excitation) else HZ * excitation,
+        rotation,
     )
-    rotation = cells.get("rotation") or ROTATIONS[0]
-    if rotation not in ROTATIONS:
-        raise BadInputError(f"{place}: rotation {rotation[:40]!r} is not known. Write {' or '.join(ROTATIONS)}.")
     position = (cells.get("x_m", math.nan), cells.get("y_m", math.nan))
-    return TableRow(line, point, rotation, _coefficients(cells), position, cells.get("converged") is not False)
+    return TableRow(line, point, _coefficients(cells), position, cells.get("converged") is not False)
 
 
 def _coefficients(cells: Mapping[Any, Any]) -> dict[str, tuple[float, float]]:

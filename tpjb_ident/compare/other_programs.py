@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.coefficient_table import ROTATIONS, TableRow, read_rows
+from tpjb_ident.compare.coefficient_table import TableRow, read_rows
 from tpjb_ident.compare.comparison import VARIANTS, Comparison, Variant
 from tpjb_ident.compare.predictions import TablePoint
 from tpjb_ident.errors import BadInputError
@@ -70,7 +70,7 @@ def _nearest(rows: Sequence[TableRow], point: OperatingPoint) -> TableRow | None
 
 def _distance(row: TableRow, point: OperatingPoint) -> float:
     """Largest deviation of a row from an operating point, over its tolerance."""
-    if row.rotation != ROTATIONS[0]:
+    if row.point.rotation != point.rotation:
         return math.inf
     excitation = point.excitation or point.shaft_speed
     turn = row.point.static_load_direction - point.static_load_direction

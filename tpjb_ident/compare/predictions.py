@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from model.pivots import formula_pivot
 from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.schema import KINDS
+from tpjb_ident.schema import KINDS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,8 +115,9 @@ def predict_points(
             pivots=settings.pivots,
             thermal=settings.thermal,
             effects=settings.effects,
-            start=before,
+            start=before if before is not None and before.rotation == static.rotation else None,
             options=settings.options,
+            rotation=static.rotation,
         )
         before = prediction if prediction.converged else None
         found[static] = prediction
@@ -130,17 +131,13 @@ def _excitation(point: OperatingPoint) -> float:
 
 
 def _static(point: OperatingPoint) -> OperatingPoint:
-    return OperatingPoint(point.static_load, point.static_load_direction, point.shaft_speed)
+    return replace(point, excitation=0.0)
 
 
-def point_columns(point: OperatingPoint) -> dict[str, float]:
+def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     """Key columns of every table over operating points (outputs.md)."""
-    return {
-        "static_load_N": point.static_load,
-        "static_load_direction_deg": point.static_load_direction_deg,
-        "shaft_speed_Hz": point.shaft_speed_hz,
-        "excitation_Hz": round(_excitation(point) / (2 * math.pi), 9),
-    }
+    excited = replace(point, excitation=_excitation(point))
+    return dict(zip(POINT_KEY, excited.key, strict=True))
 
 
 def coefficient_names(kind: str) -> tuple[str, ...]:

@@ -80,8 +80,8 @@ class _SolvedSetup:
         self.solve = functools.lru_cache(maxsize=4096)(self._solve)
 
     def _solve(self, static: OperatingPoint) -> Prediction:
-        speed = static.shaft_speed
-        prediction = predict_setup(self.setup, static.static_load, static.static_load_direction, speed, speed)
+        setup, speed = self.setup, static.spin
+        prediction = predict_setup(setup, static.static_load, static.static_load_direction, speed, static.shaft_speed)
         if not prediction.converged:
             place = f"{static.static_load:g} N, {static.static_load_direction_deg:g} deg, {static.shaft_speed_hz:g} Hz"
             why = "; ".join(prediction.status)

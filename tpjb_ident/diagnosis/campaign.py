@@ -140,6 +140,7 @@ def diagnose_campaign(
     pivot_flexibility
     """
     settings = settings or DiagnoseSettings()
+    bearing = bearing.stated_for(campaign.rotation)
     measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
     return _diagnose_measured(measured, bearing, baseline, settings, progress)
 

@@ -159,10 +159,10 @@ def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: t
     if not points:
         raise ArgumentError("points: the plan has no dynamic runs. Give at least one operating point.")
     pads = len(bearing.pads)
-    keys = sorted({(p.static_load, p.static_load_direction, p.shaft_speed) for p in points})
+    keys = sorted({(p.static_load, p.static_load_direction, p.spin) for p in points})
     tests: list[DynamicTest] = []
     for w, direction, omega in keys:
-        lines = sorted({p.excitation for p in points if (p.static_load, p.shaft_speed) == (w, omega)})
+        lines = sorted({p.excitation for p in points if (p.static_load, p.spin) == (w, omega)})
         tests += dynamic([w], lines, omega, direction, pads if sensors else 0)
     middle = keys[len(keys) // 2]
     return Layout(

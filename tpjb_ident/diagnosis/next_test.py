@@ -22,9 +22,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from model.effects import Effect, kind_of
-from model.instruments import SensorMap
+from model.mirror import rotation_of
 from model.setup import Setup
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
@@ -35,9 +35,6 @@ from tpjb_ident.diagnosis.search.components import usual_factor
 HZ = 2 * math.pi
 #: Step of the supply temperature that a cooler can make [K].
 _HOTTER = 10.0
-#: The model knows one sense of rotation: a shaft that turns clockwise is, seen in a mirror along the y axis, one that
-#: turns counter-clockwise. There x becomes -x, angles pi minus themselves, and a pad's leading edge its trailing one.
-_MIRROR = np.diag([-1.0, 1.0])
 #: How far from the middle of its pad a pivot may sit for the shaft to turn either way [share of the arc].
 _CENTRAL = 0.05
 
@@ -112,7 +109,7 @@ class _OperatingRange:
 
     @property
     def shaft(self) -> str:
-        return f"{self.speed / HZ:.0f} Hz"
+        return f"{abs(self.speed) / HZ:.0f} Hz"
 
     def tests(
         self, loads: Sequence[float], lines: Sequence[float], sensors: bool = False, faster: float = 1.0
@@ -150,7 +147,7 @@ def _other_points(at: _OperatingRange) -> list[Design]:
     ]  # fmt: skip
     return out + [
         Design(
-            f"the load sweep repeated at {factor * at.speed / HZ:.0f} Hz shaft speed, with pad temperatures",
+            f"the load sweep repeated at {factor * abs(at.speed) / HZ:.0f} Hz shaft speed, with pad temperatures",
             Layout(at.tests(loads, at.lines[:1], True, factor)),
         )
         for factor in (1.5, 0.5)
@@ -177,9 +174,14 @@ def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
     if reversible(setup):
         out.append(
             Design("the load sweep repeated with the shaft turning the other way, with pad temperatures",
-                   _mirrored_layout(sweep), change=mirrored)
+                   Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True, faster=-1.0)),
+                   change=functools.partial(_stated_for, rotation=rotation_of(at.speed)))
         )  # fmt: skip
     return out
+
+
+def _stated_for(setup: Setup, rotation: str) -> Setup:
+    return setup.change(bearing=setup.bearing.stated_for(rotation))
 
 
 def _hotter(setup: Setup, by: float) -> Setup:
@@ -224,31 +226,6 @@ def _dry(layout: Layout, pads: int) -> list[Design]:
 def reversible(setup: Setup) -> bool:
     """Whether every pad would carry with the shaft turning the other way."""
     return all(abs(pad.pivot_offset - 0.5) <= _CENTRAL for pad in setup.bearing.pads)
-
-
-def mirrored(setup: Setup) -> Setup:
-    """The set-up as a mirror shows it: its answers at a mirrored layout are those of the other sense of rotation."""
-    angle, towards = setup.misalignment
-    turned = setup.change_pads(
-        lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle, pivot_offset=1.0 - pad.pivot_offset)
-    )
-    displacement = tuple(map(_map, setup.instruments.displacement))
-    force = tuple(map(_map, setup.instruments.force))
-    instruments = replace(setup.instruments, displacement=displacement, force=force)
-    return turned.change(misalignment=(angle, math.pi - towards), instruments=instruments)
-
-
-def _mirrored_layout(layout: Layout) -> Layout:
-    """Dynamic tests as a mirror shows them, thermometers where they sit."""
-    tests = tuple(DynamicTest(t.load, math.pi - t.direction, t.speed, t.excitation, t.pads) for t in layout.dynamic)
-    return Layout(tests, temperature_position=tuple(1.0 - place for place in layout.temperature_position))
-
-
-def _map(one: SensorMap) -> SensorMap:
-    def seen(omega: float) -> ComplexArray:
-        return np.asarray(_MIRROR @ one(omega) @ _MIRROR)
-
-    return seen
 
 
 #: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong

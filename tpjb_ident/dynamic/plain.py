@@ -24,7 +24,7 @@ from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.phasors.windows import WindowSettings
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,8 +84,7 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
     rows = []
     for p in points:
         point = p.data.point
-        place = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
-        row: dict[str, object] = dict(zip(POINT_COLUMNS, place))
+        row: dict[str, object] = dict(zip(POINT_KEY, point.key))
         factor = np.repeat([1.0, 1 / point.excitation], 4)
         values = np.concatenate([p.h.real.ravel(), p.h.imag.ravel()]) * factor
         for name, value, error in zip(COEFFICIENT_COLUMNS, values, p.standard_error * factor):
@@ -93,7 +92,7 @@ def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.Dat
         figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, "; ".join(p.status) or "ok")
         rows.append(row | dict(zip(_FIGURES, figures)))
     columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
-    return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *columns, *_FIGURES])
+    return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])
 
 
 def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
@@ -105,10 +104,7 @@ def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
         for number, p in enumerate(points):
             group = file.create_group(f"point-{number:03d}")
             point = p.data.point
-            group.attrs["static_load_N"] = point.static_load
-            group.attrs["static_load_direction_deg"] = point.static_load_direction_deg
-            group.attrs["shaft_speed_Hz"] = point.shaft_speed_hz
-            group.attrs["excitation_Hz"] = point.excitation_hz
+            group.attrs.update(zip(POINT_KEY, point.key))
             group.attrs["runs"] = [run.run for run in p.data.runs]
             for name, values in (("R", p.R), ("f", p.f), ("run_index", p.data.run_index[p.data.whole])):
                 group.create_dataset(name, data=values, track_times=False)

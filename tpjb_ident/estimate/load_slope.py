@@ -20,10 +20,10 @@ def slopes_over_load(points: Sequence[OperatingPoint], h: ComplexArray) -> tuple
     """
     slope = UNKNOWN_EXPONENT * np.nan_to_num(h)
     known = np.zeros(len(points), dtype=bool)
-    families: dict[tuple[float, ...], list[int]] = {}
+    families: dict[tuple[object, ...], list[int]] = {}
     for i, p in enumerate(points):
         if p.static_load > 0 and np.isfinite(h[i]).all():
-            families.setdefault((p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz), []).append(i)
+            families.setdefault(p.key[1:], []).append(i)
     for members in families.values():
         members.sort(key=lambda i: points[i].static_load)
         log_load = np.log([points[i].static_load for i in members])
@@ -54,10 +54,5 @@ def _log_gradient(values: FloatArray, log_load: FloatArray) -> FloatArray:
 def _nearest(points: Sequence[OperatingPoint], i: int, known: BoolArray) -> int | None:
     """Point with a known slope at the same load, direction and speed, nearest in excitation."""
     p = points[i]
-    place = (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz)
-    like = [
-        j
-        for j in np.flatnonzero(known).tolist()
-        if (points[j].static_load, points[j].static_load_direction_deg, points[j].shaft_speed_hz) == place
-    ]
+    like = [j for j in np.flatnonzero(known).tolist() if points[j].static_key == p.static_key]
     return min(like, key=lambda j: abs(points[j].excitation - p.excitation), default=None)

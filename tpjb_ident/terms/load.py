@@ -25,13 +25,11 @@ class Load(Additive):
         super().__init__(rig, blocks)
         self.turn = LoadTurn(rig, blocks)
         families = self.turn.families
-        self._family = np.array(
-            [families.index((p.static_load_direction_deg, p.shaft_speed_hz)) for p in blocks.points]
-        )
+        self._family = np.array([families.index(p.static_key[1:]) for p in blocks.points])
         if not np.any(np.abs(blocks.miss) > 0):
             return
         parameters = []
-        for k, (direction, _) in enumerate(families):
+        for k, (direction, *_) in enumerate(families):
             mine = self._family[blocks.point] == k
             _, first = np.unique(blocks.run[mine], return_index=True)
             misses = blocks.miss[mine][first]

@@ -33,7 +33,7 @@ class LoadTurn(Additive):
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
-        keys = [(p.static_load_direction_deg, p.shaft_speed_hz) for p in blocks.points]
+        keys = [p.static_key[1:] for p in blocks.points]
         self.families = list(dict.fromkeys(keys))
         self._family = np.array([self.families.index(key) for key in keys])
         self._log_load = np.log(np.maximum([p.static_load for p in blocks.points], 1e-9))
@@ -41,7 +41,7 @@ class LoadTurn(Additive):
         if not np.any(blocks.miss.imag):
             return
         parameters = []
-        for direction, _ in self.families:
+        for direction, *_ in self.families:
             deviations = [PLAUSIBLE[0]] * _SLOPES + [PLAUSIBLE[1]] * (_NUMBERS - _SLOPES)
             parameters += [Parameter(f"{direction:g} deg, {i}", "1/rad", dev) for i, dev in enumerate(deviations)]
         self.parameters = tuple(parameters)

@@ -160,7 +160,7 @@ def _current_run(states: Sequence[RunStatus]) -> Run | None:
 
 def _set_up(run: Run) -> tuple[float, float, float]:
     """Load [N], its direction [rad] and speed [rad/s]: what takes time to change at the rig."""
-    return run.point.static_load, run.point.static_load_direction, run.point.shaft_speed
+    return run.point.static_load, run.point.static_load_direction, run.point.spin
 
 
 def _load(point: OperatingPoint) -> str:

@@ -133,10 +133,7 @@ def _show_coverage(c: Command, campaign: Campaign) -> None:
         if not runs:
             continue
         points = [run.point for run in runs]
-        if kind == "dry_pivot":
-            places = len({run.pad for run in runs})
-        else:
-            places = len({(p.static_load, p.static_load_direction, p.shaft_speed, p.excitation) for p in points})
+        places = len({run.pad for run in runs}) if kind == "dry_pivot" else len({p.key for p in points})
         ranges = [
             [_rate(run) for run in runs],
             [p.static_load for p in points],

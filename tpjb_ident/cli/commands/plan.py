@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice
-from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Speeds
+from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice, rotation_choice
+from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Rotation, Speeds
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import signed
 from tpjb_ident.runtime.tables import write_text
@@ -33,6 +33,7 @@ def plan(
     load: Loads = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
     load_direction: LoadDirections = "-90 deg",
     speed: Speeds = "22 Hz",
+    rotation: Rotation = None,
     excitation: Annotated[str, typer.Option(help="Excitation frequencies, each at every load.")] = "10, 25, 40 Hz",
     locus: Annotated[int, typer.Option(min=0, max=360, help="Load directions of the shaft locus; 0: none.")] = 20,
     dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,
@@ -56,7 +57,7 @@ def plan(
     from tpjb_ident.diagnosis.plan import plan as plan_campaign
     from tpjb_ident.report.panels import save_isolability
 
-    points = operating_points(load, load_direction, speed, excitation)
+    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
     with c.results() as folder:
         with c.progress("planning") as show:

@@ -9,7 +9,13 @@ import typer
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import model_settings, operating_points, pivot_choice, refuse_impossible
+from tpjb_ident.cli.common.model_inputs import (
+    model_settings,
+    operating_points,
+    pivot_choice,
+    refuse_impossible,
+    rotation_choice,
+)
 from tpjb_ident.cli.common.options import (
     ROCKER,
     BearingPath,
@@ -17,6 +23,7 @@ from tpjb_ident.cli.common.options import (
     LoadDirections,
     Loads,
     PivotChoice,
+    Rotation,
     Speeds,
     Thermal,
     refuse_unknown,
@@ -81,6 +88,7 @@ def predict(
     load: Loads = "5 kN",
     load_direction: LoadDirections = "-90 deg",
     speed: Speeds = "22 Hz",
+    rotation: Rotation = None,
     excitation: Annotated[
         str | None, typer.Option(help='Excitation frequencies: "10..50:10 Hz" [default: synchronous].')
     ] = None,
@@ -96,7 +104,6 @@ def predict(
     combination of load, direction, speed and excitation is predicted. Writes prediction.csv and .parquet.
     """
     c.options["excitation"] = excitation or "synchronous"
-    points = operating_points(load, load_direction, speed, excitation)
     pivot_model = pivot_choice(c, pivots)
     settings = model_settings(c, pivot_model, thermal, effects)
     settings = replace(settings, options=parse_physics(physics, housing_temperature))
@@ -104,6 +111,7 @@ def predict(
 
     refuse_counted_twice(pivot_model, settings.effects, effects)
     drawing = c.bearing(bearing)
+    points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     refuse_impossible(settings.effects, effects, drawing)
     with c.results():
         frame = _predicted(c, drawing, points, settings)

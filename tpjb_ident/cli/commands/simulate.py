@@ -9,8 +9,14 @@ import typer
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import model_settings, operating_points, pivot_choice, refuse_impossible
-from tpjb_ident.cli.common.options import ROCKER, BearingPath, EffectsFile, PivotChoice, Speeds, Thermal
+from tpjb_ident.cli.common.model_inputs import (
+    model_settings,
+    operating_points,
+    pivot_choice,
+    refuse_impossible,
+    rotation_choice,
+)
+from tpjb_ident.cli.common.options import ROCKER, BearingPath, EffectsFile, PivotChoice, Rotation, Speeds, Thermal
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -36,6 +42,7 @@ def simulate(
         str | None, typer.Option(help="Excitation frequencies, each at every --load [default: 25 Hz].")
     ] = None,
     speed: Speeds = "22 Hz",
+    rotation: Rotation = None,
     repeats: Annotated[int, typer.Option(min=1, max=100, help="Records per point and direction.")] = 1,
     noise: Annotated[
         float, typer.Option(min=0.0, max=1000.0, help="Channel noise: 1 as on a real rig, 0 no disturbance at all.")
@@ -62,7 +69,8 @@ def simulate(
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
     refuse_impossible(settings.effects, effects, drawing)
-    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats)
+    sense = rotation_choice(c, rotation, drawing)
+    tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(sense)
     largest = max(point.static_load for point in tests.dynamic)
     rig = VirtualRig(
         truth=rig_truth(drawing, settings, bearing.read_text(encoding="utf-8-sig")),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
+from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.cli.common.command import Command
 from tpjb_ident.cli.common.options import refuse_unknown
 from tpjb_ident.cli.common.quantities import MAX_VALUES, parse_value, parse_values
@@ -16,28 +17,35 @@ from tpjb_ident.errors import BadInputError
 if TYPE_CHECKING:
     from model.bearing import Bearing
     from model.effects import Effect
-    from rigdata.operating_point import OperatingPoint
     from tpjb_ident.compare.predictions import ModelSettings
 
 _PIVOTS = ("rigid", "kirk", "kirk-secant")
 _THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
-def operating_points(load: str, load_direction: str, speed: str, excitation: str | None) -> list[OperatingPoint]:
-    """Every combination of the four options, SI."""
+def operating_points(
+    load: str, load_direction: str, speed: str, excitation: str | None, rotation: str = ROTATIONS[0]
+) -> list[OperatingPoint]:
+    """Every combination of the first four options, SI."""
     loads = parse_values(load, "force", "--load")
     directions = parse_values(load_direction, "angle", "--load-direction")
     speeds = parse_values(speed, "speed", "--speed")
     frequencies = parse_values(excitation, "speed", "--excitation") if excitation else (0.0,)
     _refuse_negative(loads, "--load", "Give the direction of the load with --load-direction.")
-    _refuse_negative(speeds, "--speed", "The shaft turns counter-clockwise.")
+    _refuse_negative(speeds, "--speed", "Which way the shaft turns is said by --rotation.")
     if excitation:
         _refuse_negative(frequencies, "--excitation", "Leave the option out for synchronous coefficients.")
     if len(loads) * len(directions) * len(speeds) * len(frequencies) > MAX_VALUES:
         raise BadInputError(f"more than {MAX_VALUES} operating points. Take larger steps.")
-    from rigdata.operating_point import OperatingPoint
+    return [OperatingPoint(*point, rotation) for point in itertools.product(loads, directions, speeds, frequencies)]
 
-    return list(itertools.starmap(OperatingPoint, itertools.product(loads, directions, speeds, frequencies)))
+
+def rotation_choice(c: Command, rotation: str | None, bearing: Bearing) -> str:
+    """What --rotation means: itself, or the bearing file's sense of turning."""
+    if rotation is not None:
+        refuse_unknown(rotation, ROTATIONS, "--rotation")
+    c.options["rotation"] = chosen = rotation or bearing.rotation or ROTATIONS[0]
+    return chosen
 
 
 def _refuse_negative(values: Sequence[float], option: str, remedy: str) -> None:

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from rigdata.near_names import nearest_name
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 
 #: Bundled files that the examples use, from the folder of the sources.
@@ -55,6 +56,14 @@ PivotChoice = Annotated[
 Loads = Annotated[str, typer.Option("--load", help='Static loads per bearing: "2.5 kN, 5 kN" or "2.5..8.75:1.25 kN".')]
 LoadDirections = Annotated[str, typer.Option("--load-direction", help="Where the load pushes the shaft, from +X.")]
 Speeds = Annotated[str, typer.Option("--speed", help='Shaft speeds: "22 Hz" or "1320 rpm".')]
+Rotation = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation",
+        help="Which way the shaft turns [default: the bearing file's, else counter-clockwise].",
+        autocompletion=one_of(*ROTATIONS),
+    ),
+]
 EffectsFile = Annotated[
     Path | None, typer.Option("--effects", metavar="FILE", help="Effects file: what the baseline model lacks.")
 ]
@@ -111,7 +120,7 @@ _MANY = 11
 #: Headings of the help with the parameters under them, in their order; others stand under "Options".
 _HEADINGS = {
     "Arguments": "",
-    "Operating points": "load load_direction speed excitation",
+    "Operating points": "load load_direction speed rotation excitation",
     "Model": "bearing pivots thermal effects physics housing_temperature model_tolerance tolerance library",
     "A table in place of records": "coefficients reading_error",
     "Estimation": "method norm lines delay",

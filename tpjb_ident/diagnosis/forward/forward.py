@@ -12,7 +12,8 @@ import numpy as np
 from model.dynamics import bearing_impedance, with_structure
 from model.effects import Effect, apply_effects
 from model.instruments import Instruments
-from model.predict import solve_as_it_runs
+from model.mirror import runs_backward
+from model.predict import in_rig, solve_as_it_runs
 from model.setup import Setup
 from model.static_tests import dry_curve, polygon_sides
 from model.statics.equilibrium import Equilibrium
@@ -20,6 +21,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.diagnosis.observations.observe import DryTest, DynamicTest, Element, Layout
 from tpjb_ident.errors import TpjbError
 
+#: Load [N], its direction [rad], shaft speed about +z [rad/s]: negative where it turns clockwise.
 StaticPoint = tuple[float, float, float]
 Key = tuple[StaticPoint, tuple[float, ...], tuple[float, ...]]
 _PLAIN: dict[str, Any] = {
@@ -98,9 +100,11 @@ class ModelCache:
             raise NoEquilibriumError(f"no equilibrium at {load:.0f} N ({', '.join(equilibrium.status)})")
         self.start[point] = equilibrium
         h = bearing_impedance(running, equilibrium, np.array(lines)) if lines else np.zeros((0, 2, 2), complex)
+        if runs_backward(setup.bearing, speed):
+            sensors = tuple(1.0 - place for place in sensors)
         warm = np.array([film.temperature_at(place) for film, place in zip(equilibrium.films, sensors, strict=True)])
         loads = np.array([film.forces.force[0] if film.forces is not None else 0.0 for film in equilibrium.films])
-        return SolvedPoint(h, equilibrium.position, force, warm, loads)
+        return SolvedPoint(h, in_rig(running, equilibrium.position), force, warm, loads)
 
 
 __all__ = ["Forward", "ForwardModel", "NoEquilibriumError"]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import read_coefficients
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Element, Layout, Observations, Tolerance
 
@@ -21,7 +22,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
     tests: dict[tuple[float, float, float], list[float]] = {}
     for entry in read_coefficients(path, reading_error):
         point = entry.point
-        static = (point.static_load, point.static_load_direction, point.shaft_speed)
+        static = (point.static_load, point.static_load_direction, point.spin)
         tests.setdefault(static, []).append(point.excitation)
         where = tuple(zip(("load", "direction", "speed", "excitation"), (*static, point.excitation), strict=True))
         for part in "kc":

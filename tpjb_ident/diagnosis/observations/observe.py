@@ -170,7 +170,7 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
     tests: dict[tuple[float, float, float], list[int]] = {}
     points = [p for p in identification.points if not _mains_on_excitation(p)] or list(identification.points)
     for i, p in enumerate(points):
-        key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed)
+        key = (p.point.static_load, p.point.static_load_direction, p.point.spin)
         tests.setdefault(key, []).append(i)
     out = []
     for (load, direction, speed), members in tests.items():
@@ -218,7 +218,7 @@ def _add_locus(
     stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
     for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
         place = (
-            ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.shaft_speed),
+            ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.spin),
         )  # fmt: skip
         names = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
@@ -229,7 +229,7 @@ def _add_locus(
             [Element(family, name, place) for family, name in names],
             np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
         )  # fmt: skip
-        out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.shaft_speed))
+        out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.spin))
     return tuple(out)
 
 
@@ -289,7 +289,7 @@ def _turned(point: LocusPoint, locus: Locus) -> FloatArray:
     """Change of a position with the load's direction: slope of the locus itself, through its harmonics (2,)."""
     alike = [
         p for p in locus.points
-        if (p.point.static_load, p.point.shaft_speed) == (point.point.static_load, point.point.shaft_speed)
+        if (p.point.static_load, p.point.spin) == (point.point.static_load, point.point.spin)
     ]  # fmt: skip
     angle = np.array([p.point.static_load_direction for p in alike])
     place = np.array([p.position for p in alike])

@@ -142,7 +142,7 @@ def drifts(problem: Problem, fitted: Fit) -> tuple[Drift, ...]:
 
 def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drift] | None:  # type: ignore[no-untyped-def]
     name, coordinate, levels = row
-    coordinates = np.array([e.place(coordinate) if e.family in {"h", "temperature"} else math.nan
+    coordinates = np.array([abs(e.place(coordinate)) if e.family in {"h", "temperature"} else math.nan
                       for e in problem.observations.elements])  # fmt: skip
     finite_values = sorted(set(coordinates[np.isfinite(coordinates)]))
     if len(finite_values) < levels:

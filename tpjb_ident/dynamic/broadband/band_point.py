@@ -145,9 +145,7 @@ def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
     """Group broadband runs by operating point and kind of excitation, sorted."""
     groups: dict[tuple[object, ...], list[Run]] = {}
     for run in runs:
-        p = run.point
-        key = (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, run.excitation_kind)
-        groups.setdefault(key, []).append(run)
+        groups.setdefault((*run.point.static_key, run.excitation_kind), []).append(run)
     return [_group(groups[key]) for key in sorted(groups, key=repr)]
 
 
@@ -158,9 +156,7 @@ def _group(runs: list[Run]) -> BandGroup:
     if not low < high:
         text = f"runs at {first.point} have no common excitation_band"
         raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
-    p = first.point
-    point = OperatingPoint(p.static_load, p.static_load_direction, p.shaft_speed, 0.0)
-    return BandGroup(point, first.excitation_kind, (low, high), tuple(runs))
+    return BandGroup(replace(first.point, excitation=0.0), first.excitation_kind, (low, high), tuple(runs))
 
 
 def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition, ...]]:

@@ -19,12 +19,12 @@ from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditio
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.quality import feeds_motion
 from tpjb_ident.dynamic.runs.point_data import pad_means
-from tpjb_ident.schema import KINDS, STATIC_COLUMNS
+from tpjb_ident.schema import KINDS, STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_KEY_COLUMNS = (*STATIC_COLUMNS, "excitation")
+_KEY_COLUMNS = (*STATIC_KEY, "excitation")
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,7 @@ class BandResult:
 
     def key(self) -> dict[str, Any]:
         """Columns that name the result."""
-        p = self.point
-        values = (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, self.kind)
-        return dict(zip(_KEY_COLUMNS, values))
+        return dict(zip(_KEY_COLUMNS, (*self.point.static_key, self.kind)))
 
 
 def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.DataFrame:

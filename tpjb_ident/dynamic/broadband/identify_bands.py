@@ -120,8 +120,7 @@ def _slopes(points: list[BandPoint], first: list[list[LineEstimates]], i: int) -
         j
         for j, point in enumerate(points)
         if point.group.kind == mine.group.kind
-        and point.point.static_load_direction_deg == mine.point.static_load_direction_deg
-        and point.point.shaft_speed_hz == mine.point.shaft_speed_hz
+        and point.point.static_key[1:] == mine.point.static_key[1:]
         and point.point.static_load > 0
     ]
     curves = [_over(mine.plan.frequencies, points[j].plan.frequencies, first[j]) for j in neighbours]

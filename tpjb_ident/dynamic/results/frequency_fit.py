@@ -152,11 +152,10 @@ def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
 
     Points with mains on the excitation line take part: their intervals say what they are worth.
     """
-    groups: dict[tuple[float, ...], list[PointResult]] = {}
+    groups: dict[tuple[object, ...], list[PointResult]] = {}
     for p in points:
-        key = (p.point.static_load, p.point.static_load_direction_deg, p.point.shaft_speed_hz)
         if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(key, []).append(p)
+            groups.setdefault(p.point.static_key, []).append(p)
     result = []
     for members in groups.values():
         estimates = [p.stiffness for p in members]

@@ -120,13 +120,13 @@ def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float,
 
     With a single frequency Re h itself stands in.
     """
-    groups: dict[tuple[float, ...], list[PointResult]] = {}
+    groups: dict[tuple[object, ...], list[PointResult]] = {}
     for p in points:
         if np.isfinite(p.stiffness.h).all():
-            key = (p.point.static_load, p.point.static_load_direction, p.point.shaft_speed_hz)
-            groups.setdefault(key, []).append(p)
+            groups.setdefault(p.point.static_key, []).append(p)
     result = []
-    for (load, direction, _), members in groups.items():
+    for members in groups.values():
+        load, direction = members[0].point.static_load, members[0].point.static_load_direction
         square = np.array([p.stiffness.omega**2 for p in members])
         k = np.array([p.stiffness.k.ravel() for p in members])
         several = len(members) > 1 and np.ptp(square) > 0

@@ -15,7 +15,7 @@ from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
 from tpjb_ident.dynamic.results.frequency_fit import FrequencyFit, LoadFits, fits_per_load
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.presentation import Presented
-from tpjb_ident.schema import DAMPING, KINDS, POINT_COLUMNS, STATIC_COLUMNS, STIFFNESS
+from tpjb_ident.schema import DAMPING, KINDS, POINT_KEY, STATIC_KEY, STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,8 +34,8 @@ _FIT_FIGURES = (
     "largest_misfit",
 )
 _FIT_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
-_FIT_COLUMNS = (*STATIC_COLUMNS, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
-_WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_COLUMNS)
+_FIT_COLUMNS = (*STATIC_KEY, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
+_WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
 #: Sources that scatter from run to run; all others are common to the runs.
 _RANDOM = ("random", "load miss", "mains")
 _BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
@@ -137,7 +137,7 @@ class Identification(Presented):
         import pandas as pd
 
         rows = [row for p in self.points for row in _budget_rows(point_columns(p), p.stiffness, p.budget)]
-        return pd.DataFrame(rows, columns=[*POINT_COLUMNS, *_BUDGET_COLUMNS])
+        return pd.DataFrame(rows, columns=[*POINT_KEY, *_BUDGET_COLUMNS])
 
     def frequency_fits(self) -> list[LoadFits]:
         """K-C and K-C-M over the excitation frequencies, for every load that was run at several."""
@@ -174,11 +174,9 @@ class Identification(Presented):
         return {index[id(p)]: group for group in self.frequency_fits() for p in group.points}
 
 
-def point_columns(p: PointResult) -> dict[str, float]:
+def point_columns(p: PointResult) -> dict[str, object]:
     """Key of a point."""
-    point = p.point
-    values = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
-    return dict(zip(POINT_COLUMNS, values))
+    return dict(zip(POINT_KEY, p.point.key))
 
 
 def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None) -> dict[str, Any]:
@@ -218,7 +216,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None)
 
 def _fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
     """One model over frequency of one load."""
-    row: dict[str, Any] = {name: point_columns(group.points[0])[name] for name in STATIC_COLUMNS}
+    row: dict[str, Any] = dict(zip(STATIC_KEY, group.points[0].point.static_key))
     row.update(
         model=fit.model,
         supported=group.supported,

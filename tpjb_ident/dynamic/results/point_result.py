@@ -127,9 +127,5 @@ def _named(point: PointResult, runs: list[str]) -> PointResult:
 
 def _same(one: ExcludedRun, result: PointResult, any_excitation: bool) -> bool:
     run_point, result_point = one.point, result.point
-    alike = (run_point.static_load, run_point.static_load_direction_deg, run_point.shaft_speed_hz) == (
-        result_point.static_load,
-        result_point.static_load_direction_deg,
-        result_point.shaft_speed_hz,
-    )
+    alike = run_point.static_key == result_point.static_key
     return alike and (any_excitation or run_point.excitation_hz == result_point.excitation_hz)

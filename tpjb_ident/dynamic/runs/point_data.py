@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,12 +70,11 @@ def gather(runs: list[RunPhasors]) -> list[PointData]:
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
     """Operating points in order, each with the places of its runs and which line of the run is meant."""
-    groups: dict[tuple[float, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
+    groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
     for k, (stated, frequencies) in enumerate(runs):
         for i, frequency in enumerate(frequencies):
             point = point_of(stated, frequency)
-            key = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
-            groups.setdefault(key, (point, []))[1].append((k, i))
+            groups.setdefault(point.key, (point, []))[1].append((k, i))
     return [groups[key] for key in sorted(groups)]
 
 
@@ -84,8 +83,7 @@ def point_of(point: OperatingPoint, frequency: float) -> OperatingPoint:
     nominal = point.excitation_hz
     if abs(frequency - nominal) <= 0.02 * max(nominal, 1e-9):
         return point
-    rounded = 2 * np.pi * round(frequency, 3)
-    return OperatingPoint(point.static_load, point.static_load_direction, point.shaft_speed, rounded)
+    return replace(point, excitation=2 * np.pi * round(frequency, 3))
 
 
 def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> PointData:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.schema import STATIC_COLUMNS
+from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +41,7 @@ def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
 def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
     """Rows of the longest series over load (at one frequency) or over frequency (at one load); None if none varies."""
     column = _AXES[axis][0]
-    fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_COLUMNS[1:]]
+    fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_KEY[1:]]
     best, length = None, 1
     for _, group in table.groupby(fixed, sort=True):
         if group[column].nunique() > length:

@@ -14,7 +14,7 @@ from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import longest_series, with_errors
-from tpjb_ident.schema import STATIC_COLUMNS
+from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,7 +66,7 @@ def frf(
     if table is None or not len(table):
         raise ValueError("there is no line to draw, or no two excitation frequencies at one load")
     over_band = "coherence_x" in table
-    if over_band and table[[*STATIC_COLUMNS, "excitation"]].nunique().max() > 1:
+    if over_band and table[[*STATIC_KEY, "excitation"]].nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
     for axes, part, name in ((real, "real", "Re h"), (imag, "imag", "Im h")):
@@ -127,10 +127,10 @@ def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _Fit
     """The model that the frequencies of the series support, None where they refuse all."""
     if series is None:
         return None
-    wanted = tuple(series.iloc[0][list(STATIC_COLUMNS)])
+    wanted = tuple(series.iloc[0][list(STATIC_KEY)])
     for group in source.frequency_fits():
-        p, fit = group.points[0].point, group.fits.get(group.supported)
-        if fit is not None and (p.static_load, p.static_load_direction_deg, p.shaft_speed_hz) == wanted:
+        fit = group.fits.get(group.supported)
+        if fit is not None and group.points[0].point.static_key == wanted:
             low, high = (omega / (2 * np.pi) for omega in fit.omega_range)
             return _FittedModel(fit.model, (low, high), fit.h)
     return None
