@@ -64,9 +64,9 @@ class OperatingPoint:
         return self.static_load, self.static_load_direction_deg, self.shaft_speed_hz, self.rotation
 
     @property
-    def key(self) -> tuple[float, float, float, str, float]:
-        """What tells operating points apart: the static point's, and the excitation frequency [Hz]."""
-        return *self.static_key, self.excitation_hz
+    def key(self) -> tuple[float, float, float, float, str]:
+        """What tells operating points apart: load [N], direction [deg], speed and excitation [Hz], sense of turning."""
+        return *self.static_key[:3], self.excitation_hz, self.rotation
 
     @property
     def shaft_speed_hz(self) -> float:

@@ -56,7 +56,7 @@ STATIC_COLUMNS = ("static_load_N", "static_load_direction_deg", "shaft_speed_Hz"
 POINT_COLUMNS = (*STATIC_COLUMNS, "excitation_Hz")
 #: The same with the sense of turning: the values of `OperatingPoint.static_key` and `key`.
 STATIC_KEY = (*STATIC_COLUMNS, "rotation")
-POINT_KEY = (*STATIC_KEY, "excitation_Hz")
+POINT_KEY = (*POINT_COLUMNS, "rotation")
 #: Of pivot curves: tangent and secant.
 TANGENT, SECANT = f"stiffness_{STIFFNESS.suffix}", f"secant_{STIFFNESS.suffix}"
 
@@ -129,7 +129,7 @@ _STATIC = (
     Column("shaft_speed_Hz", "frequency", "Hz", "set point of the shaft speed"),
     Column("rotation", "text", "", "which way the shaft turns: counter-clockwise or clockwise"),
 )
-_POINT = (*_STATIC, Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"))
+_POINT = (*_STATIC[:3], Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"), _STATIC[3])
 _MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")
 _QUALITY = Column("quality", "text", "", 'named conditions, "ok" if there are none')
 _RUN = Column("run", "text", "", "id of the run")

@@ -95,7 +95,7 @@ def plain(small_campaign, tmp_path_factory):
 
 
 def test_one_frequency_leaves_an_empty_table_with_its_names(plain):
-    assert pd.read_csv(plain / "frequency_fits.csv").columns[3] == "model"
+    assert pd.read_csv(plain / "frequency_fits.csv").columns[4] == "model"
     frame = pd.read_csv(plain / "coefficients.csv")
     assert (frame["frequency_model"] == "single line").all()
 

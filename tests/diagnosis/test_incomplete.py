@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.campaign import unknown_centre
 from tpjb_ident.diagnosis.observations.observe import UNSEEN_DIFFERENCE, _mains_on_excitation, observe
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
@@ -15,13 +16,7 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 def point(*quality: str, load: float = 5000.0):
     h = np.array([[1e8 + 2e7j, 1e6], [-1e6, 3e8 + 4e7j]])
     return SimpleNamespace(
-        point=SimpleNamespace(
-            static_load=load,
-            static_load_direction=-1.5,
-            shaft_speed=138.0,
-            excitation=157.0,
-            excitation_hz=25.0,
-        ),
+        point=OperatingPoint(load, -1.5, 138.0, 157.0),
         stiffness=DynamicStiffness(h, 157.0, np.eye(8) * 1e10, np.full(8, 20.0), "mm-eiv", np.ones((6, 2))),
         temperatures={},
         quality=quality,

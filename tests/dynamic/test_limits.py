@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student_t
 
+from rigdata.operating_point import OperatingPoint
 from tests.dynamic import phasor_cases
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
@@ -109,7 +110,7 @@ def test_estimates_without_an_interval_are_left_out():
 
 
 def point(stiffness, load=5000.0, direction=-90.0, speed=22.0):
-    where = SimpleNamespace(static_load=load, static_load_direction_deg=direction, shaft_speed_hz=speed)
+    where = OperatingPoint(load, math.radians(direction), 2 * math.pi * speed)
     return SimpleNamespace(point=where, stiffness=stiffness)
 
 

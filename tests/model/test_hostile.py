@@ -38,7 +38,7 @@ def oil(bearing: Bearing, **changes: object) -> Bearing:
         ({"load_direction": math.inf}, "load_direction must be finite"),
         ({"load_direction": "down"}, "load_direction"),
         ({"speed": 0.0}, "speed must be positive"),
-        ({"speed": -SPEED}, "turns counter-clockwise"),
+        ({"speed": -SPEED}, "`rotation` says which way"),
         ({"speed": None}, "speed must be a number"),
         ({"excitation": 0.0}, "excitation must be a positive"),
         ({"excitation": []}, "excitation must be a positive"),

@@ -245,8 +245,7 @@ def model_side(
     from tpjb_ident.compare.static_tests import measure_static
 
     report = progress or (lambda text, done, total: None)
-    if points is None:
-        points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")}))
+    points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")})) if points is None else points
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
     bearing = bearing.stated_for(campaign.rotation)

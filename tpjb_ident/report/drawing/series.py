@@ -43,7 +43,7 @@ def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:
     column = _AXES[axis][0]
     fixed = ["excitation_Hz" if axis == "load" else "static_load_N", *STATIC_KEY[1:]]
     best, length = None, 1
-    for _, group in table.groupby(fixed, sort=True):
+    for _, group in table.groupby([name for name in fixed if name in table], sort=True):
         if group[column].nunique() > length:
             best, length = group, group[column].nunique()
     return best

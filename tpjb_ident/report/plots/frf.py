@@ -66,7 +66,7 @@ def frf(
     if table is None or not len(table):
         raise ValueError("there is no line to draw, or no two excitation frequencies at one load")
     over_band = "coherence_x" in table
-    if over_band and table[[*STATIC_KEY, "excitation"]].nunique().max() > 1:
+    if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
     figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
     for axes, part, name in ((real, "real", "Re h"), (imag, "imag", "Im h")):

@@ -1,0 +1,87 @@
+"""A campaign as a mirror along the y axis shows it, file by file: its shaft turns the other way, nothing else differs.
+
+Texts and numbers are changed as a person would change them; nothing of the toolkit is used. Cells and accelerometers
+along x keep their axis, and their readings change sign; all other channels get the mirrored axis.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import h5py
+
+_ANGLES = re.compile(r'^(axis|static_load_direction|excitation_direction) = "([-+.\d]+) deg"', re.MULTILINE)
+_CHANNEL = re.compile(r"^\[channels\.(\w+)\]$", re.MULTILINE)
+
+
+def _turned(degrees: str) -> str:
+    return f"{(360.0 - float(degrees)) % 360.0 - 180.0:.12g}"
+
+
+def mirrored_manifest(text: str, pads: int) -> tuple[str, set[str]]:
+    """The manifest, and the channels whose readings change sign."""
+    negated = set()
+    blocks = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    for i, block in enumerate(blocks):
+        channel = _CHANNEL.match(block)
+        if channel and 'axis = "0 deg"' in block:
+            negated.add(channel[1])
+        else:
+            block = _ANGLES.sub(lambda found: f'{found[1]} = "{_turned(found[2])} deg"', block)
+        blocks[i] = re.sub(r"^pad = (\d+)", lambda found: f"pad = {pads + 1 - int(found[1])}", block, flags=re.MULTILINE)
+    blocks.insert(1, '[shaft]\nrotation = "clockwise"\n\n')
+    return "".join(blocks), negated
+
+
+def mirrored_bearing(text: str) -> tuple[str, int]:
+    """The bearing file, and its number of pads: angles in the mirror, lists in reverse order."""
+    pads = 0
+
+    def turn(found: re.Match[str]) -> str:
+        nonlocal pads
+        entries = [entry.strip() for entry in found[2].split(",")][::-1]
+        if found[1] == "pivot_angles":
+            pads = len(entries)
+            entries = [f'"{_turned(entry.strip(chr(34)).removesuffix(" deg"))} deg"' for entry in entries]
+        return f"{found[1]} = [{', '.join(entries)}]"
+
+    return re.sub(r"^(\w+) = \[(.*?)\]", turn, text, flags=re.MULTILINE), pads
+
+
+def mirror_campaign(source: Path, target: Path) -> Path:
+    """Write the mirror image of a campaign, a folder of CSV or one HDF5 file."""
+    if source.is_dir():
+        return _mirror_folder(source, target)
+    shutil.copy(source, target)
+    with h5py.File(target, "r+") as file:
+        bearing, pads = mirrored_bearing(str(file.attrs["bearing"]))
+        manifest, negated = mirrored_manifest(str(file.attrs["manifest"]), pads)
+        file.attrs["bearing"], file.attrs["manifest"] = bearing, manifest
+        for run in file["runs"].values():
+            for name in negated & set(run):
+                run[name][...] = -run[name][...]
+    return target
+
+
+def _mirror_folder(source: Path, target: Path) -> Path:
+    shutil.copytree(source, target)
+    manifest = target / "campaign.toml"
+    text = manifest.read_text(encoding="utf-8")
+    drawing = target / re.search(r'^bearing = "(.*?)"', text, flags=re.MULTILINE)[1]
+    bearing, pads = mirrored_bearing(drawing.read_text(encoding="utf-8"))
+    drawing.write_text(bearing, encoding="utf-8")
+    text, negated = mirrored_manifest(text, pads)
+    manifest.write_text(text, encoding="utf-8")
+    for file in (target / "runs").glob("*.csv"):
+        lines = file.read_text(encoding="cp1252").split("\n")
+        columns = [i for i, name in enumerate(lines[5].strip().split(";")) if name in negated]
+        for n in range(7, len(lines)):
+            cells = lines[n].split(";")
+            for i in columns:
+                if i < len(cells) and any(c.isdigit() for c in cells[i]):
+                    cells[i] = cells[i][1:] if cells[i].startswith("-") else f"-{cells[i]}"
+            lines[n] = ";".join(cells)
+        file.write_text("\n".join(lines), encoding="cp1252")
+    return target
