@@ -30,7 +30,9 @@ def mirrored_manifest(text: str, pads: int) -> tuple[str, set[str]]:
             negated.add(channel[1])
         else:
             block = _ANGLES.sub(lambda found: f'{found[1]} = "{_turned(found[2])} deg"', block)
-        blocks[i] = re.sub(r"^pad = (\d+)", lambda found: f"pad = {pads + 1 - int(found[1])}", block, flags=re.MULTILINE)
+        blocks[i] = re.sub(
+            r"^pad = (\d+)", lambda found: f"pad = {pads + 1 - int(found[1])}", block, flags=re.MULTILINE
+        )
     blocks.insert(1, '[shaft]\nrotation = "clockwise"\n\n')
     return "".join(blocks), negated
 

@@ -1,0 +1,106 @@
+"""A shaft that turns clockwise: the mirror image of what the model says of one that turns counter-clockwise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.bearing import ROTATIONS, BearingError
+from model.bearing_file import parse_bearing
+from model.effects import Effect
+from model.errors import OptionError
+from model.predict import predict
+from rigdata import operating_point
+
+SPEED, OMEGA = 2 * math.pi * 22, 2 * math.pi * 25
+POINT = {"load": 5000.0, "speed": SPEED, "excitation": OMEGA, "mesh": (24, 4)}
+MIRROR = np.diag([-1.0, 1.0])
+
+
+def with_offset(bearing, offset, rotation=""):
+    return replace(bearing.with_pads(tuple(replace(p, pivot_offset=offset) for p in bearing.pads)), rotation=rotation)
+
+
+def effects(mirrored):
+    """Effects that tell left from right, in the rig's frame or in the mirror."""
+    sign = -1.0 if mirrored else 1.0
+    pad, direction = (4, math.pi - 0.4) if mirrored else (2, 0.4)
+    return [
+        Effect("hot_oil_carryover", fraction=0.8),
+        Effect("pad_offset", pad=pad, radial_offset=5e-6),
+        Effect("structure_compliance", stiffness=4e8, direction=direction),
+        Effect("parallel_stiffness", xx=1e6, xy=sign * 2e6, yx=sign * 3e6, yy=0.0),
+        Effect("misalignment", angle=1e-4, direction=direction),
+        Effect("probe_rotation", angle=sign * 0.03),
+    ]
+
+
+def test_a_clockwise_shaft_is_the_mirror_image(rocker):
+    bearing = with_offset(rocker, 0.6)
+    pads = tuple(replace(p, pivot_angle=math.pi - p.pivot_angle) for p in reversed(bearing.pads))
+    right = predict(bearing, load_direction=-1.4, effects=effects(False), **POINT)
+    left = predict(
+        bearing.with_pads(pads), load_direction=math.pi + 1.4, effects=effects(True), rotation="clockwise", **POINT
+    )
+    np.testing.assert_allclose(MIRROR @ left.h @ MIRROR, right.h, rtol=1e-9)
+    np.testing.assert_allclose(MIRROR @ left.bearing_h @ MIRROR, right.bearing_h, rtol=1e-9)
+    np.testing.assert_allclose(MIRROR @ left.position, right.position, rtol=1e-9)
+    np.testing.assert_allclose(-left.tilt[::-1], right.tilt, rtol=1e-9)
+    np.testing.assert_allclose(left.pad_load[::-1], right.pad_load, rtol=1e-9)
+    np.testing.assert_allclose(left.pad_temperature()[::-1], right.pad_temperature(), rtol=1e-9)
+    assert left.attitude_angle == pytest.approx(right.attitude_angle)
+    assert (left.speed, left.rotation, right.rotation) == (SPEED, *reversed(ROTATIONS))
+
+
+def test_hot_oil_goes_on_with_the_shaft(rocker):
+    warm = {}
+    for rotation in ROTATIONS:
+        hot = [Effect("hot_oil_carryover", fraction=0.8)]
+        warm[rotation] = [f.inlet for f in predict(rocker, effects=hot, rotation=rotation, **POINT).pad_flow]
+    # load on pad 1: the hot oil of the loaded pad enters pad 2, or pad 5
+    assert warm["counter-clockwise"][1] > warm["counter-clockwise"][4] + 1.0
+    np.testing.assert_allclose(warm["clockwise"], np.roll(warm["counter-clockwise"][::-1], 1), rtol=1e-6)
+
+
+def test_a_shaft_against_the_stated_sense_enters_at_the_other_edge(rocker):
+    stated = with_offset(rocker, 0.6, "counter-clockwise")
+    backward = predict(stated, rotation="clockwise", **POINT)
+    other_edge = predict(with_offset(rocker, 0.4), rotation="clockwise", **POINT)
+    np.testing.assert_allclose(backward.h, other_edge.h, rtol=1e-12)
+    assert backward.kxx < 0.2 * predict(stated, **POINT).kxx
+
+
+def test_the_sense_of_the_bearing_is_the_default(rocker):
+    assert predict(with_offset(rocker, 0.6, "clockwise"), **POINT).rotation == "clockwise"
+    assert predict(rocker, **POINT).rotation == "counter-clockwise"
+    assert with_offset(rocker, 0.6).stated_for("clockwise").rotation == "clockwise"
+    assert with_offset(rocker, 0.6, "clockwise").stated_for("counter-clockwise").rotation == "clockwise"
+
+
+def test_a_sense_that_there_is_not_is_refused(rocker, rocker_file):
+    with pytest.raises(OptionError, match="Did you mean 'clockwise'"):
+        predict(rocker, rotation="clokwise", **POINT)
+    text = rocker_file.read_text().replace("[bearing]", '[bearing]\nrotation = "left"')
+    with pytest.raises(BearingError, match=r"\[bearing\] rotation: 'left' is no sense of turning"):
+        parse_bearing(text, "b.toml")
+
+
+def test_arcs_are_laid_out_from_the_leading_edge_of_the_stated_sense(rocker_file):
+    # two pads 60 deg apart that meet only if each reaches 0.75 of its arc towards the other
+    lines = ('arc = "63.5 deg"', 'arc = ["80 deg", "60 deg", "60 deg", "60 deg", "60 deg"]'), (
+        "pivot_offset = 0.5", "pivot_offset = [0.75, 0.5, 0.5, 0.5, 0.5]")  # fmt: skip
+    text = rocker_file.read_text()
+    for before, after in lines:
+        assert before in text
+        text = text.replace(before, after)
+    with pytest.raises(BearingError, match="pad #5 overlaps pad #1"):
+        parse_bearing(text, "b.toml")
+    with pytest.raises(BearingError, match="pad #1 overlaps pad #2"):
+        parse_bearing(text.replace("[bearing]", '[bearing]\nrotation = "clockwise"'), "b.toml")
+
+
+def test_model_and_rig_have_the_same_words():
+    assert operating_point.ROTATIONS == ROTATIONS
