@@ -12,7 +12,13 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.predict import predict
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame, printed_formula
+from tpjb_ident.compare.predictions import (
+    ModelSettings,
+    PointPrediction,
+    predict_points,
+    prediction_frame,
+    printed_formula,
+)
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.compare.summary import _extrapolation_sentence
 
@@ -106,7 +112,7 @@ def test_the_summary_says_where_pivots_are_pressed_harder_than_in_their_dry_test
 
     def pressed(*loads):
         setup = SimpleNamespace(pivots=laws)
-        return SimpleNamespace(prediction=SimpleNamespace(setup=setup, pad_load=np.array(loads)))
+        return PointPrediction(None, SimpleNamespace(setup=setup, pad_load=np.array(loads)), 0)
 
     variants = [
         SimpleNamespace(name="rigid", points=(pressed(9e3, 9e3),)),

@@ -14,6 +14,7 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.rounding import counted, percent, with_interval
@@ -137,15 +138,22 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
 def _matched(a: pd.DataFrame, b: pd.DataFrame) -> IntArray:
     """Rows of A and B that are of one operating point, (n, 2)."""
     left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (a, b))
+    senses = [_rotation(frame) for frame in (a, b)]
     pairs = []
     for i, row in enumerate(left):
         apart = np.abs(right - row)
         turned = np.minimum(apart[:, 1] % 360.0, -apart[:, 1] % 360.0)
         near = np.delete(apart, 1, axis=1) <= _SAME_POINT * np.abs(np.delete(row, 1))
-        partners = np.flatnonzero(near.all(axis=1) & (turned <= _SAME_DIRECTION))
+        same_sense = senses[1] == senses[0][i]
+        partners = np.flatnonzero(near.all(axis=1) & (turned <= _SAME_DIRECTION) & same_sense)
         if len(partners):
             pairs.append((i, partners[0]))
     return np.array(pairs, dtype=int).reshape(-1, 2)
+
+
+def _rotation(frame: pd.DataFrame) -> np.ndarray:
+    """Sense of turning of every row; a table that does not say means the usual one."""
+    return frame["rotation"].to_numpy(str) if "rotation" in frame else np.full(len(frame), ROTATIONS[0])
 
 
 def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
@@ -160,6 +168,7 @@ def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
     left, right = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
     columns: dict[str, Any] = {name: left[name] for name in POINT_COLUMNS}
+    columns["rotation"] = _rotation(left)
     for name in ("static_load_measured_N", "quality"):
         if name in left and name in right:
             columns |= {f"{name}_a": left[name], f"{name}_b": right[name]}

@@ -10,9 +10,9 @@ import numpy as np
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance, pivot_extrapolated
+from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
 from tpjb_ident.compare.effect_words import Estimate, finding
-from tpjb_ident.compare.predictions import printed_formula
+from tpjb_ident.compare.predictions import PointPrediction, printed_formula
 from tpjb_ident.rounding import percent, signed
 
 if TYPE_CHECKING:
@@ -163,8 +163,9 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
 
 def _extrapolation_sentence(comparison: Comparison) -> list[str]:
     """Say where the model asks more of a measured pivot than the dry tests told."""
-    points = [point for v in comparison.variants if v.name == "measured" for point in v.points]
-    beyond = [point for point in points if pivot_extrapolated(point)]
+    measured = [point for v in comparison.variants if v.name == "measured" for point in v.points]
+    points = [point for point in measured if isinstance(point, PointPrediction)]
+    beyond = [point for point in points if point.extrapolated]
     if not beyond or not comparison.curves:
         return []
     largest = max(float(np.max(point.prediction.pad_load)) for point in beyond)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import read_coefficients
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Element, Layout, Observations, Tolerance
 
