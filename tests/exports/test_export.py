@@ -444,3 +444,71 @@ def test_the_same_results_are_the_same_bytes(form, tmp_path):
         bytes_of.append(path.read_bytes())
         time.sleep(1.1 if form != "parquet" else 0.0)  # the times that their libraries write are in seconds
     assert bytes_of[0] == bytes_of[1]
+
+
+def ross_call(tmp_path, bearing, version, monkeypatch):
+    """Arguments that the written function hands to TiltingPad, and the text."""
+    import sys
+    import types
+
+    export(bearing, "ross", tmp_path, ross=version)
+    text = (tmp_path / "ross_bearing.py").read_text(encoding="utf-8")
+    monkeypatch.setitem(sys.modules, "ross", types.SimpleNamespace(TiltingPad=lambda **arguments: arguments))
+    space = {}
+    exec(compile(text, "ross_bearing.py", "exec"), space)
+    return space["bearing"](3, [138.2], 10.0, -5000.0, n_link=7), text
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_bearing_file_leaves_as_the_call_that_builds_it_in_ross(tmp_path, rocker_file, version, monkeypatch):
+    from model.bearing_file import load_bearing
+
+    bearing = load_bearing(rocker_file)
+    call, text = ross_call(tmp_path, bearing, version, monkeypatch)
+    assert (call["n"], call["n_link"]) == (3, 7)
+    theirs = {2: ("frequency", "pre_load", "determine_eccentricity"), 3: ("speed", "preload", "match_load")}[version]
+    assert call[theirs[0]] == [138.2]
+    assert call["equilibrium_type"] == theirs[2]
+    load = call["load"] if version == 2 else [call["fxs_load"], call["fys_load"]]
+    assert load == [10.0, -5000.0]
+    for pad, preload, angle, arc in zip(
+        bearing.pads, call[theirs[1]], call["pivot_angle"], call["pad_arc"], strict=True
+    ):
+        assert call["radial_clearance"] / (1 - preload) == pytest.approx(pad.pad_clearance)
+        assert (angle, arc) == (pad.pivot_angle, pad.arc)
+    oil = call["lubricant"]
+    rate = math.log(oil["liquid_viscosity1"] / oil["liquid_viscosity2"]) / (oil["temperature2"] - oil["temperature1"])
+    at_50 = oil["liquid_viscosity1"] * math.exp(-rate * (323.15 - oil["temperature1"]))
+    assert at_50 == pytest.approx(bearing.oil.viscosity(50.0))
+    assert call["oil_supply_temperature"] == pytest.approx(bearing.oil.supply_temperature + 273.15)
+    assert "# - pivots (rocker)" in text
+    assert "by pad" not in text
+
+
+def test_what_a_call_of_ross_cannot_hold_of_pads_that_differ_stands_in_its_head(tmp_path, rocker_file, monkeypatch):
+    from dataclasses import replace
+
+    from model.bearing_file import load_bearing
+
+    bearing = load_bearing(rocker_file)
+    first, *others = bearing.pads
+    own = replace(first, pivot_offset=0.6, assembled_clearance=70e-6, pad_clearance=120e-6)
+    bearing = bearing.with_pads((own, *others))
+    call, text = ross_call(tmp_path, bearing, 2, monkeypatch)
+    assert "assembled clearance by pad (70, 80, 80, 80, 80 um)" in text
+    assert "ROSS 2 takes arc, offset and preload of the first" in text
+    assert call["offset"] == [0.6, 0.5, 0.5, 0.5, 0.5]
+    assert call["radial_clearance"] / (1 - call["pre_load"][0]) == pytest.approx(120e-6)
+    _, text = ross_call(tmp_path, bearing, 3, monkeypatch)
+    assert "takes arc" not in text
+
+
+def test_a_bearing_leaves_for_ross_alone(tmp_path, rocker_file):
+    from tests.command_line import tpjb
+
+    refused = tpjb("export", rocker_file, "--to", "xltrc", "--out", tmp_path / "x")
+    assert refused.exit_code == 2
+    assert "leaves for ROSS alone" in " ".join(refused.stderr.split())
+    written = tpjb("export", rocker_file, "--to", "ross", "--ross", "3", "--out", tmp_path / "o")
+    assert written.exit_code == 0, written.output
+    assert "ROSS 3, as chosen" in (tmp_path / "o" / "ross_bearing.py").read_text(encoding="utf-8")

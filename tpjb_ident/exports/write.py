@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import (
@@ -15,6 +15,7 @@ from tpjb_ident.exports.formats import (
     static_points,
     turning_counter_clockwise,
 )
+from tpjb_ident.exports.ross_bearing import write_ross_bearing
 from tpjb_ident.exports.table import write_intervals
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
@@ -46,12 +47,14 @@ class Export:
     chosen: Chosen
 
     def __str__(self) -> str:
+        if not self.chosen.points:
+            return ", ".join(self.files)
         sets = sum(len(p.frequency) for p in self.chosen.points)
         return f"{len(self.chosen.points)} static points, {sets} coefficient sets"
 
 
 def export(
-    source: Identification | pd.DataFrame | str | Path,
+    source: Identification | pd.DataFrame | str | Path | Any,
     to: str,
     folder: str | Path,
     *,
@@ -61,9 +64,11 @@ def export(
 ) -> Export:
     """Write coefficients as another program reads them, with intervals and flags in the files or beside them.
 
+    A bearing leaves for ROSS as the Python call that builds it there.
+
     Parameters
     ----------
-    source : Identification, DataFrame, str or Path
+    source : Identification, DataFrame, str, Path or Bearing
         What `identify` gives, a table as coefficients.csv or prediction.csv, such a file, or a folder that holds one.
     to : str
         ``"ross"``, ``"csv"``, ``"parquet"``, ``"excel"``, ``"mat"``, ``"xltrc"``, ``"dyrobes"`` or ``"ansys"``.
@@ -90,12 +95,14 @@ def export(
     """
     form = export_format(to)
     options = _ross_options(to, ross)
+    target = Path(folder)
+    if hasattr(source, "pads"):
+        return _export_bearing(source, to, target, options)
     frame, origin = _table(source)
     chosen = static_points(frame, force)
     if not chosen.points:
         reasons = "\n".join(chosen.doubtful[:5])
         raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
-    target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
     points = tuple(turning_counter_clockwise(point) if form.of_rotors else point for point in chosen.points)
@@ -104,6 +111,14 @@ def export(
         write_intervals(target, points)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
     return Export(target, files, chosen)
+
+
+def _export_bearing(bearing: Any, to: str, target: Path, options: dict[str, int]) -> Export:
+    if to != "ross":
+        raise ExportError(f"a bearing file leaves for ROSS alone, not for {to}. Export a prediction of it.")
+    target.mkdir(parents=True, exist_ok=True)
+    write_ross_bearing(target, bearing, **options)
+    return Export(target, ("ross_bearing.py",), Chosen(()))
 
 
 def _ross_options(to: str, version: int | None) -> dict[str, int]:

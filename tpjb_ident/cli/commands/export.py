@@ -17,11 +17,12 @@ from tpjb_ident.rounding import counted
 if TYPE_CHECKING:
     import pandas as pd
 
+    from model.bearing import Bearing
     from tpjb_ident.exports.formats import Chosen
 
 Source = Annotated[
     Path,
-    typer.Argument(metavar="CAMPAIGN|DIR", help="A campaign (identified first), or results of identify or predict."),
+    typer.Argument(metavar="CAMPAIGN|DIR|BEARING.toml", help="A campaign (identified first), results, or a bearing."),
 ]
 Force = Annotated[
     bool, typer.Option("--force", help="Also write points that are not to be trusted, marked; exit code 3 stays.")
@@ -34,6 +35,7 @@ Ross = Annotated[int | None, typer.Option(metavar="2|3", help="Version of ROSS; 
 @command(
     "tpjb export tpjb-identify-out --to ross",
     "tpjb export tpjb-predict-out --to excel",
+    "tpjb export bearing.toml --to ross",
     f"tpjb export {DEMO} --to mat",
 )
 def export(
@@ -77,8 +79,10 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
         raise NotTrustedError("\n".join(parts))
 
 
-def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame, str]:
-    """Table of coefficients of a results folder, or of a campaign that is identified for it, and its name."""
+def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame | Bearing, str]:
+    """Table of coefficients of a results folder, or of a campaign that is identified for it, or a bearing; its name."""
+    if source.suffix == ".toml" and source.is_file() and b"tpjb-rig/" not in source.read_bytes():
+        return c.bearing(source), source.stem
     from tpjb_ident.exports.write import result_table
     from tpjb_ident.runtime.table_reader import read_table
 
