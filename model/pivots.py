@@ -281,17 +281,25 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
         raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     if data.get("schema") != "tpjb-pivots/1":
         raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")
-    tables = data.get("pads")
+    _refuse_unknown(data, _FILE_KEYS, path.name)
+    tables, housing = data.get("pads"), data.get("includes_housing", True)
     if not isinstance(tables, list) or not tables:
         raise BearingError(f"{path.name}: no [[pads]] table. Write it anew with `tpjb pivot CAMPAIGN`.")
-    return measured_pivots(tables, path.name, pads, bool(data.get("includes_housing", True)))
+    if not isinstance(housing, bool):
+        raise BearingError(f"{path.name}, includes_housing: must be true or false, got {housing!r}. Correct it.")
+    return measured_pivots(tables, path.name, pads, housing)
 
 
 def measured_pivots(
     tables: Sequence[Any], source: str, pads: int | None = None, includes_housing: bool = True
 ) -> tuple[PivotLaw, ...]:
     """Make pivot laws of the pads' tables, pad #1 first."""
-    laws = dict(_read_pad(table, source, includes_housing) for table in tables)
+    laws: dict[int, PivotLaw] = {}
+    for table in tables:
+        number, law = _read_pad(table, source, includes_housing)
+        if number in laws:
+            raise BearingError(f"{source}, pad {number}: has two [[pads]] tables. Keep one of them.")
+        laws[number] = law
     wanted = pads or max(laws)
     missing = sorted(set(range(1, wanted + 1)) - set(laws))
     if missing or max(laws) > wanted:
@@ -301,19 +309,51 @@ def measured_pivots(
     return tuple(laws[k] for k in range(1, wanted + 1))
 
 
+#: Keys of a pivots.toml, of all and of a pad.
+_FILE_KEYS = ("schema", "source", "includes_housing", "pads")
+_PAD_KEYS = (
+    "pad", "law", "valid_from_N", "valid_to_N", "relative_calibration", "force_N", "deflection_m",
+    "stiffness_N_per_m", "stiffness_relative_se",
+)  # fmt: skip
+
+
 def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]:
     number = table.get("pad") if isinstance(table, dict) else None
-    if not isinstance(number, int) or not 1 <= number <= 40:
+    if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= 40:
         raise BearingError(f"{name}, [[pads]]: pad must be a number from 1, got {number!r}.")
+    place = f"{name}, pad {number}"
+    _refuse_unknown(table, _PAD_KEYS, place)
+    low, high = (_number(table.get(key, default), f"{place}, {key}") for key, default in _VALID.items())
+    if not 0.0 <= low < high:
+        raise BearingError(f"{place}: valid from {low:g} to {high:g} N. Give the lower load first, from 0.")
     try:
+        force, deflection = ([_number(v, f"{place}, {key}") for v in table[key]] for key in ("force_N", "deflection_m"))
         law = MeasuredPivot(
-            np.asarray(table["force_N"], float),
-            np.asarray(table["deflection_m"], float),
-            float(table.get("valid_from_N", 0.0)),
-            float(table.get("valid_to_N", math.inf)),
-            str(table.get("law", "measured")),
-            housing,
+            np.array(force), np.array(deflection), low, high, str(table.get("law", "measured")), housing
         )
-    except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: whole numbers of 400 digits
+    except BearingError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
         raise BearingError(f"{name}, pad {number}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     return number, law
+
+
+#: Loads between which a curve was measured [N]: keys and defaults.
+_VALID = {"valid_from_N": 0.0, "valid_to_N": math.inf}
+
+
+def _number(value: Any, place: str) -> float:
+    """A number of the file: neither text nor a truth value, and none that is not there."""
+    try:
+        number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
+    except OverflowError as error:  # whole numbers of 400 digits
+        raise BearingError(f"{place}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
+    if math.isnan(number):
+        raise BearingError(f"{place}: {value!r} is no number. Write it anew with `tpjb pivot CAMPAIGN`.")
+    return number
+
+
+def _refuse_unknown(table: dict[str, Any], keys: Sequence[str], place: str) -> None:
+    for key in table:
+        if key not in keys:
+            raise BearingError(f"{place}: {key!r} is not known. {hint(key, keys)}")

@@ -205,6 +205,18 @@ def test_file_is_read_pad_by_pad(tmp_path, rocker):
         (pivots_file(pad_table(1, force='["a", "b"]')), "pad 1"),
         (pivots_file("[[pads]]\npad = 1\n"), "force_N"),
         (pivots_file('[[pads]]\npad = "one"\n'), "must be a number from 1"),
+        (pivots_file("[[pads]]\npad = true\n"), "must be a number from 1"),
+        (pivots_file(pad_table(1) + pad_table(1)), "pad 1: has two"),
+        (pivots_file(pad_table(1, force='["500", "1000"]')), "force_N: '500' is no number"),
+        (pivots_file(pad_table(1, force="[true, 1000.0]")), "force_N: True is no number"),
+        (pivots_file(pad_table(1, deflection="[nan, 2e-6]")), "deflection_m: nan is no number"),
+        (pivots_file(pad_table(1, force=f"[1.0, 1{400 * '0'}]")), "too large to convert"),
+        (pivots_file(pad_table(1) + "valid_too_N = 900.0\n"), "pad 1: 'valid_too_N' is not known. Did you mean"),
+        (pivots_file(pad_table(1) + "valid_to_N = '900'\n"), "valid_to_N: '900' is no number"),
+        (pivots_file(pad_table(1) + "valid_from_N = 900\nvalid_to_N = 800\n"), "valid from 900 to 800 N"),
+        (pivots_file(pad_table(1) + "valid_from_N = -5\n"), "valid from -5"),
+        ('schema = "tpjb-pivots/1"\nincludes_housing = "no"\n' + pad_table(1), "must be true or false"),
+        ('schema = "tpjb-pivots/1"\ninclude_housing = false\n' + pad_table(1), "is not known. Did you mean"),
     ],
 )
 def test_broken_files_say_what_and_where(tmp_path, text, message):
