@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +32,8 @@ _BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
 _RAW = ("table", "tables", "list", "sign", "calibration")
+#: Begins a value of `tpjb init` that only the person at the rig knows.
+MARK = "??"
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,30 @@ def markdown() -> str:
     return "\n".join(lines)
 
 
+def open_paths(data: object, path: Path = ()) -> list[Path]:
+    """Paths of all values that are still open, in tables and lists of tables."""
+    if isinstance(data, str):
+        return [path] if data.startswith(MARK) and path[-1] not in ("description", "id") else []
+    if len(path) > 3:
+        return []
+    entries: list[tuple[str | int, object]] = []
+    if isinstance(data, dict):
+        entries = list(data.items())
+    elif isinstance(data, list) and path == ("runs",):
+        entries = list(enumerate(data))
+    places: list[Path] = []
+    for key, value in entries:
+        places += open_paths(value, (*path, key))
+    return places
+
+
+def open_summary(paths: Collection[Path]) -> str:
+    """How many places of a manifest are open, and of which kinds; "" where none is."""
+    counts = Counter(str(path[-1]).replace("_", " ") for path in paths)
+    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.most_common())
+    return f"{len(paths)} place{'s' if len(paths) > 1 else ''} open ({MARK}): {kinds}" if paths else ""
+
+
 _HOLDS = {
     "whole": "whole number",
     "list": "list of texts",
@@ -228,9 +255,22 @@ class Findings:
         self.lines = lines
         self.problems: list[Problem] = []
         self.errors = 0
+        self.open: tuple[Path, ...] = ()
+
+    def note_open(self, paths: Collection[Path]) -> None:
+        """Note the places that are still open, all in one; what follows from them is not told."""
+        if not paths:
+            return
+        first = min((self.lines[path] for path in paths if path in self.lines), default=0)
+        remedy = "Fill them in, then `tpjb init FOLDER --update` adds what follows from them"
+        self.append(Problem("error", self.file, f"line {first} and on", open_summary(paths), remedy))
+        self.open = tuple(paths)
 
     def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
         """Note a problem of the key at `path`."""
+        if any(place[: len(path)] == path for place in self.open):
+            self.errors += severity == "error"
+            return
         place, at = _spell(path), path
         while at and at not in self.lines:
             at = at[:-1]

@@ -11,7 +11,18 @@ from typing import Any
 from rigdata.calibration import Channel
 from rigdata.manifest.channels import TextFile, read_channels
 from rigdata.manifest.channels_of_runs import channels_by_run
-from rigdata.manifest.fields import ACQUISITION, CSV, HOUSING, MAINS_FREQUENCIES, SHAFT, TOP, Findings, Table, key_lines
+from rigdata.manifest.fields import (
+    ACQUISITION,
+    CSV,
+    HOUSING,
+    MAINS_FREQUENCIES,
+    SHAFT,
+    TOP,
+    Findings,
+    Table,
+    key_lines,
+    open_paths,
+)
 from rigdata.manifest.runs import RunEntry, read_runs
 from rigdata.problem import Problem, RigDataError, refuse
 
@@ -59,6 +70,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     """Read and check the text of a manifest."""
     data = _load_toml(text, file)
     findings = Findings(file, key_lines(text))
+    findings.note_open(open_paths(data))
     top = Table(data, (), findings)
     header = top.read(TOP, "the manifest")
     if header["schema"] not in (None, _SCHEMA):

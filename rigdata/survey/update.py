@@ -1,22 +1,30 @@
-"""A manifest that was edited by hand, carried on: what is still open or a guess is guessed again, the rest stays."""
+"""A manifest that was edited by hand, carried on: open places and guesses are filled in, what was typed stays."""
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigdata.problem import refuse
+from rigdata.manifest.fields import MARK, open_paths
+from rigdata.manifest.manifest import parse_manifest
+from rigdata.problem import RigDataError, refuse
 from rigdata.readers.series import is_time, seconds
-from rigdata.survey.draft import MARK, Survey, channel_blocks, run_lines, survey
+from rigdata.survey.draft import channel_blocks, run_lines
 from rigdata.survey.exports import Export
-from rigdata.survey.guess import ChannelGuess
+from rigdata.survey.survey import Survey, survey
+
+#: What a line of `tpjb init` bears that was no person's.
+_OWN = re.compile(r"#\s*\((?:guess|records)\)")
+#: Entries that a sensor has of the one that it is like.
+_OF_MODEL = {"unit", "sensitivity", "full_scale", "excitation", "polarity", "zero"}
 
 
 @dataclass
 class _Block:
-    """A table of a manifest: its header, its lines, and what they mean."""
+    """A table of a manifest: its kind, the channel's name or the run's file, its lines and what they mean."""
 
     kind: str
     name: str
@@ -24,18 +32,17 @@ class _Block:
     data: dict[str, Any]
 
 
-def _known_channels(text: str) -> dict[str, ChannelGuess]:
-    """Channels that a manifest describes, as far as it does."""
+def _described_channels(text: str) -> dict[str, dict[str, Any]]:
+    """Tables of the channels that a manifest describes; what is `like` another has that one's calibration."""
     try:
         tables = tomllib.loads(text).get("channels", {})
     except tomllib.TOMLDecodeError as error:
         raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
-    guesses = {}
-    for name, table in tables.items():
-        if isinstance(table, dict):
-            quantity, unit, axis = (_text(table, key) for key in ("quantity", "unit", "axis"))
-            guesses[str(name)] = ChannelGuess(quantity, unit, axis, "as the manifest says")
-    return guesses
+    described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
+    for name, table in described.items():
+        model = described.get(str(table.get("like", "")), {})
+        described[name] = {key: model[key] for key in _OF_MODEL if key in model} | table
+    return described
 
 
 def column_names(text: str) -> tuple[str, ...]:
@@ -47,23 +54,33 @@ def column_names(text: str) -> tuple[str, ...]:
     return tuple(str(n) for n in names) if isinstance(names, list) else ()
 
 
-def _text(table: Mapping[str, Any], key: str) -> str:
-    value = table.get(key, "")
-    return value if isinstance(value, str) and MARK not in value else ""
+def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[float] = ()) -> tuple[str, list[str]]:
+    """Carry a manifest on: entries for open places, guesses made anew, tables for new channels and records.
 
-
-def updated_manifest(text: str, exports: Sequence[Export]) -> tuple[str, list[str]]:
-    """Carry a manifest on: runs for new records, entries that a named channel lacks, guesses made anew.
-
-    An entry counts as a guess while it holds what `tpjb init` had guessed; one that was changed by hand stays.
+    A line is a guess while it bears the mark of one and the value that `tpjb init` had given it; all others stay. A
+    manifest is never left with errors that it had not: then new records are added and nothing else.
     """
-    described = _known_channels(text)
-    before, after = survey(exports), survey(exports, described)
-    blocks = _blocks(text)
-    changes: list[str] = []
-    _update_channels(blocks, before, after, changes)
-    _update_runs(blocks, before, after, changes)
-    return "\n".join("\n".join(block.lines).rstrip() + "\n" for block in blocks if block.lines), changes
+    described = _described_channels(text)
+    before, after = survey(exports, pivots=pivots), survey(exports, described, pivots)
+    for merges in (True, False):
+        blocks = _blocks(text)
+        changes: list[str] = []
+        _update_channels(blocks, before, after, changes, merges)
+        _update_runs(blocks, before, after, changes, merges)
+        new = "\n".join("\n".join(block.lines).rstrip() + "\n" for block in blocks if block.lines)
+        if not merges or _faults(new) <= _faults(text):
+            break
+    return new, changes
+
+
+def _faults(text: str) -> int:
+    """Errors of a manifest beyond its open places."""
+    try:
+        parse_manifest(text)
+    except RigDataError as error:
+        count = sum(problem.severity == "error" for problem in error.problems)
+        return count - (1 if open_paths(tomllib.loads(text)) else 0)
+    return 0
 
 
 def _blocks(text: str) -> list[_Block]:
@@ -91,11 +108,11 @@ def _blocks(text: str) -> list[_Block]:
     return blocks
 
 
-def _update_channels(blocks: list[_Block], before: Survey, after: Survey, changes: list[str]) -> None:
+def _update_channels(blocks: list[_Block], before: Survey, after: Survey, changes: list[str], merges: bool) -> None:
     present = {b.name for b in blocks if b.kind == "channels"}
     old, new = channel_blocks(before), channel_blocks(after)
     for block in blocks:
-        if block.kind == "channels" and block.name in new:
+        if merges and block.kind == "channels" and block.name in new:
             _merge(block, new[block.name], old.get(block.name, []), f"channel {block.name}", changes)
     fresh = [_Block("channels", name, lines, {}) for name, lines in new.items() if name not in present]
     changes += [f"channel {b.name}: new" for b in fresh]
@@ -103,15 +120,16 @@ def _update_channels(blocks: list[_Block], before: Survey, after: Survey, change
     blocks[at:at] = fresh
 
 
-def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: list[str]) -> None:
-    old = {run.file: run_lines(run, before) for run in before.runs}
-    new = {run.file: run_lines(run, after) for run in after.runs}
+def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: list[str], merges: bool) -> None:
+    old = {run.file: run_lines(run) for run in before.runs}
+    new = {run.file: run_lines(run) for run in after.runs}
     present = {b.name for b in blocks if b.kind == "runs"}
     for block in blocks:
-        if block.kind == "runs" and block.name in new:
-            _merge(block, new[block.name], old[block.name], f"run {block.data.get('id', block.name)}", changes)
-        elif block.kind == "runs" and block.name:
-            changes.append(f"run {block.data.get('id', block.name)}: its file {block.name} is not there; left as it is")
+        run = f"run {block.data.get('id', block.name)}"
+        if merges and block.kind == "runs" and block.name in new:
+            _merge(block, new[block.name], old[block.name], run, changes)
+        elif block.kind == "runs" and block.name and block.name not in new:
+            changes.append(f"{run}: its file {block.name} is not there; left as it is")
     for name, lines in new.items():
         if name not in present:
             blocks.append(_Block("runs", name, lines, {}))
@@ -119,30 +137,28 @@ def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: l
 
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
-    """Put new guesses in place of old ones and of open places, and add what is lacking."""
+    """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
     guessed, wanted = _values(old), _values(new)
-    lines, have = [], set()
+    lines, present = [], set()
     for line in block.lines:
         key, value = _entry(line)
-        have.add(key)
-        open_still = key and (MARK in value or (key in guessed and value == guessed[key][0]))
-        if not open_still or (key in wanted and wanted[key][0] == value):
-            lines.append(line)
-        elif key in wanted:
-            lines.append(wanted[key][1])
+        present.add(key)
+        is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
+        if key in wanted and (MARK in value or is_guess) and wanted[key][0] != value and MARK not in wanted[key][0]:
             changes.append(f"{place}: {key} {value} becomes {wanted[key][0]}")
-        else:
-            changes.append(f"{place}: {key} {value} goes")
+            line = wanted[key][1]
+        lines.append(line)
     while lines and not lines[-1].strip():
         lines.pop()
     # a sensor is described in full or by another one of its type
-    present = {_entry(line)[0] for line in lines}
     if "like" in present:
-        have |= {"unit", "sensitivity"}
+        present |= _OF_MODEL - {"polarity"}
     if "unit" in present:
-        have.add("like")
+        present.add("like")
+        if "sensitivity" in wanted and "sensitivity" not in guessed:
+            present.add("sensitivity")
     for key, (value, line) in wanted.items():
-        if key not in have:
+        if key not in present:
             lines.append(line)
             changes.append(f"{place}: {key} {value} added")
     block.lines = lines

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigdata.survey.guess import guess_channel, guess_run, usable_unit
 
 from rigdata import RigDataError, load_campaign
 from rigdata.problem import Problem
@@ -15,7 +16,6 @@ from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
 from rigdata.survey.draft import MARK, draft_manifest, survey
 from rigdata.survey.exports import Export, read_exports, record_files
-from rigdata.survey.guess import guess_channel, guess_run, usable_unit
 from rigdata.survey.spectrum import look_at
 from rigdata.virtual_rig import DryTest, locus_points, operating_points
 from tests.good_campaigns import SMALL_PLAN, rocker_rig

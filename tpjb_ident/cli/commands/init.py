@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,8 +19,8 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from rigdata.survey.draft import Survey
     from rigdata.survey.exports import Export
+    from rigdata.survey.survey import Survey
 
 MANIFEST = "campaign.toml"
 #: What a draft of the bearing is called, and its text in the model's package.
@@ -42,23 +44,21 @@ Update = Annotated[
 def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = False) -> None:
     """Draft the campaign.toml of a folder of exports.
 
-    And its bearing.toml, where there is none. Channels, units, rates and kinds of run are guessed from names and
-    signals; what only the person at the rig can know is marked ??. Records are only read. A campaign.toml that is there
-    already stays as it is; with --update it is carried on: what you changed stays, open places and guesses are made
-    anew, new records become runs.
+    And its bearing.toml, where there is none. Channels, units, axes, rates and runs are read from the files or
+    concluded from the records, with the figure; what remains a guess is marked (guess), what only the person at the
+    rig can know ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
+    carried on: what you typed stays, open places and guesses are made anew, new records become runs.
     """
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")
     c.target = c.out or folder
-    if update:
-        _update(c, folder)
-    else:
-        _draft(c, folder, bearing)
-    c.next(f"tpjb check {folder}")
+    text = _update(c, folder, bearing) if update else _draft(c, folder, bearing)
+    c.next(f"tpjb init {folder} --update" if _open_summary(text) else f"tpjb check {folder}")
 
 
-def _draft(c: Command, folder: Path, bearing: str | None) -> None:
-    from rigdata.survey.draft import draft_manifest, survey
+def _draft(c: Command, folder: Path, bearing: str | None) -> str:
+    from rigdata.survey.draft import draft_manifest
+    from rigdata.survey.survey import survey
 
     manifest = c.target / MANIFEST
     if manifest.exists():
@@ -67,26 +67,26 @@ def _draft(c: Command, folder: Path, bearing: str | None) -> None:
             "or move the file away."
         )
     exports, problems = _read_exports(c, folder, ())
-    guesses = survey(exports)
     name = re.sub(r"[^\w.+=@-]+", "-", folder.resolve().name) or "campaign"
     bearing = bearing or _bearing_file(folder)
+    guesses = survey(exports, pivots=_pivot_angles(folder, bearing))
     text = draft_manifest(guesses, name, bearing or BEARING)
     c.target.mkdir(parents=True, exist_ok=True)
     write_text(manifest, text)
     c.wrote(MANIFEST)
+    c.print(_verdict(manifest, guesses, text))
     _show_survey(c, guesses, folder.name)
     for problem in problems:
         c.warn(f"left out: {problem}")
-    c.print(f"{manifest}: {_open_lines(text)} lines are marked ??; only you can fill them in.")
     draft = c.target / BEARING
     if bearing is None and not draft.exists():
-        text = _bearing_draft(guesses)
-        write_text(draft, text)
+        write_text(draft, _bearing_draft(guesses))
         c.wrote(BEARING)
-        c.print(f"{draft}: {_open_lines(text)} more, from drawing and data sheet; `identify` needs none.")
+        c.print(f"{draft}: to be filled in from drawing and data sheet; `identify` needs none.")
+    return text
 
 
-def _update(c: Command, folder: Path) -> None:
+def _update(c: Command, folder: Path, bearing: str | None) -> str:
     from rigdata.survey.update import column_names, updated_manifest
 
     manifest = c.target / MANIFEST
@@ -94,24 +94,38 @@ def _update(c: Command, folder: Path) -> None:
         raise BadInputError(f"{manifest}: is not there, so there is nothing to carry on. Leave --update out.")
     before = manifest.read_text("utf-8-sig")
     exports, problems = _read_exports(c, folder, column_names(before))
-    text, changes = updated_manifest(before, exports)
+    pivots = _pivot_angles(folder, bearing or _bearing_file(folder))
+    text, changes = updated_manifest(before, exports, pivots)
+    same = text.split() == before.split()
+    remainder = _open_summary(text) or "no place is open"
+    count = "nothing to change" if same else f"{len(changes)} changes, the former one is {manifest.name}.bak"
+    c.print(f"{manifest}: {count}; {remainder}.")
     for problem in problems:
         c.warn(f"left out: {problem}")
     for change in changes:
         c.print(change)
-    marks = f"{_open_lines(text)} lines are marked ??."
-    if text.split() == before.split():
-        c.print(f"{manifest}: nothing to change, {marks}")
-        return
-    backup = manifest.with_suffix(".toml.bak")
-    write_text(backup, before)
-    write_text(manifest, text)
-    c.wrote(MANIFEST)
-    c.print(f"{manifest}: {len(changes)} changes (before: {backup.name}), {marks}")
+    if not same:
+        write_text(manifest.with_suffix(".toml.bak"), before)
+        write_text(manifest, text)
+        c.wrote(MANIFEST)
+    return text
 
 
-def _open_lines(text: str) -> int:
-    return sum("??" in line.partition("#")[0] for line in text.splitlines())
+def _verdict(manifest: Path, guesses: Survey, text: str) -> str:
+    """What was found, and what is open, in one sentence each."""
+    kinds = Counter(run.kind.value or "unknown" for run in guesses.runs)
+    runs = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    guessed = sum("(guess)" in line for line in text.splitlines()) - 1  # the head explains the mark
+    return (
+        f"{manifest}: {len(guesses.channels)} channels, {len(guesses.runs)} records ({runs}); "
+        f"{_open_summary(text) or 'no place is open'}; {guessed} marked (guess)."
+    )
+
+
+def _open_summary(text: str) -> str:
+    from rigdata.manifest.fields import open_paths, open_summary
+
+    return open_summary(open_paths(tomllib.loads(text)))
 
 
 def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[Export], list[str]]:
@@ -132,10 +146,23 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     return exports, [str(p) for p in problems]
 
 
+def _pivot_angles(folder: Path, bearing: str | None) -> list[float]:
+    """Angles of the pads [rad] by the bearing file; none where it cannot be read yet."""
+    from model.bearing import BearingError
+    from model.bearing_file import load_bearing
+
+    path = folder / (bearing or BEARING)
+    try:
+        return [pad.pivot_angle for pad in load_bearing(path).pads] if path.is_file() else []
+    except BearingError:
+        return []
+
+
 def _bearing_draft(guesses: Survey) -> str:
     """Text of a bearing file with every entry explained; the pads' angles where dry load steps tell them."""
     text = (Path(model.__file__).parent / DRAFT).read_text("utf-8")
-    steps = {run.pad: run.direction for run in guesses.runs if run.kind == "dry_pivot" and run.pad}
+    dry = [run for run in guesses.runs if run.kind.value == "dry_pivot" and run.pad.value]
+    steps = {run.pad.value: run.direction.number for run in dry}
     pads = list(range(1, len(steps) + 1))
     if len(pads) > 1 and sorted(steps) == pads and all(math.isfinite(angle) for angle in steps.values()):
         angles = ", ".join(f'"{steps[pad]:g} deg"' for pad in pads)
@@ -150,14 +177,18 @@ def _bearing_file(folder: Path) -> str | None:
 
 
 def _show_survey(c: Command, guesses: Survey, name: str) -> None:
-    """Print what the channels and the files may be."""
-    channels = [[n, g.quantity or "?", g.unit or "?", g.axis or "", g.why] for n, g in guesses.channels.items()]
-    c.show(f"{name}: channels, guessed", words("channel", "quantity", "unit", "axis", "why"), channels)
+    """Print what the channels and the files may be, and by what."""
+    channels = []
+    for channel, guess in guesses.channels.items():
+        axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
+        channels.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, guess.axis.reason])
+    c.show(f"{name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     runs = []
     for rate, run in zip(guesses.rates, guesses.runs[:MOST_RECORDS], strict=False):
-        lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3]) or "-"
-        runs.append([run.file, run.kind or "?", rate if rate > 0 else "?", lines, run.why])
-    columns = [*words("file", "kind"), "rate {frequency}", *words("lines Hz", "why")]
-    c.show(f"{name}: records, guessed", columns, runs)
+        oscillates = run.kind.value in ("dynamic", "locus")
+        lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3] if oscillates) or "-"
+        runs.append([run.file, run.kind.value or "?", rate if rate > 0 else "?", lines, run.kind.reason])
+    columns = [*words("file", "kind"), "rate {frequency}", *words("lines Hz", "kind by")]
+    c.show(f"{name}: records", columns, runs)
     if len(guesses.runs) > len(runs):
         c.print(f"... and {len(guesses.runs) - len(runs)} more records")

@@ -1,0 +1,147 @@
+"""Where sensors point, concluded from the records: two of a kind at right angles, held against known directions.
+
+Both read the same vector, so the angle of their readings follows its direction, turned by where the first one points
+and mirrored where the second is clockwise from it: directions that are known tell both, and signs with them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.readers.series import Series
+from rigdata.survey.channels import ChannelGuess, Entry
+
+#: Directions further off than this in the mean [deg] are not what these two sensors see: no proposal.
+_MOST_OFF = 12.0
+#: By so much worse the mirror image must be.
+_MIRROR = 3.0
+#: People mount sensors at multiples of this [deg]; a figure so near, or within its residual, was meant to be one.
+_MOUNTED, _NEAR = 15.0, 2.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Two sensors of a kind: names, where the first points [rad], and the sense in which the second follows."""
+
+    names: tuple[str, str]
+    angle: float
+    sense: int
+    source: str
+    reason: str
+
+    def direction(self, readings: FloatArray) -> FloatArray:
+        """Directions (n,) [rad] of readings (n, 2)."""
+        return self.angle + self.sense * np.arctan2(readings[..., 1], readings[..., 0])
+
+
+def pairs(channels: Mapping[str, ChannelGuess], quantity: str) -> list[tuple[str, str]]:
+    """Channels of a quantity and unit, two by two as they follow each other."""
+    names: dict[str, list[str]] = {}
+    for name, guess in channels.items():
+        if guess.quantity.value == quantity:
+            names.setdefault(guess.unit, []).append(name)
+    return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2], strict=False)]
+
+
+def stated_frame(pair: tuple[str, str], channels: Mapping[str, ChannelGuess]) -> Frame | None:
+    """The frame of two sensors whose axes are in the manifest, or which their names hint at."""
+    first, second = (channels[name] for name in pair)
+    if first.typed and second.typed:
+        angles = [g.axis.number + (180.0 if g.polarity < 0 else 0.0) for g in (first, second)]
+        source, reason = "file", ""
+    else:
+        angles, source, reason = [first.hint, second.hint], "guess", "its name"
+    turn = math.sin(math.radians(angles[1] - angles[0]))
+    if not abs(turn) > math.cos(math.radians(_MOST_OFF)):
+        return None
+    return Frame(pair, math.radians(angles[0]), 1 if turn > 0 else -1, source, reason)
+
+
+def fitted_frame(
+    pair: tuple[str, str], readings: FloatArray, directions: FloatArray, reason: str, most: float = _MOST_OFF
+) -> Frame | None:
+    """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict."""
+    if len(readings) < 2:
+        return None
+    turned = np.arctan2(readings[:, 1], readings[:, 0])
+    fits = []
+    for sense in (1, -1):
+        offsets = np.exp(1j * (directions - sense * turned))
+        mean = offsets.mean()
+        residual = math.degrees(float(np.sqrt(np.mean(np.angle(offsets * np.conj(mean)) ** 2))))
+        fits.append((residual, sense, float(np.angle(mean))))
+    (residual, sense, angle), (mirrored, _, _) = sorted(fits)
+    if residual > most or mirrored < _MIRROR * max(residual, 1.0):
+        return None
+    return Frame(pair, angle, sense, "records", f"{reason}, residual {residual:.1f} deg")
+
+
+def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
+    """Give two channels the axes of their frame: 0 to 180 deg, and the sign as a polarity."""
+    for number, name in enumerate(frame.names):
+        if channels[name].typed:
+            continue
+        angle = math.degrees(frame.angle) + (90.0 * frame.sense if number else 0.0)
+        round_angle = _MOUNTED * round(angle / _MOUNTED)
+        reason = frame.reason
+        if frame.source == "records":
+            reason = f"{_signed(angle):g} deg by {reason}"
+        if abs(round_angle - angle) <= _NEAR:
+            angle = round_angle
+        turned = angle % 360.0
+        polarity = channels[name].sign or (-1 if turned >= 180.0 else 1)
+        pointed = turned + (180.0 if polarity < 0 else 0.0)
+        axis = Entry(_signed(pointed), frame.source, reason)
+        channels[name] = replace(channels[name], axis=axis, polarity=polarity)
+
+
+def _signed(angle: float) -> float:
+    return round((angle + 180.0) % 360.0 - 180.0, 1) + 0.0  # no minus before zero
+
+
+def changes(series: Sequence[Series]) -> FloatArray:
+    """Difference of two channels (2,) between the last and the first tenth of a record."""
+    parts = []
+    for channel in series:
+        good = channel.values[np.isfinite(channel.values)]
+        tenth = max(1, len(good) // 10)
+        parts.append(float(good[-tenth:].mean() - good[:tenth].mean()) if len(good) else math.nan)
+    return np.array(parts)
+
+
+def means(series: Sequence[Series]) -> FloatArray:
+    """Means of two channels (2,)."""
+    return np.array([float(np.nanmean(s.values)) if np.isfinite(s.values).any() else math.nan for s in series])
+
+
+def line_phasors(series: Sequence[Series], frequency: float) -> ComplexArray:
+    """Phasors (2,) of two channels at a frequency [Hz], at their own times."""
+    phasors = []
+    for channel in series:
+        time = np.arange(len(channel)) / channel.rate if channel.time is None else channel.time
+        values = np.nan_to_num(channel.values - np.nanmean(channel.values))
+        window = np.hanning(len(values))
+        wave = np.exp(-2j * np.pi * frequency * time) * window
+        phasors.append(2.0 * complex(values @ wave) / float(window.sum()))
+    return np.array(phasors)
+
+
+def along(cells: ComplexArray, housing: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Readings (2,) of cells and of accelerometers when the force is largest; the housing follows it."""
+    phase = 0.5 * np.angle(np.sum(cells**2))
+    turn = np.exp(-1j * phase)
+    return (cells * turn).real, -(housing * turn).real
+
+
+def sweep_readings(series: Sequence[Series], blocks: int = 120) -> FloatArray:
+    """Readings (blocks, 2) of two channels in equal shares of a record, from the middle of what they run around."""
+    columns = []
+    for channel in series:
+        parts = np.array([np.nanmean(part) for part in np.array_split(channel.values, blocks)])
+        columns.append(parts - 0.5 * (parts.max() + parts.min()))
+    return np.stack(columns, axis=1)

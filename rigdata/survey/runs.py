@@ -1,0 +1,179 @@
+"""What a record may be: by its file's name, by how the forces move, by its lines."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from rigdata.readers.series import Series
+from rigdata.survey.channels import OPEN, ChannelGuess, Entry
+from rigdata.survey.exports import Export
+from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
+from rigdata.units import unit_factor
+
+#: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
+_SLOW, _STRAIGHT = 0.9, 0.97
+#: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
+_MOSTLY, _DRIVEN = 0.5, 0.05
+_BLOCK = 0.25
+#: How far a line may lie from a frequency that is stated or known, as a share.
+NEAR = 0.02
+#: Units of a tachometer, in Hz.
+_TURNS = {"rpm": 1.0 / 60.0, "Hz": 1.0, "1/s": 1.0, "rad/s": 1.0 / (2.0 * math.pi)}
+#: Units of a load in the names of files.
+_LOADS = (("kN", "kN"), ("klbf?", "klbf"), ("lbf|lbs?", "lbf"), ("N", "N"))
+_BY_NAME = (
+    ("dry_pivot", r"pivot|dry|trocken|steps?|stufen|^p-"),
+    ("clearance", r"clear|spiel|^c-"),
+    ("locus", r"locus|locat|^l-"),
+    ("dynamic", r"dyn|excit|shake|^d-"),
+)
+
+
+@dataclass(frozen=True)
+class RunGuess:
+    """What a record may be; loads [N] with their text in the manifest, directions in degrees, frequencies in Hz."""
+
+    file: str
+    kind: Entry
+    lines: tuple[SpectralPeak, ...] = ()
+    load: Entry = OPEN
+    load_text: str = ""
+    direction: Entry = OPEN
+    pad: Entry = OPEN
+    speed: Entry = OPEN
+    excitation: Entry = OPEN
+
+
+def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
+    """Guess what a record is, as far as it tells alone."""
+    forces = of_quantity(export, channels, "force")
+    moves = of_quantity(export, channels, "displacement")
+    lines = strongest_lines(forces) or strongest_lines(moves)
+    stem = export.name.rpartition("/")[2].rpartition(".")[0]
+    pad = re.search(r"(?:^p|pad)[-_ #]?(\d{1,2})(?!\d)", stem, re.IGNORECASE)
+    load, text = _load_of(stem)
+    angle = _number_before(stem, r"deg(?:ree)?s?|°|grad")
+    return RunGuess(
+        file=export.name,
+        kind=_kind(stem, forces, moves, lines),
+        lines=lines,
+        load=load,
+        load_text=text,
+        direction=_stated(angle),
+        pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else Entry(),
+        speed=_speed(export, channels, stem),
+        excitation=_stated_frequency(stem, lines),
+    )
+
+
+def of_quantity(export: Export, channels: Mapping[str, ChannelGuess], quantity: str) -> list[Series]:
+    """Channels of a record that measure a quantity."""
+    return [s for s in export.series if channels[s.name].quantity.value == quantity]
+
+
+def _stated(number: float) -> Entry:
+    return Entry(number, "file") if math.isfinite(number) else Entry()
+
+
+def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> Entry:
+    """Movement beats a misleading name, but a name tells a constant load from none."""
+    named = next((kind for kind, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
+    movement, why = _by_movement(forces, moves, lines)
+    if movement and movement != named and named and {movement, named} != {"dynamic", "locus"}:
+        return Entry(movement, "records", f"{why} (its name says {named})")
+    if movement and movement == (named or movement):
+        return Entry(movement, "records", why)
+    return Entry(named, "guess", "the file's name") if named else Entry()
+
+
+def _number_before(stem: str, unit: str) -> float:
+    """Number before a unit in a file's name: ``-90deg``, ``1320_rpm``; NaN without one."""
+    match = re.search(rf"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?(?:{unit})(?![a-z])", stem, re.IGNORECASE)
+    if match is None:
+        return float("nan")
+    size = float(match[2].replace(",", "."))
+    return -size if match[1] == "-" else size  # behind a letter it is a hyphen
+
+
+def _load_of(stem: str) -> tuple[Entry, str]:
+    """Static load that a file's name states, in N and as text: ``5kN``, ``1349lbf``, or a bare number of newtons."""
+    for pattern, unit in _LOADS:
+        number = _number_before(stem, pattern)
+        if math.isfinite(number):
+            factor = 1e3 * unit_factor("lbf", "force") if unit == "klbf" else unit_factor(unit, "force")
+            text = f"{1e3 * number:g} lbf" if unit == "klbf" else f"{number:g} {unit}"
+            return Entry(abs(number) * factor, "file"), text.lstrip("-")
+    bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.])", stem)]
+    newtons = next((n for n in bare if 100.0 <= n <= 200_000.0), math.nan)
+    if math.isnan(newtons):
+        return Entry(), ""
+    return Entry(newtons, "guess", "a number in the file's name"), f"{newtons / 1e3:g} kN"
+
+
+def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> Entry:
+    """Shaft speed [Hz] by a tachometer in engineering units, else by the file's name."""
+    for series in of_quantity(export, channels, "speed"):
+        guess = channels[series.name]
+        factor = _TURNS.get(guess.unit, guess.gain / (2.0 * math.pi))
+        good = series.values[np.isfinite(series.values)]
+        mean = float(np.median(good)) * factor if len(good) and math.isfinite(factor) else 0.0
+        if mean > 0:
+            return Entry(mean, "records", f"{mean:.4g} Hz by {series.name}")
+    return _stated(_number_before(stem, r"rpm|u[-_]?min|1[-_]min") / 60.0)
+
+
+def _stated_frequency(stem: str, lines: tuple[SpectralPeak, ...]) -> Entry:
+    """Frequency [Hz] that a file's name states and one of the record's lines confirms."""
+    numbers = re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)
+    frequencies = [float(number.replace(",", ".")) for number in numbers]
+    confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
+    return Entry(confirmed[0], "file") if len(confirmed) == 1 else Entry()
+
+
+def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> tuple[str, str]:
+    pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
+    if not pair:
+        return "", ""
+    slow = [_slow(s) for s in pair]
+    total = sum(float(np.nanvar(s.values)) for s in pair)
+    if total <= 0:
+        return "", ""
+    share = sum(float(np.var(b)) for b in slow) / total
+    driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
+    if share > _SLOW or (share > _MOSTLY and not driven):
+        if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
+            spread = np.linalg.eigvalsh(np.cov(np.stack(slow)))
+            if spread[-1] < _STRAIGHT * spread.sum():
+                return "clearance", "the force goes around"
+        return "dry_pivot", "the force climbs slowly along one line"
+    return ("dynamic", "the force oscillates") if lines else ("locus", "the force is constant")
+
+
+def _slow(series: Series) -> FloatArray:
+    """Means over blocks of a quarter of a second."""
+    step = max(1, round(_BLOCK * series.rate))
+    count = len(series.values) // step
+    blocks = series.values[: count * step].reshape(count, step)
+    means = []
+    for block in blocks:
+        finite = block[np.isfinite(block)]
+        if len(finite):
+            means.append(float(np.mean(finite)))
+    return np.array(means)
+
+
+def strongest_lines(channels: Sequence[Series]) -> tuple[SpectralPeak, ...]:
+    """Lines of the channel that oscillates most, strongest first."""
+    best: tuple[SpectralPeak, ...] = ()
+    for series in channels:
+        frequency, amplitude = amplitude_spectrum(series.values, series.rate)
+        peaks = strongest(frequency, amplitude, most=4)
+        if peaks and (not best or peaks[0].amplitude > best[0].amplitude):
+            best = peaks
+    return best

@@ -1,0 +1,368 @@
+"""A folder of exports as a whole: what its records tell of each other and of the sensors' axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from rigdata.manifest.fields import MAINS_FREQUENCIES
+from rigdata.readers.series import Series
+from rigdata.survey.axes import (
+    Frame,
+    along,
+    changes,
+    fitted_frame,
+    line_phasors,
+    means,
+    pairs,
+    stated_frame,
+    sweep_readings,
+    with_axes,
+)
+from rigdata.survey.channels import ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
+from rigdata.survey.exports import Export
+from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
+
+#: Directions [deg] no farther apart than this are meant to be one; a dry test so near a pad's is toward that pad.
+_ALIKE, _TOWARD = 3.0, 15.0
+_MAINS_NEAR = 0.005
+#: In a clearance sweep the shaft lies in the corners, up to half a pad from where it is pushed [deg].
+_CORNERS = 25.0
+#: Loads and speeds that differ by no more than this factor are one set point; a round number so near is meant.
+_ONE_LOAD, _ONE_SPEED, _ROUND = 1.03, 1.015, 0.003
+#: Share of the running records in which the shaft speed must show.
+_MOST_OF = 0.8
+#: A load that a file's name states and the cells contradict by more than this share is to be confirmed.
+_CONTRADICTS = 0.1
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What was found in a folder of exports."""
+
+    rates: tuple[float, ...]
+    channels: dict[str, ChannelGuess]
+    runs: tuple[RunGuess, ...]
+    speed_line: float = float("nan")
+    clock: str = ""
+    nameless: int = 0
+    per_hertz: dict[str, float] = field(default_factory=dict)
+
+
+def survey(
+    exports: Sequence[Export],
+    described: Mapping[str, Mapping[str, Any]] | None = None,
+    pivots: Sequence[float] = (),
+) -> Survey:
+    """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
+    channels: dict[str, ChannelGuess] = {}
+    for export in exports:
+        for series in export.series:
+            if series.name not in channels:
+                guess = guess_channel(series.name, series.unit)
+                channels[series.name] = as_described(guess, (described or {}).get(series.name, {}))
+    runs = [guess_run(export, channels) for export in exports]
+    cells = _cells(exports, channels, runs, pivots)
+    if cells is not None:
+        with_axes(channels, cells)
+        runs = [_loaded(run, export, channels, cells, pivots) for run, export in zip(runs, exports, strict=True)]
+    speed = _common_line(exports, channels, runs)
+    runs = [_with_lines(run, speed) for run in runs]
+    if cells is not None:
+        _other_axes(exports, channels, runs, cells, pivots)
+    return Survey(
+        rates=tuple(e.rate for e in exports),
+        channels=channels,
+        runs=_set_points(runs),
+        speed_line=speed.number,
+        per_hertz=_tachometers(exports, channels, runs, speed.number),
+        clock=next((e.clock for e in exports if e.clock), ""),
+        nameless=max((e.nameless for e in exports), default=0),
+    )
+
+
+def _pair(export: Export, names: tuple[str, str]) -> list[Series]:
+    """The two channels of a record; empty where one is missing or both never move."""
+    series = {s.name: s for s in export.series}
+    chosen = [series[name] for name in names if name in series]
+    return chosen if len(chosen) == 2 and any(np.isfinite(s.values).any() for s in chosen) else []
+
+
+def _steps(exports: Sequence[Export], runs: Sequence[RunGuess], names: tuple[str, str]) -> dict[int, FloatArray]:
+    """By how much two channels change from the first to the last step of every dry test, by the run's number."""
+    steps = {}
+    for number, (export, run) in enumerate(zip(exports, runs, strict=True)):
+        series = _pair(export, names) if run.kind.value == "dry_pivot" else []
+        if series and np.isfinite(change := changes(series)).all() and change.any():
+            steps[number] = change
+    return steps
+
+
+def _cells(
+    exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], pivots: Sequence[float]
+) -> Frame | None:
+    """Frame of the load cells: typed, told by dry steps toward known pads, or as their names hint."""
+    pair = next(iter(pairs(channels, "force")), None)
+    if pair is None:
+        return None
+    stated = stated_frame(pair, channels)
+    if stated is not None and stated.source == "file":
+        return stated
+    steps = _steps(exports, runs, pair)
+    toward = {i: runs[i].pad.value for i in steps if 0 < (runs[i].pad.value or 0) <= len(pivots)}
+    if len(set(toward.values())) > 1:
+        directions = np.array([pivots[pad - 1] for pad in toward.values()])
+        reason = f"{len(toward)} dry steps toward their pads"
+        fitted = fitted_frame(pair, np.array([steps[i] for i in toward]), directions, reason)
+        return fitted or stated
+    if stated is None or not len(pivots) or len(steps) < 2:
+        return stated
+    readings = np.array(list(steps.values()))
+    hinted = stated.direction(readings)
+    nearest = np.array([_nearest_pad(angle, pivots)[1] for angle in hinted])
+    if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
+        return stated  # the names' directions lead to no pads
+    return fitted_frame(pair, readings, nearest, f"its name and {len(steps)} dry steps toward pads") or stated
+
+
+def _nearest_pad(angle: float, pivots: Sequence[float]) -> tuple[int, float]:
+    """Number and angle [rad] of the pad nearest to a direction."""
+    number = int(np.argmax(np.cos(np.asarray(pivots) - angle)))
+    return number + 1, float(pivots[number])
+
+
+def _loaded(
+    run: RunGuess, export: Export, channels: Mapping[str, ChannelGuess], cells: Frame, pivots: Sequence[float]
+) -> RunGuess:
+    """A run with direction, load and pad as the cells tell them."""
+    series = _pair(export, cells.names)
+    if not series or run.kind.value == "clearance":
+        return run
+    is_dry = run.kind.value == "dry_pivot"
+    force = changes(series) if is_dry else means(series)
+    if not force.any() or not np.isfinite(force).all():
+        return run
+    angle = float(cells.direction(force))
+    source = "guess" if cells.source == "guess" else "records"
+    degrees = (math.degrees(angle) + 180.0) % 360.0 - 180.0
+    degrees = round(degrees, 1) + 0.0
+    reason = f"cells {degrees:g} deg" + (", if their axes hold" if source == "guess" else "")
+    if run.direction.source != "file":
+        run = replace(run, direction=Entry(float(round(degrees)), source, reason))
+    if is_dry and len(pivots):
+        number, pivot = _nearest_pad(angle, pivots)
+        off = math.degrees(abs(math.remainder(pivot - angle, 2 * math.pi)))
+        if off <= _TOWARD and run.pad.value in (None, number):
+            pad = run.pad if run.pad.value else Entry(number, source, f"{reason}, {off:.1f} deg from it")
+            angle_of_pad = (round(math.degrees(pivot), 6) + 180.0) % 360.0 - 180.0
+            return replace(run, pad=pad, direction=replace(run.direction, value=angle_of_pad))
+        if run.pad.value:
+            return replace(run, pad=replace(run.pad, source="guess", reason=f"the file's name; {reason}"))
+    gains = [channels[name].gain for name in cells.names]
+    return run if is_dry or not all(map(math.isfinite, gains)) else _with_load(run, force * gains, channels, cells)
+
+
+def _with_load(run: RunGuess, force: FloatArray, channels: Mapping[str, ChannelGuess], cells: Frame) -> RunGuess:
+    """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
+    load = float(np.hypot(*force))
+    kilonewtons = f"{load / 1e3:.3g} kN"
+    if run.load.source == "file":
+        if abs(load - run.load.number) <= _CONTRADICTS * run.load.number:
+            return run
+        return replace(run, load=replace(run.load, source="guess", reason=f"the file's name; cells {kilonewtons}"))
+    return replace(run, load=Entry(load, "records", f"cells {kilonewtons}"), load_text="")
+
+
+def _other_axes(
+    exports: Sequence[Export],
+    channels: dict[str, ChannelGuess],
+    runs: Sequence[RunGuess],
+    cells: Frame,
+    pivots: Sequence[float],
+) -> None:
+    """Axes of probes by the dry steps, or the sweep; of accelerometers by the excitation; hints where these fail."""
+    forces = _steps(exports, runs, cells.names)
+    for pair in pairs(channels, "displacement"):
+        steps = _steps(exports, runs, pair)
+        used = [i for i in steps if i in forces]
+        directions = np.array([float(cells.direction(forces[i])) for i in used])
+        toward = [runs[i].pad.value for i in used]
+        if all(0 < (pad or 0) <= len(pivots) for pad in toward):
+            directions = np.array([pivots[pad - 1] for pad in toward])
+        frame = fitted_frame(pair, np.array([steps[i] for i in used]), directions, f"{len(used)} dry steps")
+        frame = frame or _frame_by_sweep(exports, runs, pair, cells)
+        if frame is not None:
+            with_axes(channels, frame)
+    for pair in pairs(channels, "acceleration"):
+        frame = _frame_by_excitation(exports, runs, pair, cells) or stated_frame(pair, channels)
+        if frame is not None:
+            with_axes(channels, frame)
+
+
+def _frame_by_sweep(
+    exports: Sequence[Export], runs: Sequence[RunGuess], pair: tuple[str, str], cells: Frame
+) -> Frame | None:
+    """Frame of two probes by a small load that goes around: the shaft follows it from corner to corner."""
+    for export, run in zip(exports, runs, strict=True):
+        probes, forces = _pair(export, pair), _pair(export, cells.names)
+        if run.kind.value == "clearance" and probes and forces:
+            directions = cells.direction(sweep_readings(forces))
+            return fitted_frame(pair, sweep_readings(probes), directions, "the clearance sweep", _CORNERS)
+    return None
+
+
+def _frame_by_excitation(
+    exports: Sequence[Export], runs: Sequence[RunGuess], pair: tuple[str, str], cells: Frame
+) -> Frame | None:
+    """Frame of two accelerometers: the housing gives way to the force on its cells along the excitation."""
+    readings, directions = [], []
+    for export, run in zip(exports, runs, strict=True):
+        housing, forces = _pair(export, pair), _pair(export, cells.names)
+        frequency = run.excitation.number
+        if run.kind.value == "dynamic" and housing and forces and frequency > 0:
+            force, acceleration = along(line_phasors(forces, frequency), line_phasors(housing, frequency))
+            readings.append(acceleration)
+            directions.append(float(cells.direction(force)))
+    if not readings:
+        return None
+    reason = f"the excitation of {len(readings)} runs"
+    return fitted_frame(pair, np.array(readings), np.array(directions), reason)
+
+
+def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
+    """A run with its speed and excitation: what turns with the shaft is not the excitation."""
+    if run.kind.value not in ("dynamic", "locus", None):
+        return run
+    if run.speed.value is None:
+        run = replace(run, speed=speed)
+    if run.excitation.value is not None or run.kind.value == "locus":
+        return run
+    turns = run.speed.number
+    lines = [p for p in run.lines if not any(abs(p.frequency - n * turns) <= NEAR * n * turns for n in (1, 2))]
+    if lines:
+        beside = " beside the shaft's" if len(lines) < len(run.lines) else ""
+        return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{beside}"))
+    return replace(run, excitation=Entry(None, "", "its only line is the shaft's") if run.lines else Entry())
+
+
+def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
+    """Directions, speeds, frequencies and loads that are nearly alike become the set point that was meant."""
+
+    def close(group: list[float], angle: float) -> bool:
+        return angle - group[-1] <= _ALIKE and angle - group[0] <= 2 * _ALIKE
+
+    def rounded(middle: float) -> float:
+        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
+        return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
+
+    angles = _common([r.direction.number for r in runs], close, rounded)
+    speeds = _common([r.speed.number for r in runs], _within(_ONE_SPEED), _round_frequency)
+    lines = _common([r.excitation.number for r in runs], _within(_ONE_SPEED), _round_frequency)
+    measured = [r.load.number for r in runs if r.load.source == "records"]
+    loads = _common(measured, _within(_ONE_LOAD), lambda middle: float(f"{middle:.2g}"))
+    changed = []
+    for run in runs:
+        load = run.load
+        if load.source == "records":
+            load = replace(load, value=loads[load.value])
+        changed.append(
+            replace(
+                run,
+                direction=_moved(run.direction, angles),
+                speed=_moved(run.speed, speeds),
+                excitation=_moved(run.excitation, lines),
+                load=load,
+                load_text=run.load_text or (f"{load.number / 1e3:.4g} kN" if load.source else ""),
+            )
+        )
+    return tuple(changed)
+
+
+def _within(factor: float) -> Callable[[list[float], float], bool]:
+    return lambda group, value: value <= factor * group[0]
+
+
+def _round_frequency(middle: float) -> float:
+    nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
+    return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.4g}")
+
+
+def _moved(entry: Entry, set_points: Mapping[float, float]) -> Entry:
+    return replace(entry, value=set_points.get(entry.value, entry.value))
+
+
+def _common(
+    values: Sequence[float], close: Callable[[list[float], float], bool], rounded: Callable[[float], float]
+) -> dict[float, float]:
+    """What every finite value was meant to be: the middle of its group of values that are alike, rounded."""
+    groups: list[list[float]] = []
+    for value in sorted({v for v in values if math.isfinite(v)}):
+        if groups and close(groups[-1], value):
+            groups[-1].append(value)
+        else:
+            groups.append([value])
+    set_points: dict[float, float] = {}
+    for group in groups:
+        members = sorted(v for v in values if v in group)
+        set_points |= dict.fromkeys(group, rounded(members[len(members) // 2]))
+    return set_points
+
+
+def _tachometers(
+    exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], line: float
+) -> dict[str, float]:
+    """Reading per hertz of speed channels in volts, where it is one in all running records."""
+    per_hertz: dict[str, float] = {}
+    if not math.isfinite(line):
+        return per_hertz
+    ratios: dict[str, list[float]] = {}
+    for export, run in zip(exports, runs, strict=True):
+        for series in of_quantity(export, channels, "speed") if run.kind.value in ("dynamic", "locus") else ():
+            if not quantity_of_unit(channels[series.name].unit):
+                ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
+    for name, values in ratios.items():
+        low, high = min(values), max(values)
+        if low > 0 and high - low <= NEAR * high:
+            per_hertz[name] = sorted(values)[len(values) // 2]
+    return per_hertz
+
+
+def is_mains(frequency: float) -> bool:
+    """Whether a frequency [Hz] is that of the mains."""
+    return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in MAINS_FREQUENCIES)
+
+
+def _common_line(exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess]) -> Entry:
+    """Shaft speed [Hz]: line of all running records' displacements, besides an excitation that its name states."""
+    running = []
+    for export, run in zip(exports, runs, strict=True):
+        if run.kind.value in ("dynamic", "locus"):
+            peaks = strongest_lines(of_quantity(export, channels, "displacement"))
+            driven = run.excitation.number
+            running.append([p.frequency for p in peaks if not abs(p.frequency - driven) <= NEAR * p.frequency])
+    if len(running) < 2:
+        return Entry()
+    frequencies = np.sort(np.concatenate(running))
+
+    def count(frequency: float) -> int:
+        return int((np.abs(frequencies - frequency) < NEAR * frequency).sum())
+
+    # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
+    order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -count(2 * f), f))
+    for candidate in order:
+        near = frequencies[np.abs(frequencies - candidate) < NEAR * candidate]
+        if len(near) >= _MOST_OF * len(running):
+            half = frequencies[np.abs(2 * frequencies - candidate) < NEAR * candidate]
+            speeds = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
+            speed = float(speeds[len(speeds) // 2])
+            mains = "; it may be the mains" if is_mains(speed) else ""
+            text = f"this line is in {count(speed)} of {len(running)} records{mains}"
+            if min(count(speed), count(2 * speed)) < _MOST_OF * len(running) or mains:
+                return Entry(speed, "guess", text)
+            return Entry(speed, "records", f"{text}, twice it in {count(2 * speed)}")
+    return Entry()
