@@ -90,18 +90,19 @@ def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
         round_angle = _MOUNTED * round(angle / _MOUNTED)
         reason = frame.reason
         if frame.source == "records":
-            reason = f"{_signed(angle):g} deg by {reason}"
+            reason = f"{folded(angle):g} deg by {reason}"
         if abs(round_angle - angle) <= _NEAR:
             angle = round_angle
         turned = angle % 360.0
         polarity = channels[name].sign or (-1 if turned >= 180.0 else 1)
         pointed = turned + (180.0 if polarity < 0 else 0.0)
-        axis = Entry(_signed(pointed), frame.source, reason)
+        axis = Entry(folded(pointed), frame.source, reason)
         channels[name] = replace(channels[name], axis=axis, polarity=polarity)
 
 
-def _signed(angle: float) -> float:
-    return round((angle + 180.0) % 360.0 - 180.0, 1) + 0.0  # no minus before zero
+def folded(angle: float) -> float:
+    """An angle [deg] from above -180 to 180, to a tenth."""
+    return round(180.0 - (180.0 - angle) % 360.0, 1) + 0.0  # no minus before zero
 
 
 def changes(series: Sequence[Series]) -> FloatArray:

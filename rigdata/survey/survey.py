@@ -17,6 +17,7 @@ from rigdata.survey.axes import (
     along,
     changes,
     fitted_frame,
+    folded,
     line_phasors,
     means,
     pairs,
@@ -149,8 +150,7 @@ def _loaded(
         return run
     angle = float(cells.direction(force))
     source = "guess" if cells.source == "guess" else "records"
-    degrees = (math.degrees(angle) + 180.0) % 360.0 - 180.0
-    degrees = round(degrees, 1) + 0.0
+    degrees = folded(math.degrees(angle))
     reason = f"cells {degrees:g} deg" + (", if their axes hold" if source == "guess" else "")
     if run.direction.source != "file":
         run = replace(run, direction=Entry(float(round(degrees)), source, reason))
@@ -159,8 +159,7 @@ def _loaded(
         off = math.degrees(abs(math.remainder(pivot - angle, 2 * math.pi)))
         if off <= _TOWARD and run.pad.value in (None, number):
             pad = run.pad if run.pad.value else Entry(number, source, f"{reason}, {off:.1f} deg from it")
-            angle_of_pad = (round(math.degrees(pivot), 6) + 180.0) % 360.0 - 180.0
-            return replace(run, pad=pad, direction=replace(run.direction, value=angle_of_pad))
+            return replace(run, pad=pad, direction=replace(run.direction, value=folded(math.degrees(pivot))))
         if run.pad.value:
             return replace(run, pad=replace(run.pad, source="guess", reason=f"the file's name; {reason}"))
     gains = [channels[name].gain for name in cells.names]

@@ -66,7 +66,7 @@ def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(fo
     record(folder / "test-5kN.csv", ("Time", "Dev1_ai0", "Dev1_ai1", "FH [N]", "FV [N]"))
     tpjb("init", folder)
     manifest = folder / "campaign.toml"
-    why = 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, acceleration, ..'
+    why = 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..'
     edit(manifest, (why, 'quantity = "displacement"'))
     result = tpjb("init", folder, "--update")
     assert "channel Dev1_ai0: axis '?? deg' added" in result.stdout
@@ -80,7 +80,7 @@ def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
     record(folder / "dyn-5kN-25Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
     tpjb("init", folder)
     manifest = folder / "campaign.toml"
-    load = 'static_load = "5 kN"   # (guess) by the file\'s name; set point, per bearing'
+    load = 'static_load = "5 kN"'  # read from the file's name: no mark
     edit(manifest, (load, 'static_load = "4.9 kN"'),
          ('mass = "?? kg"   # stator mass between oil film and load cells', 'mass = "31 kg"  # weighed'))  # fmt: skip
     record(folder / "dyn-5kN-30Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"), frequency=30.0)
@@ -90,6 +90,35 @@ def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
     assert 'mass = "31 kg"  # weighed' in text
     assert text.count('static_load = "4.9 kN"') == 1
     assert 'excitation_frequency = "30 Hz"' in text
+
+
+def test_filling_in_a_unit_leaves_what_is_like_it_and_a_valid_manifest_valid(folder):
+    record(folder / "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Prox B", "FH [N]", "FV [N]"))
+    tpjb("init", folder)
+    manifest = folder / "campaign.toml"
+    edit(manifest, ('"?? kg"', '"30 kg"'), ('unit = "??"', 'unit = "um"'), ('sensitivity = "??"', "# typed"))
+    text = manifest.read_text("utf-8").replace('axis = "?? deg"', 'axis = "45 deg"', 1)
+    manifest.write_text(text.replace('axis = "?? deg"', 'axis = "135 deg"   # by the drawing'), "utf-8")
+    assert len(load_campaign(folder).runs) == 1
+    result = tpjb("init", folder, "--update")
+    assert result.exit_code == 0, result.stderr
+    after = manifest.read_text("utf-8")
+    assert 'like = "Prox A"' in after
+    assert 'axis = "135 deg"   # by the drawing' in after
+    assert "# typed" in after
+    assert load_campaign(folder).runs[0].channels["Prox B"].unit == "um"
+
+
+def test_open_places_are_one_line_and_the_last_one_the_next_command(folder):
+    record(folder / "dyn-5kN-1320rpm.csv", ("Time", "Prox A", "Prox B", "FH [N]", "FV [N]"))
+    first, *_, last = tpjb("init", folder).stdout.strip().splitlines()
+    assert "2 axis" in first
+    assert "1 mass" in first
+    assert last == f"Next: tpjb init {folder} --update"
+    result = tpjb("check", folder, "--out", folder.parent / "out")
+    assert result.exit_code == 2
+    assert sum("open (??)" in line for line in result.stdout.splitlines()) == 1
+    assert "0 errors" not in result.stdout
 
 
 def test_update_without_a_manifest_says_so(folder):

@@ -1,27 +1,81 @@
-"""Exports as six laboratories write them become a report with three commands and at most ten typed lines."""
+"""Exports of five strange laboratories become coefficients by few typed lines, and their drafts are true."""
 
 from __future__ import annotations
 
+import importlib
+
+import numpy as np
 import pytest
 
-from rigdata.campaign import load_campaign
-from tests.good_campaigns import rocker_rig
-from tests.rigs.laboratories import LABORATORIES, MOST_LINES, through
+from rigdata.survey.exports import read_exports
+from rigdata.survey.survey import survey
+from tests.rigs.laboratories import through
+from tests.rigs.strange_exports import LABORATORIES, LBF, PADS, tests_of, write_exports
 
-pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def campaign(campaign_of):
-    return load_campaign(campaign_of(rocker_rig(3)))
+#: Typed lines at most: where cells and probes are in volts, and where the files state their units.
+VOLTS, UNITS = 10, 3
+NAMES = [laboratory.name for laboratory in LABORATORIES]
 
 
-@pytest.mark.parametrize("laboratory", LABORATORIES, ids=lambda one: one.write.__name__)
-def test_from_records_to_report_with_few_lines_by_hand(laboratory, campaign, tmp_path):
-    for module in {"tdms": "nptdms", "uff": "pyuff"}.get(laboratory.write.__name__, "numpy").split():
-        pytest.importorskip(module)
-    found = through(laboratory, campaign, tmp_path)
-    assert found["report"]
-    assert found["commands"] == 3
-    assert found["lines"] <= MOST_LINES
-    assert found["worst"] < 0.1
+def needs_library(laboratory):
+    for name, library in (("TDMS", "nptdms"), ("MATLAB", "scipy"), ("Parquet", "pyarrow")):
+        if laboratory.name.startswith(name):
+            importlib.import_module(library)
+
+
+@pytest.fixture(scope="module", params=LABORATORIES, ids=NAMES)
+def surveyed(request, tmp_path_factory):
+    """A laboratory, and what is concluded from its files and the pads' angles."""
+    needs_library(request.param)
+    folder = tmp_path_factory.mktemp("records")
+    write_exports(folder, request.param)
+    problems = []
+    exports = list(read_exports(folder, problems))
+    assert not problems
+    return request.param, survey(exports, pivots=PADS)
+
+
+def direction(guess):
+    """Where a sensor points [deg], its sign counted in."""
+    return guess.axis.value + (180.0 if guess.polarity < 0 else 0.0)
+
+
+@pytest.mark.slow
+def test_axes_and_signs_are_those_of_the_rig(surveyed):
+    laboratory, result = surveyed
+    for sensor in laboratory.sensors[:6]:
+        guess = result.channels[sensor.name]
+        assert guess.quantity.value == sensor.quantity
+        assert "residual" in guess.axis.reason
+        turned = direction(guess) - sensor.axis - (180.0 if sensor.gain < 0 else 0.0)
+        assert abs((turned + 180.0) % 360.0 - 180.0) < 1e-9, f"{sensor.name}: {guess.axis}"
+
+
+@pytest.mark.slow
+def test_runs_are_what_was_done(surveyed):
+    laboratory, result = surveyed
+    runs = {run.file.rpartition(".")[0]: run for run in result.runs}
+    kinds = {"dry": "dry_pivot", "dynamic": "dynamic", "clearance": "clearance"}
+    for test in tests_of(laboratory):
+        run = runs[laboratory.title(test)]
+        assert run.kind.value == kinds[test.kind]
+        if test.kind == "dry":
+            assert run.pad.value == test.pad
+            assert np.cos(np.radians(run.direction.value) - PADS[test.pad - 1]) > 1.0 - 1e-6
+        if test.kind == "dynamic":
+            assert run.speed.value == pytest.approx(22.0)
+            assert run.excitation.value == test.frequency  # never what turns with the shaft
+            assert run.load.value == pytest.approx(test.load, rel=0.005)
+            assert run.load_text in (f"{test.load / 1e3:g} kN", f"{test.load:.0f} N", f"{test.load / LBF:.0f} lbf")
+            assert run.direction.value == -90.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("laboratory", LABORATORIES, ids=NAMES)
+def test_from_records_to_coefficients_with_few_lines_by_hand(laboratory, tmp_path):
+    needs_library(laboratory)
+    way = through(laboratory, tmp_path)
+    assert way["lines"] <= (VOLTS if "volts" in laboratory.name else UNITS)
+    assert way["messages"] == 0
+    assert way["K"] < 0.1
+    assert way["C"] < 0.15

@@ -8,15 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigdata.survey.guess import guess_channel, guess_run, usable_unit
 
 from rigdata import RigDataError, load_campaign
+from rigdata.manifest.fields import MARK
 from rigdata.problem import Problem
 from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
-from rigdata.survey.draft import MARK, draft_manifest, survey
+from rigdata.survey.channels import guess_channel, usable_unit
+from rigdata.survey.draft import draft_manifest
 from rigdata.survey.exports import Export, read_exports, record_files
+from rigdata.survey.runs import guess_run
 from rigdata.survey.spectrum import look_at
+from rigdata.survey.survey import survey
 from rigdata.virtual_rig import DryTest, locus_points, operating_points
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.check.campaign import check_campaign
@@ -50,15 +53,15 @@ def found(exports):
 
 def test_kinds_and_set_points_are_guessed_right(found):
     by_name = {run.file.rpartition("/")[2]: run for run in found.runs}
-    kinds = {name[0]: run.kind for name, run in by_name.items()}
+    kinds = {name[0]: run.kind.value for name, run in by_name.items()}
     assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
     assert found.clock == "Zeit"
     assert found.speed_line == pytest.approx(22.0, abs=0.3)
     for name, load, line in (("d-02500-25-01.csv", 2500.0, 25.0), ("d-05000-40-02.csv", 5000.0, 40.0)):
-        assert by_name[name].load == load
+        assert by_name[name].load.value == load
         assert by_name[name].lines[0].frequency == pytest.approx(line, abs=0.2)
-        assert by_name[name].direction == pytest.approx(-90.0, abs=2.0)
-    assert by_name["p-1-up.csv"].pad == 1
+        assert by_name[name].direction.value == pytest.approx(-90.0, abs=2.0)
+    assert by_name["p-1-up.csv"].pad.value == 1
 
 
 def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, found):
@@ -68,7 +71,10 @@ def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, 
     (folder / "draft.toml").write_text(draft, encoding="utf-8")
     problems = check_campaign(folder / "draft.toml")
     assert {p.severity for p in problems} == {"error"}
-    assert any("X1A" in str(p) and "line" in p.place for p in problems)
+    (problem,) = problems  # what is open is one line
+    assert "places open" in problem.what
+    assert "sensitivity" in problem.what
+    assert "line" in problem.place
     filled = draft.replace('"?? kg"', '"30 kg"')
     for name, lines in _calibrations(original).items():
         head, _, rest = filled.partition(f"[channels.{name}]\n")
@@ -115,8 +121,9 @@ def _calibrations(manifest: str) -> dict[str, str]:
 )
 def test_channels_are_guessed_by_unit_first_then_by_name(name, unit, quantity, axis):
     guess = guess_channel(name, unit)
-    assert (guess.quantity, guess.axis) == (quantity, axis)
-    assert guess.why
+    assert (guess.quantity.value or "") == quantity
+    assert (f"{guess.hint:g} deg" if math.isfinite(guess.hint) else "") == axis
+    assert guess.axis.value is None  # a name is no measurement
 
 
 def test_units_are_spelt_as_a_manifest_spells_them():
@@ -156,8 +163,8 @@ def test_movement_beats_a_misleading_name():
     time = np.arange(4000) / RATE
     force = Series("F1", "N", np.floor(time) * 500.0, time)
     guess = guess_run(Export("dynamic-7.csv", (force,)), {"F1": guess_channel("F1", "N")})
-    assert guess.kind == "dry_pivot"
-    assert "its name says dynamic" in guess.why
+    assert guess.kind.value == "dry_pivot"
+    assert "its name says dynamic" in guess.kind.reason
 
 
 def test_a_look_finds_lines_and_dead_channels():
@@ -188,15 +195,15 @@ def test_directions_a_degree_apart_are_one():
     made = [export_of(f"l-{i}.csv", 1000.0 * np.array([math.cos(math.radians(a)), math.sin(math.radians(a))]))
             for i, a in enumerate(angles)]  # fmt: skip
     found = survey(made)
-    assert [run.direction for run in found.runs] == [-90.0, -90.0, -90.0, -18.0, 54.0]
+    assert [run.direction.value for run in found.runs] == [-90.0, -90.0, -90.0, -18.0, 54.0]
 
 
 def test_speed_comes_from_the_tachometer_before_the_name_before_the_lines():
     forces = np.array([0.0, -1000.0])
     first, second = survey([export_of("run-900rpm.csv", forces, 1320.0), export_of("run-900rpm.csv", forces)]).runs
-    assert first.speed == pytest.approx(22.0)
-    assert "tachometer tach" in first.why_speed
-    assert second.speed == pytest.approx(15.0)
+    assert first.speed.value == pytest.approx(22.0)
+    assert "by tach" in first.speed.reason
+    assert second.speed.value == pytest.approx(15.0)
 
 
 def test_units_in_names_are_understood():
@@ -204,14 +211,14 @@ def test_units_in_names_are_understood():
     swing = 500.0 * np.sin(2 * np.pi * 25.0 * time)
     one = Export("dyn_5kN_-90deg_1320rpm_25Hz.csv", (Series("Force", "N", swing, time),))
     run = survey([one]).runs[0]
-    assert (run.load, run.direction, run.excitation) == (5000.0, -90.0, 25.0)
-    assert run.speed == pytest.approx(22.0)
+    assert (run.load.value, run.direction.value, run.excitation.value) == (5000.0, -90.0, 25.0)
+    assert run.speed.value == pytest.approx(22.0)
 
 
 def test_the_pad_of_a_thermometer_is_read_from_its_name():
     time = np.arange(100) / 10.0
     text = draft_manifest(survey([Export("a.csv", (Series("T3", "degC", 40.0 + 0 * time, time),))]), "x", None)
-    assert "pad = 3   # (guess) by its name" in text
+    assert "pad = 3   # (guess) its name" in text
 
 
 def test_a_link_that_leads_out_of_the_folder_is_named_and_not_read(tmp_path):
