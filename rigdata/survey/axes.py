@@ -20,7 +20,7 @@ from rigdata.survey.channels import ChannelGuess, Entry
 _MOST_OFF = 12.0
 #: By so much worse the mirror image must be.
 _MIRROR = 3.0
-#: People mount sensors at multiples of this [deg]; a figure so near, or within its residual, was meant to be one.
+#: People mount sensors at multiples of this [deg]; a figure so near, or within its interval, was meant to be one.
 _MOUNTED, _NEAR = 15.0, 2.0
 
 
@@ -33,6 +33,7 @@ class Frame:
     sense: int
     source: str
     reason: str
+    error: float = 0.0  #: standard error of the angle [deg]
 
     def direction(self, readings: FloatArray) -> FloatArray:
         """Directions (n,) [rad] of readings (n, 2)."""
@@ -78,7 +79,8 @@ def fitted_frame(
     (residual, sense, angle), (mirrored, _, _) = sorted(fits)
     if residual > most or mirrored < _MIRROR * max(residual, 1.0):
         return None
-    return Frame(pair, angle, sense, "records", f"{reason}, residual {residual:.1f} deg")
+    text = f"{reason}, residual {residual:.1f} deg"
+    return Frame(pair, angle, sense, "records", text, residual / math.sqrt(len(readings)))
 
 
 def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
@@ -91,7 +93,7 @@ def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
         reason = frame.reason
         if frame.source == "records":
             reason = f"{folded(angle):g} deg by {reason}"
-        if abs(round_angle - angle) <= _NEAR:
+        if abs(round_angle - angle) <= max(_NEAR, 2.0 * frame.error):
             angle = round_angle
         turned = angle % 360.0
         polarity = channels[name].sign or (-1 if turned >= 180.0 else 1)
@@ -103,6 +105,11 @@ def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
 def folded(angle: float) -> float:
     """An angle [deg] from above -180 to 180, to a tenth."""
     return round(180.0 - (180.0 - angle) % 360.0, 1) + 0.0  # no minus before zero
+
+
+def ends(series: Sequence[Series]) -> FloatArray:
+    """Means of two channels (2,) over the last tenth of a record."""
+    return np.array([float(np.nanmean(s.values[-max(1, len(s) // 10) :])) for s in series])
 
 
 def changes(series: Sequence[Series]) -> FloatArray:

@@ -79,7 +79,8 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     head, quantity = f"[channels.{_key(name)}]", guess.quantity.value
     if not quantity or quantity == "ignore":
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
-    lines = [head, _line("quantity", f'"{quantity}"', guess.quantity)]
+    source = Entry() if like else guess.quantity  # what it is like bears the mark for both
+    lines = [head, _line("quantity", f'"{quantity}"', source)]
     if quantity in _DIRECTED:
         lines.append(_axis_line(guess))
     if like:

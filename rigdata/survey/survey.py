@@ -16,6 +16,7 @@ from rigdata.survey.axes import (
     Frame,
     along,
     changes,
+    ends,
     fitted_frame,
     folded,
     line_phasors,
@@ -193,14 +194,26 @@ def _other_axes(
         toward = [runs[i].pad.value for i in used]
         if all(0 < (pad or 0) <= len(pivots) for pad in toward):
             directions = np.array([pivots[pad - 1] for pad in toward])
-        frame = fitted_frame(pair, np.array([steps[i] for i in used]), directions, f"{len(used)} dry steps")
-        frame = frame or _frame_by_sweep(exports, runs, pair, cells)
-        if frame is not None:
-            with_axes(channels, frame)
+        frames = [
+            fitted_frame(pair, np.array([steps[i] for i in used]), directions, f"{len(used)} dry steps"),
+            _frame_by_contacts(pair, np.array([ends(_pair(exports[i], pair)) for i in used]), directions),
+            _frame_by_sweep(exports, runs, pair, cells),
+        ]
+        if proposals := [frame for frame in frames if frame is not None]:
+            with_axes(channels, min(proposals, key=lambda frame: frame.error))
     for pair in pairs(channels, "acceleration"):
         frame = _frame_by_excitation(exports, runs, pair, cells) or stated_frame(pair, channels)
         if frame is not None:
             with_axes(channels, frame)
+
+
+def _frame_by_contacts(pair: tuple[str, str], places: FloatArray, directions: FloatArray) -> Frame | None:
+    """Frame of two probes by where the shaft lies on the pads (n, 2), pulled in n directions [rad]."""
+    if len(places) < 3:
+        return None
+    apart = np.exp(1j * directions) - np.exp(1j * directions).mean()
+    reason = f"where {len(places)} dry steps end"
+    return fitted_frame(pair, places - places.mean(axis=0), np.angle(apart), reason)
 
 
 def _frame_by_sweep(

@@ -44,7 +44,7 @@ def deflection(load: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Test:
+class Planned:
     """One run: what was done, its load [N], frequency [Hz], direction [deg] or pad, and its number."""
 
     kind: str
@@ -72,30 +72,30 @@ class Laboratory:
 
     name: str
     sensors: tuple[Sensor, ...]
-    title: Callable[[Test], str]
+    title: Callable[[Planned], str]
     write: Callable[[Path, np.ndarray, Table, Table], None]
     loads: tuple[float, float] = (3000.0, 6000.0)
     edits: dict[tuple[str, str], str] = field(default_factory=dict)
 
 
-def tests_of(laboratory: Laboratory) -> Iterator[Test]:
+def planned_runs(laboratory: Laboratory) -> Iterator[Planned]:
     """Every run of a campaign."""
-    yield Test("clearance")
+    yield Planned("clearance")
     for pad in range(1, 6):
-        yield Test("dry", pad=pad)
+        yield Planned("dry", pad=pad)
     number = 0
     for load in laboratory.loads:
         for frequency in FREQUENCIES:
             for direction in DIRECTIONS:
                 number += 1
-                yield Test("dynamic", load, frequency, direction, number=number)
+                yield Planned("dynamic", load, frequency, direction, number=number)
 
 
 def write_exports(folder: Path, laboratory: Laboratory, seed: int = 1) -> None:
     """Write all records of a laboratory, and nothing else."""
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
-    for test in tests_of(laboratory):
+    for test in planned_runs(laboratory):
         time, motion = _motion(test, rng)
         readings = {s.name: _reading(s, motion, rng) for s in laboratory.sensors}
         fast = {s.name: readings[s.name] for s in laboratory.sensors if s.quantity == "displacement"}
@@ -115,7 +115,7 @@ def _reading(sensor: Sensor, motion: Table, rng: np.random.Generator) -> np.ndar
     return sensor.gain * values + sensor.zero
 
 
-def _motion(test: Test, rng: np.random.Generator) -> tuple[np.ndarray, Table]:
+def _motion(test: Planned, rng: np.random.Generator) -> tuple[np.ndarray, Table]:
     """Times, and every quantity in SI (degC, Hz)."""
     if test.kind == "dynamic":
         return _dynamic(test, rng)
@@ -125,7 +125,7 @@ def _motion(test: Test, rng: np.random.Generator) -> tuple[np.ndarray, Table]:
                   "temperature": 21.0 + still, "speed": still}  # fmt: skip
 
 
-def _dry(test: Test) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _dry(test: Planned) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Load steps toward a pad: 0.2 s up, 0.8 s held."""
     time = np.arange(0.0, len(STEPS) + 1.0, 1.0 / SLOW_RATE)
     step, within = np.divmod(time, 1.0)
@@ -157,7 +157,7 @@ def _sweep() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time, push, position
 
 
-def _dynamic(test: Test, rng: np.random.Generator) -> tuple[np.ndarray, Table]:
+def _dynamic(test: Planned, rng: np.random.Generator) -> tuple[np.ndarray, Table]:
     """The film between shaft and housing, the housing on its cells, unbalance stronger than the light load's drive."""
     time = np.arange(0.0, 3.0, 1.0 / RATE)
     omega = 2 * np.pi * test.frequency
@@ -232,8 +232,8 @@ def _parquet(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     pd.DataFrame({"time (s)": time, **fast, **other}).to_parquet(path.with_suffix(".parquet"), index=False)
 
 
-def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Test], str]:
-    def title(test: Test) -> str:
+def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Planned], str]:
+    def title(test: Planned) -> str:
         form = {"dynamic": dynamic, "dry": dry, "clearance": sweep}[test.kind]
         kn, lbf = f"{test.load / 1e3:g}", f"{test.load / LBF:.0f}"
         return form.format(kn=kn, lbf=lbf, n=f"{test.load:.0f}", f=f"{test.frequency:g}", pad=test.pad, i=test.number)
@@ -241,7 +241,7 @@ def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Test], str]:
     return title
 
 
-def _numbered(test: Test) -> str:
+def _numbered(test: Planned) -> str:
     """A counter alone, as a logger names its files."""
     place = {"clearance": 1, "dry": 1 + test.pad, "dynamic": 6 + test.number}[test.kind]
     return f"Test_{place:03d}"
