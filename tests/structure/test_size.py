@@ -20,9 +20,9 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (137.8, 16_590),
     "model": (92.4, 12_175),
-    "rigdata": (70.5, 9_600),
+    "rigdata": (75.3, 10_130),
     "diagnosis": (42.6, 5_220),
-    "cli": (28.0, 3_910),
+    "cli": (28.3, 3_950),
     "report": (26.2, 3_440),
     "pivot": (19.1, 2_620),
     "clearance": (8.8, 1_160),
