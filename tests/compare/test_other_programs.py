@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from model.bearing_file import parse_bearing
+from rigdata import load_campaign
 from tests.command_line import tpjb
 from tpjb_ident.cli.commands.compare import refuse_comparison
-from tpjb_ident.compare.comparison import comparison_frame
+from tpjb_ident.compare.comparison import (
+    CompareSettings,
+    compare_campaign,
+    comparison_frame,
+    locus_distance,
+    locus_frame,
+)
 from tpjb_ident.compare.from_table import compare_table
 from tpjb_ident.compare.other_programs import read_predictions, with_predictions
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -19,6 +28,7 @@ from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 from tpjb_ident.us_table import us_table
 
+DEMO = Path(__file__).parents[2] / "rigdata" / "samples" / "demo.h5"
 MEASURED = """static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m
 2500,-90,22,10,7e7,1.1e8,6e5
 2500,-90,22,25,6e7,1.0e8,7e5
@@ -171,3 +181,18 @@ def test_a_prediction_that_did_not_converge_ends_with_three(tmp_path, measured):
     result = compared(measured, written(tmp_path, head.replace("e5\n", "e5,False\n")))
     with pytest.raises(NotTrustedError, match="did not converge at 3 points"):
         refuse_comparison(result)
+
+
+@pytest.mark.slow
+def test_a_table_stands_beside_a_campaign_with_a_locus(tmp_path):
+    demo = load_campaign(DEMO)
+    bearing = parse_bearing(demo.bearing_text, demo.bearing_name)
+    points = "".join(f"{load},22,25,1e8\n" for load in (2500, 3750, 5000))
+    theirs = written(tmp_path, f"static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m\n{points}")
+    ours = compare_campaign(demo, bearing, CompareSettings(("kirk",), "isothermal"))
+    result = with_predictions(ours, read_predictions([theirs]))
+    assert set(locus_frame(result)["pivots"]) == {"kirk"}
+    table = result.variant("theirs")
+    assert math.isnan(locus_distance(result, table))
+    assert "theirs.csv predicts 3 of 7 points" in result.summary()
+    assert comparison_frame(result)["kyy_N_per_m_predicted"].notna().sum() == 7 + 3

@@ -330,8 +330,10 @@ def predicted_locus(comparison: Comparison, variant: Variant) -> FloatArray:
     """Predicted positions (n, 2) [m] in the order and about the origin of the measured ones.
 
     Without a clearance run the probes' zero stands anywhere: then the prediction is shifted by the mean difference,
-    and only the shape of the two can be compared.
+    and only the shape of the two can be compared. NaN for a table of another program: it has no locus.
     """
+    if not variant.locus:
+        return np.full_like(measured_locus(comparison), np.nan)
     places = np.array([p.prediction.position for p in variant.locus]).reshape(-1, 2)
     if comparison.clearance is None and len(places):
         places = places + np.nanmean(measured_locus(comparison) - places, axis=0)
@@ -354,6 +356,8 @@ def locus_frame(comparison: Comparison) -> pd.DataFrame:
         return pd.DataFrame(columns=["pivots", "static_load_direction_deg", "x_m", "y_m"])
     frames = []
     for variant in comparison.variants:
+        if not variant.locus:
+            continue
         frame = comparison.locus.to_frame()
         places = predicted_locus(comparison, variant)
         frame.insert(0, "pivots", variant.name)
