@@ -17,6 +17,7 @@ from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.redundant_channels import report_inconsistent_channels
 from tpjb_ident.check.response import check_accelerometers, check_responses
+from tpjb_ident.check.rotation import check_rotation
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_follows, check_sweeps
 
@@ -79,6 +80,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> list[Obse
     _spread_doubts(observations)
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
     check_accelerometers(dynamic)
+    check_rotation(of_kind["dynamic"])
     check_housing(of_kind["dynamic"])
     report_inconsistent_channels(dynamic)
     check_shaft_follows(of_kind["dry_pivot"])

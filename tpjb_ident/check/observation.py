@@ -17,6 +17,7 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, steady_level, strongest_line
+from tpjb_ident.check.rotation import shaft_force
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
@@ -49,6 +50,7 @@ class Observation:
     digest: str
     report: Reporter = field(repr=False)
     band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)  #: (k, m) complex
+    shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
 
     @property
     def phasors(self) -> ComplexArray:
@@ -105,6 +107,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         digest=digest,
         report=report,
         band=band,
+        shaft_force=shaft_force(phasors),
     )
 
 
