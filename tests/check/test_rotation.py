@@ -1,4 +1,4 @@
-"""Which way the shaft turns, by the force at running speed: told where it is described wrongly, silent where rightly."""
+"""Which way the shaft turns, by the force at running speed: told where it is described wrongly, else silent."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (137.8, 16_590),
+    "measurement": (138.1, 16_640),
     "model": (92.4, 12_175),
     "rigdata": (75.3, 10_130),
     "diagnosis": (42.6, 5_220),

@@ -58,8 +58,8 @@ def check_rotation(runs: Sequence[Observation]) -> None:
         other = ROTATIONS[rotation == ROTATIONS[0]]
         text = f"shows a force at running speed that goes round {other}, but the shaft is said to turn {rotation}"
         cure = (
-            "Check rotation in [shaft] or the runs; if it is right, left and right are exchanged: the sign of a cell or "
-            "probe along X, or two exchanged cells or probes"
+            "Check rotation in [shaft] or the runs; if it is right, left and right are exchanged: the sign of a cell "
+            "or probe along X, or two exchanged cells or probes"
         )
         for observation in against:
             observation.report.say("rotation", "warning", "force at running speed", text, cure)
