@@ -55,6 +55,8 @@ class Campaign:
         ``"counter-clockwise"`` or ``"clockwise"``.
     mount : str or None
         ``"floating"``: the stator hangs on its stingers; ``"cells"``: it stands on the load cells; None: not stated.
+    date, by : str
+        When and by whom it was measured, as the manifest says.
 
     Examples
     --------
@@ -77,6 +79,8 @@ class Campaign:
     mains: float | None = None
     rotation: str = "counter-clockwise"
     mount: str | None = None
+    date: str = ""
+    by: str = ""
 
     def __str__(self) -> str:
         counts = Counter(run.kind for run in self.runs)
@@ -345,6 +349,8 @@ def _assembled(
         mains=manifest.mains,
         rotation=manifest.rotation,
         mount=manifest.mount,
+        date=manifest.date,
+        by=manifest.by,
         **source,
     )
 

@@ -73,6 +73,8 @@ TOP = (
     Field("id", "text", "name of the campaign", '"rocker-A"', required=True),
     Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', required=True),
     Field("description", "text", "free text", '"after overhaul"', default=""),
+    Field("date", "text", "when it was measured", '"2026-03-12"', default=""),
+    Field("by", "text", "laboratory and person", '"TU Chemnitz, K. Sato"', default=""),
     Field("shaft", "table", "", ""),
     Field("housing", "table", "", ""),
     Field("acquisition", "table", "", ""),

@@ -63,6 +63,8 @@ class Manifest:
     mains: float | None = None
     rotation: str = "counter-clockwise"
     mount: str | None = None
+    date: str = ""
+    by: str = ""
     described: Mapping[str, Mapping[str, Channel]] = field(default_factory=dict, repr=False)  #: by run, if other
 
 
@@ -100,6 +102,8 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         mains=mains,
         rotation=top.subtable("shaft").read(SHAFT, "[shaft]")["rotation"],
         mount=housing["mount"],
+        date=header["date"],
+        by=header["by"],
         described=described,
     )
     if findings.errors:

@@ -105,9 +105,9 @@ class Tab:
         path.write_bytes(data)
         return data
 
-    def pdf(self, path: Path) -> None:
-        """Print to PDF."""
-        path.write_bytes(base64.b64decode(self.call("Page.printToPDF", preferCSSPageSize=True)["data"]))
+    def pdf(self, path: Path, width: float = 8.27, height: float = 11.69) -> None:
+        """Print to PDF on paper of so many inches."""
+        path.write_bytes(base64.b64decode(self.call("Page.printToPDF", paperWidth=width, paperHeight=height)["data"]))
 
     def accessible(self) -> list[dict[str, Any]]:
         """Nodes of the accessibility tree that are not ignored."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -156,6 +157,62 @@ def test_it_prints_on_a_few_pages(chromium, report, tmp_path):
         tab.pdf(tmp_path / "report.pdf")
     pages = len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "report.pdf").read_bytes()))
     assert 3 <= pages <= 10
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_the_first_screen_says_what_how_good_and_how_sure(chromium, report, width, height):
+    """What was tested, the verdict with its largest deviation, and K and C with intervals: without a scroll."""
+    with chromium() as tab:
+        tab.size(width, height)
+        tab.open(report.as_uri())
+        shown = tab.js(
+            "[...document.querySelectorAll('h1, .tested div, .first, .next, .answer td, .answer figure svg')]"
+            f".filter((e) => e.getBoundingClientRect().bottom <= {height}).map((e) => e.textContent.trim()).join('|')"
+        )
+    for words in ("22 Hz (1320 rpm)", "2.5 to 7.5 kN", "58 (42 dynamic", "0-peak", "The records are computed",
+                  "largest single deviation", "inside their interval", "tpjb init", "66.00 ±", "26 of 28"):  # fmt: skip
+        assert words in shown, words
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_column_of_the_first_screen_is_cut(chromium, report, width):
+    with chromium() as tab:
+        tab.size(width, 844)
+        tab.open(report.as_uri())
+        wide = (
+            "[...document.querySelectorAll('.answer .scroll')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+        )
+        assert tab.js(wide) == 0
+
+
+def test_one_legend_names_the_curves_of_the_page(chromium, report):
+    with chromium() as tab:
+        tab.open(report.as_uri())
+        labels = tab.js("[...document.querySelectorAll('figure svg text')].map((t) => t.textContent)")
+    assert labels.count("Kirk pivots") <= 2  # coefficients, and the locus with other curves
+    assert labels.count("off measured, %") >= 4
+
+
+def test_a_printed_page_is_signed_numbered_and_legible(chromium, report, tmp_path):
+    pdf = shutil.which("pdftotext")
+    with chromium() as tab:
+        tab.open(report.as_uri())
+        for name, size in (("a4", (8.27, 11.69)), ("letter", (8.5, 11.0))):
+            tab.pdf(tmp_path / f"{name}.pdf", *size)
+    if pdf is None:
+        pytest.skip("no pdftotext")
+    for name in ("a4", "letter"):
+        text = subprocess.run([pdf, "-layout", tmp_path / f"{name}.pdf", "-"], capture_output=True, text=True).stdout
+        pages = text.split("\f")[:-1]
+        assert len(pages) <= 11
+        for number, page in enumerate(pages, start=1):
+            assert f"Page {number} of {len(pages)}" in page
+            assert "Rocker-backed" in page
+            assert "0-peak" in page
+        assert "Checked by" in pages[-1]
+        boxes = subprocess.run([pdf, "-bbox", tmp_path / f"{name}.pdf", "-"], capture_output=True, text=True).stdout
+        heights = [float(b) - float(a) for a, b in re.findall(r'yMin="([\d.]+)" xMax="[\d.]+" yMax="([\d.]+)"', boxes)]
+        assert min(h for h in heights if h > 0) >= 6.0
 
 
 def test_a_hostile_campaign_stays_text(chromium, tmp_path):

@@ -127,3 +127,34 @@ def test_markers_carry_their_values(page_and_svg):
     assert texts["one"].count("<title>kxx ") == 3
     assert "<title>kxx 2 MN/m at static load 2 kN</title>" in texts["one"]
     assert texts["two"].count("<title>") == 2
+
+
+def test_a_title_in_the_running_head_cannot_leave_its_string():
+    page = report_page.Page(title='x"; } body { display: none } </style><script>', subtitle="", answer="")
+    style = render_page(page, {}).split("<style>")[1].split("</style>")[0]
+    (head,) = re.findall(r'@top-left \{ content: "([^"]*)"', style)
+    assert re.fullmatch(r"(?:[A-Za-z0-9]|\\[0-9a-f]{6})+", head)
+    assert "display: none }" not in style
+
+
+def test_the_second_legend_of_a_page_is_cut_off():
+    texts, panels = {}, []
+    for name in ("one", "two"):
+        figure, axes = new_picture("x", "y")
+        axes.plot([0, 1], [1, 0], label="model")
+        add_legend(axes)
+        panels.append(panel(name, name, figure, ""))
+        texts[name] = svg_text(figure, name)
+    html = render_page(
+        report_page.Page("t", "", "", picture=panels[0], sections=[Section("s", panels=panels[1:])]), texts
+    )
+    assert html.count(">model</text>") == 1
+    heights = [float(h) for h in re.findall(r'viewBox="0 [\d.]+ [\d.]+ ([\d.]+)"', html)]
+    assert heights[0] - heights[1] > 10.0
+
+
+def test_what_was_tested_stands_before_the_verdict():
+    html = render_page(
+        report_page.Page("t", "", "The verdict.", facts={"Shaft": "22 Hz (1320 rpm)"}, flags="No flags."), {}
+    )
+    assert html.index("22 Hz (1320 rpm)") < html.index("The verdict.") < html.index("No flags.")

@@ -95,8 +95,14 @@ def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, .
     if worth_a_diagnosis(all_deviations):
         who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
         return f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with {_in_words(best)}."
+    largest = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
     agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
-    return f"{name}: prediction and measurement {agrees} with {_in_words(best)}."
+    inside = f"{sum(d.inside for d in best_deviations)} of {sum(d.n for d in best_deviations)}"
+    return (
+        f"{name}: prediction and measurement {agrees} with {_in_words(best)}; the largest single deviation is "
+        f"{percent(largest.worst)} in {largest.coefficient}, and {inside} direct coefficients are "
+        "inside their interval."
+    )
 
 
 def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
@@ -124,11 +130,9 @@ def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None)
         sentences.append("No coefficient could be compared: see the quality flags.")
     else:
         best_deviations = [d for d in all_deviations if d.pivots == best]
-        worst = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
         sentences.append(
             f"The prediction comes closest with {_in_words(best)}: {_medians(best_deviations)} (median over "
-            f"{max(d.n for d in best_deviations)} points); the largest single deviation is {percent(worst.worst)} in "
-            f"{worst.coefficient}."
+            f"{max(d.n for d in best_deviations)} points)."
         )
     sentences += [
         f"With {_in_words(v.name)}: {_medians([d for d in all_deviations if d.pivots == v.name])}."

@@ -17,7 +17,15 @@ from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import point_label
-from tpjb_ident.report.laboratory_sections import budget_table, evidence_section, set_up_section
+from tpjb_ident.report.figure import Panel
+from tpjb_ident.report.laboratory_sections import (
+    budget_table,
+    evidence_section,
+    flags_line,
+    set_up_section,
+    tested_facts,
+    values_table,
+)
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
 from tpjb_ident.rounding import fixed, percent, signed, with_interval
@@ -38,6 +46,7 @@ def write_report(
     settings: Mapping[str, Any] | None = None,
     inputs: Mapping[str, str] | None = None,
     then: str = "",
+    note: str = "",
 ) -> Path:
     """Write report.html and its figures.
 
@@ -52,6 +61,8 @@ def write_report(
         SHA-256 of the inputs; default: of the campaign's files.
     then : str
         The command that comes next.
+    note : str
+        What a reader has to know before all else, such as that the records are computed.
 
     Returns
     -------
@@ -68,17 +79,23 @@ def write_report(
     """
     frame = comparison_frame(comparison)
     answer, *more = summary_sentences(comparison, frame)
+    points = comparison.identification.points
+    coefficients = coefficient_panels(frame)
+    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), coefficients[0] if coefficients else None)
     campaign, bearing = comparison.campaign, comparison.bearing
     hashes = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
-    described = f": {campaign.description}" if campaign.description else ""
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
-        subtitle=f"{campaign.id if bearing is None else bearing.name}{described}",
+        subtitle=campaign.description,
         answer=answer,
         more=more,
-        then=then,
+        facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
         key_table=_key_table(deviations(comparison, frame)),
-        sections=_sections(comparison, frame),
+        values=values_table(points),
+        flags=flags_line(_flagged(comparison), len(points)),
+        picture=lead,
+        then=then,
+        sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
         settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
         inputs=dict(hashes if inputs is None else inputs),
     )
@@ -112,14 +129,14 @@ def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
         inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
         rows.append([VARIANT_LABEL.get(variant, variant), *cells, f"{inside} of {n}"])
     return Table(
-        "Predicted against measured: median deviation (largest single one)",
-        ["", *names, "inside the 95 % interval"],
+        "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
+        ["", *names, "inside"],
         rows,
     )
 
 
-def _sections(comparison: Comparison, frame: pd.DataFrame) -> list[Section]:
-    sections = [*grouped(coefficient_panels(frame)), *_pivot_sections(comparison), *_position_sections(comparison)]
+def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequence[Panel]) -> list[Section]:
+    sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign = comparison.campaign
     table = isinstance(campaign, TableSource)
     evidence = None if isinstance(campaign, TableSource) else evidence_section(campaign, comparison.identification)
@@ -175,6 +192,8 @@ def _position_sections(comparison: Comparison) -> list[Section]:
     return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
 
 
+#: The picture of the first screen: the coefficient of the loaded direction.
+_LEAD = "kyy-over-"
 _DIRECT = ("kxx", "kyy", "cxx", "cyy")
 #: Loads at which pivot stiffness is tabled [N].
 _PIVOT_LOADS = (2000.0, 4000.0)
@@ -218,16 +237,18 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
 
 def _flag_table(comparison: Comparison) -> Table:
     """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
+    rows = [[place, str(c), c.detail, c.meaning] for place, status in _flagged(comparison) for c in status]
+    return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
+
+
+def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
+    """What can have flags, and its flags."""
     identified = comparison.identification
     parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
-    if comparison.clearance is not None:
-        parts.append(("clearance", comparison.clearance.status))
-    if comparison.locus is not None:
-        parts.append(("locus", comparison.locus.status))
-    rows = [[place, str(c), c.detail, c.meaning] for place, status in parts for c in status]
-    return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
+    tests = (("clearance", comparison.clearance), ("locus", comparison.locus))
+    return parts + [(name, test.status) for name, test in tests if test is not None]
 
 
 def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:

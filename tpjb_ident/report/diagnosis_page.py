@@ -12,6 +12,7 @@ from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels
 from tpjb_ident.report.plots.gap import gap
@@ -20,8 +21,6 @@ from tpjb_ident.report.plots.residual_series import residual_series
 from tpjb_ident.rounding import signed
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
@@ -56,14 +55,22 @@ def write_diagnosis_report(
     verdict = result.diagnosis.verdict
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
+    points = () if result.identification is None else result.identification.points
+    coefficients = coefficient_panels(table) if len(table) else []
+    worst = next((d.observable for d in verdict.disagreement if d.observable[0] in "kc"), "kyy")
+    lead = next((p for p in coefficients if p.name.startswith(worst)), None)
     page = Page(
         title=f"{campaign.id}: what the model lacks",
-        subtitle=f"{result.setup.bearing.name}{': ' + campaign.description if campaign.description else ''}",
+        subtitle=campaign.description,
         answer=answer,
         more=more,
+        facts=tested_facts(campaign, result.setup.bearing, points),
+        values=values_table(points),
+        flags=flags_line([("", p.quality) for p in points], len(points)),
+        picture=lead,
         then=then,
         key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
-        sections=_sections(result, table),
+        sections=_sections(result, [p for p in coefficients if p is not lead]),
         settings={k: "none" if v is None else str(v) for k, v in settings.items()},
         inputs=dict(inputs),
     )
@@ -96,11 +103,6 @@ def _effect_sections(verdict: Verdict) -> list[Section]:
     return sections
 
 
-def _coefficient_sections(table: pd.DataFrame) -> list[Section]:
-    """K and C over load and frequency: measured, before and after."""
-    return grouped(coefficient_panels(table)) if len(table) else []
-
-
 def _other_explanations(verdict: Verdict) -> list[Section]:
     """What else it could be, and the test that tells."""
     notes = []
@@ -114,7 +116,7 @@ def _other_explanations(verdict: Verdict) -> list[Section]:
     return [Section("What else could it be, and the test that tells", notes)] if notes else []
 
 
-def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
+def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
     verdict = result.diagnosis.verdict
     note = (
         "Sigma joins measurement noise and the stated model tolerance. Held-out points are whole operating points that "
@@ -126,7 +128,7 @@ def _sections(result: CampaignDiagnosis, table: pd.DataFrame) -> list[Section]:
         for d in verdict.disagreement
     ]
     tried = [[in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
-    sections = _effect_sections(verdict) + _coefficient_sections(table) + _other_explanations(verdict)
+    sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
     sections.append(
         Section(
             _GROUP,

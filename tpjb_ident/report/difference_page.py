@@ -19,6 +19,7 @@ from tpjb_ident.report.figure import panel
 from tpjb_ident.report.page import Page, Section, Table, write_page
 from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, TANGENT, Coefficient
 
+_TITLE = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
 _MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
 #: Height of the ticks' second line [inches].
 _SECOND_LINE = 0.16
@@ -29,10 +30,12 @@ def write_difference_report(
 ) -> Path:
     """Write report.html and its figure into an existing folder."""
     answer, *more = difference_sentences(difference)
-    a, b = difference.a, difference.b
+    a, b, points = difference.a, difference.b, difference.points
     page = Page(
         title=f"{a.name} and {b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
+        facts=_facts(difference),
+        picture=panel("difference", _TITLE, functools.partial(_drawn, points), "") if len(points) else None,
         answer=answer,
         more=more,
         then=then,
@@ -43,14 +46,25 @@ def write_difference_report(
     return write_page(folder, page)
 
 
+def _facts(difference: Difference) -> dict[str, str]:
+    """What each side is, and when and by whom it was measured."""
+    facts = {}
+    for name, side in (("First", difference.a), ("Second", difference.b)):
+        campaign = side.campaign
+        if campaign is None:
+            facts[name] = f"{side.name}, a folder of results"
+            continue
+        parts = (side.name, campaign.description, f"{len(campaign.runs)} runs", campaign.date, campaign.by)
+        facts[name] = ", ".join(part for part in parts if part)
+    return facts
+
+
 def _sections(difference: Difference) -> list[Section]:
     sections = []
     points = difference.points
     if len(points):
-        drawing = functools.partial(_drawn, points)
-        title = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
-        sections.append(Section("Coefficients", panels=[panel("difference", title, drawing, "")], tables=tables))
+        sections.append(Section("Coefficients", tables=tables))
     if not difference.pivots.empty:
         rows = [
             _row(row, TANGENT, "stiffness", f"{row['force_N'] * per('load'):.3g}")

@@ -30,9 +30,11 @@ from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
 _PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
-_SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
+_SIZE = re.compile(r'viewBox="0 [\d.]+ ([\d.]+) ([\d.]+)"')
 _USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
 _POINTS_PER_INCH = 72.0
+#: Between the last line of a legend and its panel [points].
+_BELOW_LEGEND = 2.0
 #: Markers are found again by their place in the drawing [points].
 _NEAR = 0.05
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
@@ -101,6 +103,20 @@ def inline_svg(text: str, name: str, title: str) -> str:
     head, content = body.split(">", 1)
     head = re.sub(r'\s(width|height)="[^"]*"', "", head)
     return f'{head} role="img" aria-label="{title}">{content}'
+
+
+def without_legend(svg: str) -> tuple[str, str]:
+    """A drawing without the legend above its panel, the legend's room cut off, and the legend's words; "" if none."""
+    start, size = svg.find('<g id="legend_1">'), _SIZE.search(svg)
+    if start < 0 or size is None or '<g id="legend_2">' in svg:
+        return svg, ""
+    end = _end_of_group(svg, start)
+    texts = re.findall(r'y="([\d.]+)"[^>]*>([^<]+)</text>', svg[start:end])
+    bottom = max(float(y) for y, _ in texts) + _BELOW_LEGEND
+    width, height = float(size[1]), float(size[2])
+    cut = svg[:start] + svg[end:]
+    cut = cut.replace(size[0], f'viewBox="0 {bottom:.2f} {width:g} {height - bottom:.2f}"', 1)
+    return cut, "|".join(words for _, words in texts)
 
 
 def prefixed_ids(svg: str, prefix: str) -> str:

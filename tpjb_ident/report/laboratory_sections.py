@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from rigdata.run import Run
     from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.conditions import Condition
     from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.dynamic.results.point_result import PointResult
 
 #: Calibrated quantities whose unit changes with the system, and those that people read in one unit everywhere.
 _SHOWN = {"displacement": "length", "force": "force", "pressure": "pressure"}
@@ -41,6 +44,68 @@ _SENSITIVITY = {
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip
 _EVIDENCE = "Raw evidence of one run"
+
+
+def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequence[PointResult]) -> dict[str, str]:
+    """What was tested, for the head of a page: bearing, loads, speeds, excitation, runs, when and by whom."""
+    facts = {}
+    if bearing is not None:
+        diameter, length = (amount(v, "size", ".4g") for v in (bearing.journal_diameter, bearing.length))
+        facts["Bearing"] = f"{bearing.name}, {len(bearing.pads)} pads, Ø {diameter} × {length}"
+    if points:
+        loads = _span({p.point.static_load * per("load") for p in points}, symbol("load"))
+        directions = ", ".join(f"{a:g}°" for a in sorted({p.point.static_load_direction_deg for p in points}))
+        facts["Static load"] = f"{loads} at {directions}"
+        facts["Shaft"] = ", ".join(spinning(f) for f in sorted({p.point.shaft_speed_hz for p in points}))
+        amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
+        moved = f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)" if amplitude else ""
+        facts["Excitation"] = _span({p.point.excitation_hz for p in points}, "Hz") + moved
+    if isinstance(campaign, TableSource):
+        return facts | {"Source": campaign.description}
+    counts = Counter(_KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
+    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    measured = ", ".join(text for text in (campaign.date, campaign.by) if text)
+    return facts | {
+        "Runs": f"{len(campaign.runs)} ({kinds})",
+        "Measured": measured or "date and by are not in campaign.toml",
+    }
+
+
+def _span(values: set[float], unit: str) -> str:
+    """The only value, or from which to which in how many steps."""
+    low, high = min(values), max(values)
+    return f"{low:.4g} {unit}" if len(values) == 1 else f"{low:.4g} to {high:.4g} {unit} ({len(values)} values)"
+
+
+def values_table(points: Sequence[PointResult]) -> Table | None:
+    """K and C of the point in the middle, with intervals."""
+    solved = [p for p in points if np.isfinite(p.stiffness.h).all()]
+    if not solved:
+        return None
+    p = solved[len(solved) // 2]
+    half, rows = p.stiffness.half_width(), []
+    for i, entry in enumerate(ENTRIES):
+        cells = []
+        for kind, j, omega in ((STIFFNESS, i, 1.0), (DAMPING, 4 + i, p.stiffness.omega)):
+            value = p.stiffness.vector[j]
+            cells.append(with_interval(value, value - half[j], value + half[j], kind.display_scale * omega))
+        rows.append([entry, *cells])
+    columns = ["", *(f"{kind.symbol.upper()}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING))]
+    caption = f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz)}; 95 % intervals"
+    return Table(caption, columns, rows)
+
+
+def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) -> str:
+    """The flags of a result with how often each is there, gravest first."""
+    counts = Counter((str(c), c.severity) for _, conditions in named for c in conditions)
+    order = ("error", "warning", "note")
+    texts = [
+        f"{name} ({n})" if n > 1 else name
+        for (name, _), n in sorted(counts.items(), key=lambda c: order.index(c[0][1]))
+    ]
+    bad = sum(n for (_, severity), n in counts.items() if severity == "error")
+    head = f"{bad} flags forbid trust" if bad else f"Flags on {points} points, none forbids trust"
+    return f"{head}: {', '.join(texts)}." if texts else "No flags: nothing about the records calls for caution."
 
 
 def set_up_section(comparison: Comparison) -> Section:

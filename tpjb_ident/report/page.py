@@ -12,7 +12,7 @@ from pathlib import Path
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text
+from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text, without_legend
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.tables import printable, readable, write_text
 
@@ -39,13 +39,17 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report."""
+    """A report; what stands before its sections is its first screen."""
 
     title: str
     subtitle: str
     answer: str
     more: Sequence[str] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)  #: what was tested
     key_table: Table | None = None
+    values: Table | None = None  #: K and C at one point
+    flags: str = ""
+    picture: Panel | None = None
     then: str = ""
     sections: Sequence[Section] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
@@ -69,17 +73,36 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     environment = _templates()
     script = environment.get_template("sort.js").render()
-    panels = [panel for section in page.sections for panel in section.panels]
+    shown: set[str] = set()
+    drawings = {}
+    for panel in panels_of(page):
+        drawing, legend = without_legend(svg[panel.name])
+        drawings[panel.name] = drawing if legend in shown else svg[panel.name]
+        shown |= {legend} - {""}
+    running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
     return environment.get_template("report.html").render(
         page=page,
-        drawn={panel.name: _element(svg[panel.name], panel) for panel in panels},
-        style=markupsafe.Markup(environment.get_template("style.css").render()),  # our own text, no data in it
+        drawn={panel.name: _element(drawings[panel.name], panel) for panel in panels_of(page)},
+        # our own text; the one text from outside is escaped, character by character
+        style=markupsafe.Markup(environment.get_template("style.css").render(running=_css_text(running))),
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        shapes={panel.name: shape(svg[panel.name]) for panel in panels},
+        shapes={name: shape(drawing) for name, drawing in drawings.items()},
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
+
+
+def panels_of(page: Page) -> list[Panel]:
+    """All panels of a page, that of its first screen first."""
+    first = [] if page.picture is None else [page.picture]
+    return [*first, *(panel for section in page.sections for panel in section.panels)]
+
+
+def _css_text(text: str) -> markupsafe.Markup:
+    """A text within a style sheet: letters and digits as they are, everything else by its number."""
+    letters = (c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in printable(text))
+    return markupsafe.Markup("".join(letters))  # no sign is left that could end a string or an element
 
 
 def render_section(section: Section) -> str:
@@ -88,14 +111,14 @@ def render_section(section: Section) -> str:
     svg = {panel.name: svg_text(panel.figure, panel.name) for panel in section.panels}
     drawn = {panel.name: _element(svg[panel.name], panel) for panel in section.panels}
     shapes = {name: shape(text) for name, text in svg.items()}
-    style = environment.get_template("style.css").render().replace(":root", ":host")
+    style = environment.get_template("style.css").render(running="").replace(":root", ":host")
     html = environment.get_template("section.html").module.section(section, drawn, shapes, "")  # type: ignore[attr-defined]
     return f"<style>{style} :host {{ background: var(--paper); color: var(--ink); }}</style>{html}"
 
 
 def write_page(folder: Path, page: Page) -> Path:
     """Write ``report.html`` and its figures, as SVG and PNG in ``figures``."""
-    texts = save_panels([panel for section in page.sections for panel in section.panels], folder / "figures")
+    texts = save_panels(panels_of(page), folder / "figures")
     path = folder / "report.html"
     write_text(path, render_page(page, texts))
     return path

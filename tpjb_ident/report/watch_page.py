@@ -12,7 +12,7 @@ from tpjb_ident.columns import amount, per, size, spinning, symbol
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
-from tpjb_ident.report.page import Page, Section, Table, render_page
+from tpjb_ident.report.page import Page, Section, Table, panels_of, render_page
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
 from tpjb_ident.rounding import with_interval
 from tpjb_ident.runtime.tables import write_text
@@ -47,9 +47,8 @@ def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: M
         refresh=refresh,
         beside="coefficients.csv and watch.json are beside this file.",
     )
-    panels = [p for section in page.sections for p in section.panels]
     path = folder / "watch.html"
-    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels}))
+    write_text(path, render_page(page, {p.name: svg_text(p.figure, p.name) for p in panels_of(page)}))
     return path
 
 

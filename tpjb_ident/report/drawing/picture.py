@@ -18,7 +18,7 @@ from matplotlib.legend import Legend
 
 from tpjb_ident.report.drawing.colours import GREY, INK, RULE
 
-_WIDTH, _HEIGHT = 5.2, 3.4  # inches: legible in one column of a phone
+_WIDTH, _HEIGHT = 4.6, 3.1  # inches: legible in one column of a phone, and of a printed page
 FONT_SIZE = 9.0
 LEFT, _RIGHT, _BOTTOM, _TOP = 0.8, 0.15, 0.55, 0.15  # margins [inches]
 _LINE = 0.172  # height of one line of text with its leading [inches]
@@ -45,17 +45,23 @@ def new_picture(
 
 
 def new_pictures(
-    rows: int, columns: int, *, title: str | None = None, width: float = _WIDTH, height: float = _HEIGHT
+    rows: int,
+    columns: int,
+    *,
+    title: str | None = None,
+    width: float = _WIDTH,
+    height: float | Sequence[float] = _HEIGHT,
 ) -> tuple[Picture, list[list[Axes]]]:
-    """Make a picture with rows times columns of empty panels, each with its own margins."""
+    """Make a picture with rows times columns of empty panels, each with its own margins; a height for all or each."""
     head = 1.6 * _LINE if title else 0.0
-    size = (columns * width, rows * height + head)
+    heights = list(height) if isinstance(height, Sequence) else [height] * rows
+    size = (columns * width, sum(heights) + head)
     figure = Picture(figsize=size, facecolor="white")
     FigureCanvasAgg(figure)
     grid = [
         [
-            _panel(figure, (j * width + LEFT, (rows - 1 - i) * height + _BOTTOM, width - LEFT - _RIGHT,
-                            height - _BOTTOM - _TOP))
+            _panel(figure, (j * width + LEFT, sum(heights[i + 1 :]) + _BOTTOM, width - LEFT - _RIGHT,
+                            heights[i] - _BOTTOM - _TOP))
             for j in range(columns)
         ]
         for i in range(rows)
@@ -164,7 +170,7 @@ def mark_extrapolated(axes: Axes, start: float) -> None:
     if end > start:
         axes.axvspan(start, end, color=RULE, alpha=0.35, linewidth=0, zorder=0)
         axes.text(
-            start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1.5,
+            start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1,
             color=GREY, va="bottom", ha="left",
         )  # fmt: skip
         axes.set_xlim(right=end)

@@ -45,7 +45,9 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
     from tpjb_ident.diagnosis.observations.gap import residuals
 
     rows = []
-    for model, prediction in (("before", diagnosis.problem.base), ("after", diagnosis.after)):
+    models = [("before", diagnosis.problem.base)]
+    models += [("after", diagnosis.after)] if diagnosis.verdict.effects else []
+    for model, prediction in models:
         z = residuals(diagnosis.observations, prediction)
         for element, value in zip(diagnosis.observations.elements, z, strict=True):
             if element.family == "h":

@@ -21,6 +21,8 @@ _AXES = {
     "load": ("static_load_N", "load", "static load"),
     "frequency": ("excitation_Hz", "frequency", "excitation frequency"),
 }
+#: Points from which on a line joins them; between fewer nobody knows what it would do.
+CURVE = 5
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
 

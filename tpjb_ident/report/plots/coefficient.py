@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
-from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.drawing.series import DIRECT, axis_of, longest_series, with_errors
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.series import CURVE, DIRECT, axis_of, longest_series, with_errors
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
+
+#: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
+_SMALL = 5.0
+_BARS: dict[str, Any] = {"fmt": "o", "color": INK, "markersize": 5, "capsize": 3, "linewidth": 1.2, "zorder": 5}
 
 
 def coefficient(
@@ -31,7 +37,8 @@ def coefficient(
     ----------
     comparison : Comparison or DataFrame
         What `compare_campaign` gives, or its table (``comparison.csv``). A prediction that needed a pivot beyond its
-        measured loads stands in a frame.
+        measured loads stands in a frame. Where intervals are smaller than their marks, a second panel shows the
+        deviations, as far as the closest prediction reaches.
     name : str
         ``"kxx"``, ``"kxy"``, .. ``"cyy"``.
     over : {"load", "frequency"}
@@ -52,21 +59,37 @@ def coefficient(
     kind = KINDS[name[0]]
     scale, key = kind.display_scale, coefficient_column(name)
     column, axis_scale, axis_label = axis_of(over)
-    figure, axes = new_picture(axis_label, f"{name}, {kind.display_unit}", title=title)
-    for variant in dict.fromkeys(series["pivots"]):
-        rows = series[series["pivots"] == variant].sort_values(column)
-        _draw_predicted(axes, rows[column] / axis_scale, rows[f"{key}_predicted"] / scale, rows, str(variant))
     measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
     value, errors = with_errors(measured, key, scale)
-    axes.errorbar(
-        measured[column] / axis_scale, value, yerr=errors, fmt="o", color=INK,
-        markersize=5, capsize=3, linewidth=1.2, label="measured, 95 %", zorder=5,
-    )  # fmt: skip
+    shares = 100.0 * errors / np.maximum(np.abs(value), np.finfo(float).tiny)
+    apart = len(value) > 0 and float(np.median(shares)) < _SMALL
+    figure, grid = new_pictures(2 if apart else 1, 1, title=title, height=(2.3, 1.5) if apart else 3.1)
+    axes = grid[0][0]
+    label(axes, axis_label, f"{name}, {kind.display_unit}")
+    variants = {str(pivots): rows.sort_values(column) for pivots, rows in series.groupby("pivots", sort=False)}
+    for variant, rows in variants.items():
+        _draw_predicted(axes, rows[f"{key}_predicted"].to_numpy(float) / scale, rows, variant, over)
+    axes.errorbar(measured[column] / axis_scale, value, yerr=errors, label="measured, 95 %", **_BARS)
     axes.margins(x=0.06, y=0.1)
     if name in DIRECT:
         axes.set_ylim(bottom=0.0)
     add_legend(axes)
+    if apart:
+        below = grid[1][0]
+        label(below, axis_label, "off measured, %")
+        reach = [_draw_deviations(below, rows, variant, key, over) for variant, rows in variants.items()]
+        below.errorbar(measured[column] / axis_scale, np.zeros_like(value), yerr=shares, **_BARS)
+        below.margins(x=0.06)
+        limit = 1.4 * max(float(np.max(shares)), min(reach))
+        below.set_ylim(-limit, limit)
     return figure
+
+
+def _draw_deviations(axes: Axes, rows: pd.DataFrame, variant: str, key: str, over: str) -> float:
+    """Draw predicted / measured - 1 [%] of one prediction; how far it reaches."""
+    off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
+    _draw_predicted(axes, off, rows, variant, over)
+    return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
 
 
 def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
@@ -79,10 +102,12 @@ def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
     return comparison_frame(comparison)
 
 
-def _draw_predicted(axes: Axes, over: pd.Series, predicted: pd.Series, rows: pd.DataFrame, variant: str) -> None:
+def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, variant: str, over: str) -> None:
+    column, size, _ = axis_of(over)
+    x = rows[column].to_numpy(float) / size
     colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
-    x, y = over.to_numpy(float), predicted.to_numpy(float)
-    axes.plot(x, y, color=LIGHT[colour], linestyle=dashes, linewidth=1.6, marker=marker, markersize=4,
+    line = dashes if len(x) >= CURVE else "none"
+    axes.plot(x, y, color=LIGHT[colour], linestyle=line, linewidth=1.6, marker=marker, markersize=4,
               label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
     if variant == "measured" and "pivot_extrapolated" in rows:
         extrapolated = rows["pivot_extrapolated"].to_numpy(bool)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
-from tpjb_ident.report.drawing.series import as_table, axis_of, longest_series, with_errors
+from tpjb_ident.report.drawing.series import CURVE, as_table, axis_of, longest_series, with_errors
 from tpjb_ident.schema import KINDS
 
 if TYPE_CHECKING:
@@ -71,7 +71,8 @@ def direct_coefficients(
             value, errors = with_errors(rows, key, kind.display_scale)
             axes.errorbar(
                 rows[column] / axis_scale, value, yerr=errors, marker=marker,
-                markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour], linestyle=dashes,
+                markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour],
+                linestyle=dashes if len(rows) >= CURVE else "none",
                 linewidth=1.3, capsize=3, label=f"{name}, {part}{entry}",
             )  # fmt: skip
     if not drawn:

@@ -49,10 +49,11 @@ def gap(
     figure, axes = new_picture("gap, sigma", "", title=title, height=0.3 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
-    for offset, values, colour, hatch, name in (
-        (-0.2, before, "orange", "////", "baseline"), (0.2, after, "blue", None, "with the effects found"),
-    ):  # fmt: skip
-        axes.barh(y + offset, values, 0.38, color=LIGHT[colour] if hatch is None else PAPER, hatch=hatch,
+    bars = [(before, "orange", "////", "baseline"), (after, "blue", None, "with the effects found")]
+    bars = bars[:1] if np.array_equal(before, after) else bars  # nothing was added: there is no after
+    for number, (values, colour, hatch, name) in enumerate(bars):
+        places = y + 0.4 * number - 0.2 * (len(bars) - 1)
+        axes.barh(places, values, 0.38, color=LIGHT[colour] if hatch is None else PAPER, hatch=hatch,
                   edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
     axes.set_yticks(y, words)
     axes.invert_yaxis()

@@ -38,7 +38,7 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
     if good.sum() < 2:
         raise ValueError(f"run {run.id} has no displacements to draw")
     path = per("length") * (path - np.median(path[good], axis=0))
-    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.6)
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title)
     shown = path[:_MOST_SAMPLES]
     axes.plot(shown[:, 0], shown[:, 1], color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation

@@ -12,7 +12,7 @@ from tpjb_ident.report.drawing.picture import (
     add_legend,
     new_picture,
 )
-from tpjb_ident.report.drawing.series import axis_of
+from tpjb_ident.report.drawing.series import CURVE, axis_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +68,8 @@ def residual_series(
             rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
             last = number == len(models) - 1
             axes.plot(
-                rows[column] / scale, rows["z"], color=LIGHT[colour], linestyle=_DASHES[number % len(_DASHES)],
+                rows[column] / scale, rows["z"], color=LIGHT[colour],
+                linestyle=_DASHES[number % len(_DASHES)] if len(rows) >= CURVE else "none",
                 marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else PAPER, linewidth=1.3,
                 label=f"{entry}, {VARIANT_LABEL.get(model, str(model))}",
             )  # fmt: skip
