@@ -188,7 +188,10 @@ def test_no_column_of_the_first_screen_is_cut(chromium, report, width):
 def test_one_legend_names_the_curves_of_the_page(chromium, report):
     with chromium() as tab:
         tab.open(report.as_uri())
-        labels = tab.js("[...document.querySelectorAll('figure svg text')].map((t) => t.textContent)")
+        labels = tab.js(
+            "[...document.querySelectorAll('figure svg text')]"
+            ".filter((t) => getComputedStyle(t).visibility !== 'hidden').map((t) => t.textContent)"
+        )
     assert labels.count("Kirk pivots") <= 2  # coefficients, and the locus with other curves
     assert labels.count("off measured, %") >= 4
 
@@ -210,9 +213,26 @@ def test_a_printed_page_is_signed_numbered_and_legible(chromium, report, tmp_pat
             assert "Rocker-backed" in page
             assert "0-peak" in page
         assert "Checked by" in pages[-1]
-        boxes = subprocess.run([pdf, "-bbox", tmp_path / f"{name}.pdf", "-"], capture_output=True, text=True).stdout
-        heights = [float(b) - float(a) for a, b in re.findall(r'yMin="([\d.]+)" xMax="[\d.]+" yMax="([\d.]+)"', boxes)]
-        assert min(h for h in heights if h > 0) >= 6.0
+
+
+#: Texts smaller than 6 pt (8 px), in a window as wide as A4 between its margins.
+SMALL = """
+[...document.querySelectorAll("body *")].filter((e) => e.getClientRects().length && !e.closest("title, script, style"))
+  .filter((e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()))
+  .map((e) => {
+    const svg = e.closest("svg");
+    const scale = svg ? svg.getBoundingClientRect().width / svg.viewBox.baseVal.width : 1;
+    return [e.textContent.trim().slice(0, 30), scale * parseFloat(getComputedStyle(e).fontSize)];
+  }).filter(([, size]) => size < 8)
+"""
+
+
+def test_no_printed_text_is_under_six_points(chromium, report):
+    with chromium() as tab:
+        tab.call("Emulation.setEmulatedMedia", media="print")
+        tab.size(695, 1000)
+        tab.open(report.as_uri())
+        assert tab.js(SMALL) == []
 
 
 def test_a_hostile_campaign_stays_text(chromium, tmp_path):

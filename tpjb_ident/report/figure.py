@@ -105,18 +105,19 @@ def inline_svg(text: str, name: str, title: str) -> str:
     return f'{head} role="img" aria-label="{title}">{content}'
 
 
-def without_legend(svg: str) -> tuple[str, str]:
-    """A drawing without the legend above its panel, the legend's room cut off, and the legend's words; "" if none."""
+def without_legend(svg: str) -> tuple[str, frozenset[str]]:
+    """A drawing with its legend hidden (it may define marks that others use), its room cut off, and its words."""
     start, size = svg.find('<g id="legend_1">'), _SIZE.search(svg)
     if start < 0 or size is None or '<g id="legend_2">' in svg:
-        return svg, ""
+        return svg, frozenset()
     end = _end_of_group(svg, start)
     texts = re.findall(r'y="([\d.]+)"[^>]*>([^<]+)</text>', svg[start:end])
     bottom = max(float(y) for y, _ in texts) + _BELOW_LEGEND
     width, height = float(size[1]), float(size[2])
-    cut = svg[:start] + svg[end:]
-    cut = cut.replace(size[0], f'viewBox="0 {bottom:.2f} {width:g} {height - bottom:.2f}"', 1)
-    return cut, "|".join(words for _, words in texts)
+    cut = f'{svg[:start]}<g visibility="hidden"{svg[start + 2 :]}'.replace(
+        size[0], f'viewBox="0 {bottom:.2f} {width:g} {height - bottom:.2f}"', 1
+    )
+    return cut, frozenset(words for _, words in texts)
 
 
 def prefixed_ids(svg: str, prefix: str) -> str:
@@ -236,7 +237,7 @@ def _with_titles(svg: str, lines: tuple[_HoverPoints, ...]) -> str:
 
 def _end_of_group(svg: str, start: int) -> int:
     depth = 0
-    for match in re.compile(r"<g[ >]|</g>").finditer(svg, start):
+    for match in re.compile(r"<g(?: [^>]*)?(?<!/)>|</g>").finditer(svg, start):
         depth += -1 if match[0] == "</g>" else 1
         if depth == 0:
             return match.end()

@@ -73,12 +73,13 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     environment = _templates()
     script = environment.get_template("sort.js").render()
-    shown: set[str] = set()
+    shown: list[frozenset[str]] = []
     drawings = {}
     for panel in panels_of(page):
         drawing, legend = without_legend(svg[panel.name])
-        drawings[panel.name] = drawing if legend in shown else svg[panel.name]
-        shown |= {legend} - {""}
+        repeated = any(legend <= former for former in shown)
+        drawings[panel.name] = drawing if repeated else svg[panel.name]
+        shown += [legend] if legend else []
     running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
     return environment.get_template("report.html").render(
         page=page,

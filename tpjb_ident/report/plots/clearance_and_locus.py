@@ -61,7 +61,7 @@ def clearance_and_locus(
     named = {} if polygons is None else polygons if isinstance(polygons, Mapping) else {"measured": polygons}
     if not named and locus is None and not predicted and drawing is None:
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
-    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=5.2, height=5.4)
+    figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.8)
     if drawing is not None:
         axes.plot(*(per("length") * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
                   linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip

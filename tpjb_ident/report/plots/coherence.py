@@ -41,7 +41,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
         raise ValueError("there is no operating point to draw")
     rows = table.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     unexplained = np.clip(1.0 - rows["coherence"].to_numpy(float), _SMALLEST, None)
-    width = max(5.2, 0.36 * len(rows) + 1.2)
+    width = max(4.6, 0.36 * len(rows) + 1.2)
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=3.4)
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "1 - coherence")
     shrink(axes, bottom=0.25)
@@ -56,7 +56,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
     axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
     ticks = [f"{w * per('load'):.4g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
-    axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.5)
+    axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.0)
     axes.grid(axis="x", visible=False)
     add_legend(axes)
     return figure

@@ -53,7 +53,7 @@ def window_weights(result: PointResult | DynamicStiffness, *, title: str | None 
         if len(rejected) > _NAMED:
             words.append(f"and {len(rejected) - _NAMED} more")
         box = {"facecolor": PAPER, "edgecolor": RULE, "alpha": 0.85}
-        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 2, color=INK,
+        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 1.0, color=INK,
                   va="bottom", bbox=box)  # fmt: skip
     add_legend(axes)
     return figure
