@@ -83,6 +83,25 @@ def parquet(folder: Path, rows: int = 2**26) -> Path:
 FOREIGN = {"mat73": mat73, "mat73_chunk": mat73_chunk, "mat5": mat5, "parquet": parquet}
 
 
+def mdf(folder: Path, cycles: int = 2**31) -> Path:
+    """MDF 4 of a kilobyte whose channel group claims this many records."""
+    from asammdf import MDF, Signal
+
+    path = folder / "claims.mf4"
+    values = np.zeros(20)
+    with MDF(version="4.10") as file:
+        file.append([Signal(samples=values, timestamps=np.arange(20.0), name="X1A", unit="um")])
+        file.save(path, overwrite=True)
+    data = bytearray(path.read_bytes())
+    group = data.index(b"##CG")
+    links = int.from_bytes(data[group + 16 : group + 24], "little")
+    count = group + 24 + 8 * links + 8  # behind head, links and record number
+    assert int.from_bytes(data[count : count + 8], "little") == len(values)
+    data[count : count + 8] = cycles.to_bytes(8, "little")
+    path.write_bytes(data)
+    return path
+
+
 def read(path: Path) -> str:
     """Read a file as whoever opens it would; what it is answered with."""
     from rigdata import load_campaign

@@ -78,6 +78,16 @@ def test_each_format_is_refused_by_what_it_claims(make, tmp_path):
         read_foreign(path, path.name)
 
 
+@pytest.mark.slow
+def test_mdf_is_refused_by_what_it_claims_in_the_process_that_reads_it(tmp_path):
+    pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
+    path = claims.mdf(tmp_path)
+    assert path.stat().st_size < 10_000
+    with pytest.raises(RigDataError, match=r"claims\.mf4: claims 34360 MB of samples"):
+        read_foreign(path, path.name)
+    assert len(read_foreign(claims.mdf(tmp_path, 20), path.name)) == 1
+
+
 def test_short_channels_are_not_spread_over_a_long_clock():
     clock = Series("fast", "", np.zeros(1000), np.arange(1000.0))
     slow = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 999.0])) for i in range(10_000)]

@@ -2,10 +2,12 @@
 
     python -m tests.studies.load make FILE.h5 [--runs 2000] [--gigabytes 20]
     python -m tests.studies.load watch [--every 0.5] [--write] -- tpjb identify FILE.h5 --out DIR --workers 2
+    python -m tests.studies.load table [--runs 60 600 3000] [--workers 1 2] [--seconds 2] [--write]
 
 `make` lets the virtual rig write one second of every run (six directions at each operating point), repeats it and adds
 fresh noise, uncompressed. All lines are whole Hz, so that the repeats join. `watch` runs any command and samples the
 memory of it and all its processes (proportional set size: shared pages count once), their CPU time and open files.
+`table` makes campaigns of several sizes, with records of some seconds, and watches `identify` of each.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ import math
 import os
 import resource
 import subprocess
+import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -143,6 +147,28 @@ def watch(command: list[str], every: float) -> dict[str, float]:
     }
 
 
+def sizes(runs: list[int], workers: list[int], seconds: float, folder: Path) -> list[tuple[str, ...]]:
+    """Watch `identify` of campaigns with so many runs; one row per campaign and number of workers."""
+    rows = []
+    for count in runs:
+        path = folder / f"{count}.h5"
+        made = make(path, count, count * seconds * _BYTES_A_SECOND / 1e9)
+        for number in workers:
+            out = folder / f"{count}-{number}"
+            words = ["identify", str(path), "--out", str(out), "--workers", str(number), "--quiet"]
+            seen = watch([sys.executable, "-P", "-m", "tpjb_ident", *words], 0.2)
+            cells = (seen["cpu_seconds"], seen["seconds"], seen["peak_MB"], seen["open_files"], seen["exit_code"])
+            rows.append((f"{made:,}", f"{path.stat().st_size / 1e6:.0f} MB", str(number), *map(str, cells)))
+            print(*rows[-1], flush=True)
+        path.unlink()
+    return rows
+
+
+#: Of all channels of the virtual rig, in single precision.
+_BYTES_A_SECOND = 14 * 2000 * 4
+_COLUMNS = ("runs", "records", "workers", "processor s", "elapsed s", "peak MB of all processes", "open files", "exit")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     actions = parser.add_subparsers(dest="action", required=True)
@@ -154,7 +180,18 @@ def main() -> None:
     watching.add_argument("--every", type=float, default=0.5)
     watching.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     watching.add_argument("command", nargs=argparse.REMAINDER)
+    sized = actions.add_parser("table")
+    sized.add_argument("--runs", type=int, nargs="+", default=[60, 600, 3000])
+    sized.add_argument("--workers", type=int, nargs="+", default=[1, 2])
+    sized.add_argument("--seconds", type=float, default=2.0, help="of each record")
+    sized.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
+    if given.action == "table":
+        with tempfile.TemporaryDirectory() as scratch:
+            rows = sizes(given.runs, given.workers, given.seconds, Path(scratch))
+        if given.write:
+            write_section("runs", f"python -m tests.studies.load {' '.join(sys.argv[1:])}", table(_COLUMNS, rows))
+        return
     if given.action == "make":
         print(json.dumps({"runs": make(given.file, given.runs, given.gigabytes)}))
     else:
