@@ -7,6 +7,7 @@ import logging
 import os
 import sys
 import tempfile
+import time
 import zipfile
 from collections.abc import Mapping
 from functools import cache
@@ -96,6 +97,8 @@ def save_arrays(key: str, arrays: Mapping[str, FloatArray]) -> bool:
 
 def _prune(folder: Path) -> None:
     """Remove all but the newest files: a sweep over geometries must not fill a disk."""
-    files = sorted(folder.glob("pad-*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
+    latest = time.time() + 60.0  # what is later was stored while the clock was ahead: it must not outlive all others
+    changed = {path: path.stat().st_mtime for path in folder.glob("pad-*.npz")}
+    files = sorted(changed, key=lambda path: changed[path] if changed[path] < latest else 0.0, reverse=True)
     for path in files[_KEEP:]:
         path.unlink(missing_ok=True)

@@ -1,0 +1,71 @@
+"""A computer's clock that jumps: an hour ahead, back to 1970, at every look."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model.pad import store
+from tests.command_line import tpjb
+from tpjb_ident.watch.landing import NewFiles
+
+DEMO = Path(__file__).parents[2] / "rigdata" / "samples" / "demo.h5"
+
+
+@pytest.fixture
+def jumping(monkeypatch):
+    """A clock of the day that is somewhere else at every look; that which counts on alone goes steadily."""
+    jumps = itertools.cycle((0.0, 3.6e3, -8.64e4, 1e9, -time.time() + 1.0))
+    now = time.time
+    monkeypatch.setattr(time, "time", lambda: now() + next(jumps))
+
+
+def test_solutions_stored_while_the_clock_was_ahead_do_not_push_out_new_ones(tmp_path, monkeypatch):
+    monkeypatch.setenv("TPJB_CACHE", str(tmp_path))
+    for number in range(store._KEEP):
+        assert store.save_arrays(f"ahead{number}", {"a": np.ones(1)})
+    for path in tmp_path.iterdir():
+        os.utime(path, (time.time() + 1e6,) * 2)
+    for number in range(3):
+        assert store.save_arrays(f"new{number}", {"a": np.full(1, float(number))})
+    assert [store.load_arrays(f"new{number}", {"a": (1,)})["a"][0] for number in range(3)] == [0.0, 1.0, 2.0]
+    assert len(list(tmp_path.iterdir())) == store._KEEP
+
+
+@pytest.mark.parametrize("steps", [[0.0, 3600.0, -86400.0, 5.0]])
+def test_a_file_that_is_being_written_is_left_alone_whatever_the_clock_says(tmp_path, steps):
+    path, day, steady = tmp_path / "a.csv", time.time(), itertools.count(0.0, 2.0)
+    watch = NewFiles(5.0, lambda: day, lambda: next(steady))
+    path.write_text("x", encoding="utf-8")
+    os.utime(path, (day, day))
+    for number, step in enumerate(steps):  # a line is written between two looks, and the clock jumps
+        stable, written = watch.look([path])
+        assert (stable, written) == ({}, [path])
+        day += step
+        path.write_text("x" * (number + 2), encoding="utf-8")
+        os.utime(path, (day, day))
+    looks = [bool(watch.look([path])[0]) for _ in range(4)]
+    assert looks == [False, False, False, True]  # 2 s apart, 5 s without a change
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("jumping")
+def test_a_command_under_a_clock_that_jumps_gives_the_same_and_may_be_verified(tmp_path):
+    shutil.copy(DEMO, tmp_path / "demo.h5")
+    tables = []
+    for name, year in (("a", 1971), ("b", 2100)):
+        os.utime(tmp_path / "demo.h5", (365.25 * 86400 * (year - 1970),) * 2)
+        out = tmp_path / name
+        assert tpjb("locus", tmp_path / "demo.h5", "--out", out).exit_code == 0
+        assert tpjb("locus", tmp_path / "demo.h5", "--out", out).exit_code == 0  # over results of another time
+        assert tpjb("verify", out).exit_code == 0
+        assert list(json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]) == ["locus"]
+        tables.append((out / "locus.csv").read_bytes())
+    assert tables[0] == tables[1]
