@@ -65,8 +65,9 @@ def test_rows_meet_points_by_load_direction_speed_and_excitation_and_gaps_stay_g
     assert frame["kyy_N_per_m_ratio"][5000.0, 25.0] == pytest.approx(1.1)
     assert frame["y_m_predicted"][2500.0, 25.0] == -2e-5
     assert frame["kxx_N_per_m_predicted"].isna().all()
-    (remark,) = result.remarks
-    assert "predicts 2 of 3 points (load within 1 %" in remark
+    remark, tolerances = result.remarks
+    assert "predicts 2 of 3 points;" in remark
+    assert "load within 1 %, direction within 1 deg, speed and excitation within 0.5 %" in tolerances
     assert "without a row: 2500 N at -90 deg, shaft 22 Hz, excited at 10 Hz" in remark
     assert "rows that meet no point: line 4 (5000 N at -90 deg, shaft 22 Hz, excited at 40 Hz)" in remark
 
@@ -196,3 +197,13 @@ def test_a_table_stands_beside_a_campaign_with_a_locus(tmp_path):
     assert math.isnan(locus_distance(result, table))
     assert "theirs.csv predicts 3 of 7 points" in result.summary()
     assert comparison_frame(result)["kyy_N_per_m_predicted"].notna().sum() == 7 + 3
+
+
+def test_every_table_has_a_line_and_marker_of_its_own(tmp_path, measured):
+    pytest.importorskip("matplotlib")
+    from tpjb_ident.report.plots.coefficient import coefficient
+
+    text = "static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m\n2500,22,25,1e8\n5000,22,25,2e8\n"
+    figure = coefficient(compared(measured, *(written(tmp_path, text, f"{n}.csv") for n in "abcde")), "kyy")
+    lines = [line for line in figure.axes[0].get_lines() if line.get_label() in "abcde"]
+    assert len({(line.get_color(), line.get_marker()) for line in lines}) == 5

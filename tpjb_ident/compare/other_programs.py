@@ -18,7 +18,7 @@ from tpjb_ident.schema import ENTRIES
 
 #: How far a row may be from an operating point that it predicts: what set points are rounded by in tables.
 _LOAD, _DIRECTION, _FREQUENCY = 0.01, math.radians(1.0), 0.005
-_TOLERANCES = "load within 1 %, direction within 1 deg, speed and excitation within 0.5 %, the same rotation"
+_TOLERANCES = "its load within 1 %, direction within 1 deg, speed and excitation within 0.5 %, the same rotation"
 #: Points and lines that a remark lists.
 _MOST = 6
 
@@ -58,6 +58,8 @@ def with_predictions(comparison: Comparison, tables: Sequence[PredictionTable]) 
         variants.append(Variant(table.name, tuple(map(_table_point, points, met))))
         alone = [str(point) for point, row in zip(points, met, strict=True) if row is None]
         remarks.append(_remark(table, len(points), alone, unmet))
+    if tables:
+        remarks.append(f"A row of a table meets a point where it has {_TOLERANCES}; nothing is interpolated.")
     return replace(comparison, variants=tuple(variants), remarks=tuple(remarks))
 
 
@@ -96,7 +98,7 @@ def _table_point(point: OperatingPoint, row: TableRow | None) -> TablePoint:
 
 def _remark(table: PredictionTable, total: int, alone: Sequence[str], unmet: Sequence[TableRow]) -> str:
     """Say how many points a table meets, and what has no partner."""
-    sentences = [f"{table.file} predicts {total - len(alone)} of {total} points ({_TOLERANCES})"]
+    sentences = [f"{table.file} predicts {total - len(alone)} of {total} points"]
     if alone:
         sentences.append(f"without a row: {_listed(alone)}")
     if unmet:

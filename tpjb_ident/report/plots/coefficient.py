@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
+from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, Style, style_of_variant
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import CURVE, DIRECT, axis_of, longest_series, with_errors
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
@@ -67,8 +67,9 @@ def coefficient(
     axes = grid[0][0]
     label(axes, axis_label, f"{name}, {kind.display_unit}")
     variants = {str(pivots): rows.sort_values(column) for pivots, rows in series.groupby("pivots", sort=False)}
+    styles = {variant: style_of_variant(variant, list(variants)) for variant in variants}
     for variant, rows in variants.items():
-        _draw_predicted(axes, rows[f"{key}_predicted"].to_numpy(float) / scale, rows, variant, over)
+        _draw_predicted(axes, rows[f"{key}_predicted"].to_numpy(float) / scale, rows, styles[variant], over)
     axes.errorbar(measured[column] / axis_scale, value, yerr=errors, label="measured, 95 %", **_BARS)
     axes.margins(x=0.06, y=0.1)
     if name in DIRECT:
@@ -77,7 +78,7 @@ def coefficient(
     if apart:
         below = grid[1][0]
         label(below, axis_label, "off measured, %")
-        reach = [_draw_deviations(below, rows, variant, key, over) for variant, rows in variants.items()]
+        reach = [_draw_deviations(below, rows, styles[variant], key, over) for variant, rows in variants.items()]
         below.errorbar(measured[column] / axis_scale, np.zeros_like(value), yerr=shares, **_BARS)
         below.margins(x=0.06)
         limit = 1.4 * max(float(np.max(shares)), min(reach))
@@ -85,10 +86,10 @@ def coefficient(
     return figure
 
 
-def _draw_deviations(axes: Axes, rows: pd.DataFrame, variant: str, key: str, over: str) -> float:
+def _draw_deviations(axes: Axes, rows: pd.DataFrame, style: Style, key: str, over: str) -> float:
     """Draw predicted / measured - 1 [%] of one prediction; how far it reaches."""
     off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
-    _draw_predicted(axes, off, rows, variant, over)
+    _draw_predicted(axes, off, rows, style, over)
     return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
 
 
@@ -102,10 +103,10 @@ def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
     return comparison_frame(comparison)
 
 
-def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, variant: str, over: str) -> None:
+def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, style: Style, over: str) -> None:
     column, size, _ = axis_of(over)
+    variant, (colour, dashes, marker) = str(rows["pivots"].iloc[0]), style
     x = rows[column].to_numpy(float) / size
-    colour, dashes, marker = VARIANT_STYLE.get(variant, ("green", (0, (4, 1, 1, 1)), "*"))
     line = dashes if len(x) >= CURVE else "none"
     axes.plot(x, y, color=LIGHT[colour], linestyle=line, linewidth=1.6, marker=marker, markersize=4,
               label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
