@@ -22,7 +22,7 @@ MIRROR = np.diag([-1.0, 1.0])
 
 def rotation_of(speed: float) -> str:
     """Sense of a shaft speed about +z: negative is clockwise."""
-    return ROTATIONS[speed < 0.0]
+    return ROTATIONS[int(speed < 0.0)]
 
 
 def runs_backward(bearing: Bearing, speed: float) -> bool:

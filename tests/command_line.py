@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from typing import Any
 
 import typer.testing
@@ -16,5 +17,6 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
 
 
 def tpjb(*words: Any, app: typer.Typer = app) -> Any:
-    """Run `tpjb words`, or another program of commands; its output, exit code and exception."""
-    return typer.testing.CliRunner().invoke(app, [str(word) for word in words])
+    """Run `tpjb words`, or another program of commands; its output, in long lines, exit code and exception."""
+    wide = {} if "COLUMNS" in os.environ else {"COLUMNS": "400"}
+    return typer.testing.CliRunner(env=wide).invoke(app, [str(word) for word in words])

@@ -162,7 +162,7 @@ def test_init_writes_a_draft_that_check_can_work_on(folder):
     assert result.exit_code == 0, result.stderr
     text = (folder / "campaign.toml").read_text(encoding="utf-8")
     assert 'static_load = "5 kN"' in text
-    assert 'excitation_frequency = "24.99 Hz"' in text
+    assert 'excitation_frequency = "25 Hz"' in text
     assert "??" in text
     checked = tpjb("check", folder, "--out", folder.parent / "o")
     assert checked.exit_code == 2

@@ -150,3 +150,17 @@ def test_a_check_tells_how_many_runs_it_has_read(small_campaign, tmp_path, monke
     result = tpjb("check", small_campaign, "--out", tmp_path / "out")
     assert result.exit_code == 0
     assert "tpjb: doing: reading small.h5: 9 of 10" in result.stderr
+
+
+def test_what_is_printed_fits_80_columns_in_a_pipe(capsys):
+    c = Terminal()
+    c.print("a sentence of many words " * 8)
+    columns = ["load kN", "dir. deg", "speed Hz", "exc. Hz", *(Column(f"c{entry} kN s/m") for entry in "abcd"), "out %"]
+    rows = [[str(load), "-90", "22", "25", *4 * ["12345.6 ±123.4"], "0"] for load in (3, 6)]
+    c.show("a table that is wider than a page", columns, rows)
+    c.next("check", "a folder")
+    c.close()
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert any("dir. deg -90; speed Hz 22" in line for line in lines)  # what is the same in all rows is said once
+    assert lines[-1] == "Next: tpjb check 'a folder'"

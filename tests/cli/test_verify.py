@@ -51,7 +51,7 @@ def half_moved(place):
 @pytest.mark.parametrize(
     ("spoil", "code", "says"),
     [
-        (lambda place: None, 0, "All results and inputs are the same bytes"),
+        (lambda place: None, 0, "all results and inputs are the same bytes"),
         (changed_table, 3, "locus.csv is not what it was"),
         (missing_table, 3, "clearance.parquet is missing"),
         (changed_records, 3, "input small.h5 is not what it was"),

@@ -31,7 +31,7 @@ def span(*values: float) -> str:
     if not finite:
         return "-"
     low, high = min(finite), max(finite)
-    return f"{low:g}" if low == high else f"{low:g}..{high:g}"
+    return f"{low:.4g}" if low == high else f"{low:.4g}..{high:.4g}"
 
 
 RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
@@ -63,13 +63,18 @@ def check(c: Command, campaign: CampaignPath) -> None:
     summary = check_summary(c, source.id if source else path.name, problems, source)
     with c.results():
         c.json("check.json", summary)
+    counts = summary["counts"]
+    c.print(f"{summary['campaign']}: {', '.join(counted(counts[severity], severity) for severity in SEVERITIES)}")
     for line in problem_lines(problems):
         c.print(line)
     if source is not None:
         _show_coverage(c, source)
-    counts = summary["counts"]
-    c.print(f"{summary['campaign']}: {', '.join(counted(counts[severity], severity) for severity in SEVERITIES)}")
     c.print(f"Results: {c.target}")
+    if any("open (??)" in p.what for p in problems):
+        c.next("init", path if path.is_dir() else path.parent, "--update")
+    else:
+        dynamic = source is not None and source.of_kind("dynamic")
+        c.next("check" if counts["error"] else "identify" if dynamic else "pivot", campaign)
     if not summary["ok"]:
         raise BadInputError(
             f"{path}: {counted(counts['error'], 'error')}, listed above and in {c.target / 'check.json'}: to be mended."

@@ -55,14 +55,15 @@ def demo(c: Command) -> None:
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
             write_report(folder, result, named(c.options), c.inputs, _NEXT, note)
     counts = summary["counts"]
+    show_comparison(c, result)
     c.print(
         f"Read {len(campaign.runs)} records of {path.name}: {counted(counts['error'], 'error')}, "
         f"{counted(counts['warning'], 'warning')}."
     )
-    show_comparison(c, result)
     c.print(note)
     c.print(f"Report: {(c.target / 'report.html').resolve()}")
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
+    c.next("view", c.target)
     refuse_comparison(result)
 
 

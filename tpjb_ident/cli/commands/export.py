@@ -62,6 +62,7 @@ def export(
         c.remarks = written.chosen.doubtful
     c.print(str(written))
     c.print(f"Results: {c.target}")
+    c.next("verify", c.target)
     if form.note:
         c.note(form.note)
     _refuse_doubtful(written.chosen, force)

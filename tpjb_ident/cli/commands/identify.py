@@ -100,8 +100,10 @@ def identify(
                 write_r_matrices(folder / "r_matrices.h5", points)
         c.remarks = result.remarks()
     show_identification(c, result)
-    if result.points:
-        c.next(f"tpjb {'compare' if source.bearing_text else 'export --to ross'} {campaign}")
+    if source.bearing_text:
+        c.next("compare", campaign)
+    elif result.points:
+        c.next("export", c.target, "--to", "ross")
     c.print(f"Results: {c.target}")
     refuse_untrusted(result)
 

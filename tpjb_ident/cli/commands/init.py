@@ -53,7 +53,10 @@ def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = F
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")
     c.target = c.out or folder
     text = _update(c, folder, bearing) if update else _draft(c, folder, bearing)
-    c.next(f"tpjb init {folder} --update" if _open_summary(text) else f"tpjb check {folder}")
+    if _open_summary(text):
+        c.next("init", folder, "--update")
+    else:
+        c.next("check", folder)
 
 
 def _draft(c: Command, folder: Path, bearing: str | None) -> str:

@@ -45,7 +45,10 @@ def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
         clearances = np.array([pad.assembled_clearance for pad in drawing.pads])
         panels = position_panels(static.clearance, (angles, clearances), static.locus, {}, polygons)
         save_panels(panels, folder / "figures")
+    parts = [f"the {name} is measured" for name in ("clearance", "locus") if getattr(static, name) is not None]
+    c.print(f"{source.id}: {' and '.join(parts)}.")
     _show(c, static, drawing, source.id, refused)
+    c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for polygon in polygons:
         c.print(str(polygon))
     c.print(f"Results: {c.target}")

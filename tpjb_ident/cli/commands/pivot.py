@@ -41,7 +41,10 @@ def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
         write_pivots(folder / "pivots.toml", curves, source.id)
         with c.progress("drawing figures"):
             save_panels(pivot_panels(curves, formula), folder / "figures")
+    tested = {run.pad for run in source.of_kind("dry_pivot")}
+    c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
     _show_curves(c, curves, source.id, formula)
+    c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     c.print(f"Results: {c.target}")
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))

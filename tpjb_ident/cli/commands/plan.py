@@ -12,7 +12,7 @@ from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice, rotation_choice
 from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Rotation, Speeds
 from tpjb_ident.columns import Column, words
-from tpjb_ident.rounding import signed
+from tpjb_ident.rounding import counted, signed
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def plan(
         write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
     _show(c, result)
     c.print(f"Results: {c.target}")
+    c.next("simulate", bearing)
 
 
 def _data_sets(c: Command, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
@@ -109,8 +110,16 @@ def _show(c: Command, result: CampaignPlan) -> None:
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])
     columns = [*words("effect"), Column("sigma", ".1f"), "seen from", *words("like")]
+    seen = len(rows) - len(result.below_floor)
+    c.print(
+        f"{seen} of {counted(len(rows), 'effect')} would be seen at a typical size; {len(result.confusable)} of "
+        f"{result.pairs} pairs could not be told apart."
+    )
     c.show("What this campaign could tell", columns, rows)
     c.print("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
     blind = ", ".join(label_in_words(name) for name in result.below_floor)
     c.print(f"Below the floor at a size that would not surprise: {blind or 'nothing'}.")
-    c.print(f"Pairs it could not tell apart at d' = 6: {len(result.confusable)} of {result.pairs}.")
+    c.print(
+        "Pairs are told apart from d' = 6 on: the distance in standard deviations between what the two leave in the "
+        "data, each at the size at which they look most alike (docs/guide/planning.md)."
+    )

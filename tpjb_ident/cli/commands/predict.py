@@ -31,6 +31,7 @@ from tpjb_ident.cli.common.options import (
 from tpjb_ident.cli.common.quantities import parse_value
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.executors import background_job, forks
 
 if TYPE_CHECKING:
@@ -116,11 +117,14 @@ def predict(
     with c.results():
         frame = _predicted(c, drawing, points, settings)
         c.table("prediction", frame)
+    bad = int((~frame["converged"]).sum())
+    state = f"{bad} did NOT converge" if bad else "all converged"
+    c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
+    c.next("export", c.target, "--to", "ross")
     c.show(drawing.name, list(COLUMNS.values()), frame.head(MOST_ROWS)[list(COLUMNS)].itertuples(index=False))
     if len(frame) > MOST_ROWS:
         c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")
     c.print(f"Results: {c.target}")
-    bad = int((~frame["converged"]).sum())
     if bad:
         raise NotTrustedError(
             f"{bad} of {len(frame)} points did not converge; their status says why, their values are NaN."

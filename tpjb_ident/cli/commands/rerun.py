@@ -61,16 +61,18 @@ def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
                 if reason := contradiction(folder / file):
                     c.warn(f"{folder / file}: {reason}")
                 found.append((name, compared(folder, again, file, tolerance)))
+    different = [f"{d.file} {_WORDS[d.state]} {d.where}".strip() for _, d in found if d.matters]
+    count = f"{len(different)} of {len(found)} files differ" if different else f"{len(found)} files: nothing differs"
+    c.print(f"{folder}: {count} by more than {tolerance:g}.")
+    c.next("verify", folder)
     rows = [[name, d.file, _WORDS[d.state], f"{d.size:.1e}" if d.size else "-"] for name, d in found]
     c.show(f"{folder}: computed again", [*words("command", "file", "state"), Column("largest difference")], rows)
     if c.out is not None:
         files = [{"command": name, **vars(difference)} for name, difference in found]
         with c.results():
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
-    different = [f"{d.file} {_WORDS[d.state]} {d.where}".strip() for _, d in found if d.matters]
     if different:
         raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n" + "\n".join(different[:8]))
-    c.print(f"{len(found)} files: nothing differs by more than {tolerance:g}.")
 
 
 def _check_inputs(folder: Path, name: str, entry: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
 from tpjb_ident.cli.common.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.provenance import sha256
 
 if TYPE_CHECKING:
@@ -56,6 +57,10 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
     if not place.exists():
         raise BadInputError(f"{source}: there is no such file or folder. Check the path.")
     campaign = c.open(source) if place.is_dir() or place.suffix.lower() in (*HDF5, ".toml") else None
+    if campaign is not None:
+        c.next("check", source)
+    else:
+        c.next("init", source.parent)
     if campaign is not None and run is None:
         _show_campaign(c, campaign)
         if picture:
@@ -71,6 +76,8 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
             title = source.name
             displayed = series = list(read_export(source).series)
         looks = {s.name: look_at(s.values, s.rate) for s in displayed}
+    dead = [name for name, look in looks.items() if look.flat]
+    c.print(f"{title}: {counted(len(displayed), 'channel')}, {', '.join(dead) or 'none'} dead.")
     _show_channels(c, title, displayed, looks)
     if not picture and c.out is None:
         return

@@ -88,6 +88,7 @@ def simulate(
         truth.write(folder / "truth.json")
     c.print(f"{name}: {len(rig.runs())} runs, seed {seed}")
     c.print(f"Results: {c.target / file}, the truth in {c.target / 'truth.json'}")
+    c.next("check", c.target / file)
 
 
 def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed: str) -> RigPlan:

@@ -37,7 +37,11 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
     files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
+    same = sum(f["state"] == "same" for f in files)
+    count = "all" if same == len(files) else f"{same} of {len(files)}"
+    c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
     _show(c, results, entries, files)
+    c.next("rerun", results)
     if c.out is not None:
         c.options = {"results": results}
         with c.results():
@@ -55,7 +59,6 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
             f"{results}: the results are unchanged, but {len(missing)} inputs ({missing[0]}, ..) are not where they "
             "were. Give --input PATH of the campaign."
         )
-    c.print("All results and inputs are the same bytes as when the commands ended.")
 
 
 def recorded(results: Path) -> dict[str, dict[str, Any]]:

@@ -83,6 +83,7 @@ def watch(
         c.print("Stopped. The same command goes on from here.")
         return
     c.print(f"Results: {c.target}")
+    c.next("check", folder)
     urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))

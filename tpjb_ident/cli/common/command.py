@@ -155,6 +155,14 @@ class Command(Terminal):
         self._outputs = list(dict.fromkeys([*self._outputs, *names]))
 
     def run(self, function: Callable[..., None], options: Mapping[str, Any]) -> int:
+        """Run the command, and print the one that comes next, last of all."""
+        exit_code = self._ended(function, options)
+        if exit_code in (0, _BAD_INPUT, _NOT_TRUSTED):
+            with contextlib.suppress(BrokenPipeError):
+                self.close()
+        return exit_code
+
+    def _ended(self, function: Callable[..., None], options: Mapping[str, Any]) -> int:
         """Run the command; any end of it is a result, one clear message, or a named bug, never a traceback."""
         try:
             with warnings.catch_warnings():
@@ -163,6 +171,8 @@ class Command(Terminal):
                 function(self, **options)
         except NotTrustedError as error:
             self.error("not to be trusted", str(error))
+            if self._sources:  # the records come first
+                self.next("check", self._sources[-1])
             return _NOT_TRUSTED
         except KeyboardInterrupt as error:
             kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)

@@ -26,7 +26,7 @@ _LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 def with_half(value: float, half: float) -> str:
     """A number with half its interval, or that there is none."""
-    if not math.isfinite(value):
+    if not math.isfinite(value) or (value == 0.0 and not half > 0.0):
         return "no answer"
     if not math.isfinite(half) or half <= 0:
         return f"{value:.4g} ±?"

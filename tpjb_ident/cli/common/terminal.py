@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import shlex
 import shutil
 import textwrap
 import time
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 #: Seconds between two lines about progress where there is no terminal.
 LINE_EVERY = 30.0
 #: Columns of a log file or a pipe.
-_LOG_WIDTH = 100
+_LOG_WIDTH = 80
 #: Rows of a table that are printed where a file has them all.
 MOST_ROWS = 40
 #: Share of a step from which its speed is known well enough to tell the remaining time.
@@ -40,6 +40,7 @@ class Terminal:
         self.as_json = as_json
         self._silent = as_json or quiet
         self.lines: list[str] = []
+        self.following = ""  #: the command that comes next
         self.messages: list[dict[str, str]] = []
         self.tables: list[dict[str, Any]] = []
 
@@ -49,9 +50,16 @@ class Terminal:
         if not self._silent:
             _console().print(_fitted(text), markup=False)
 
-    def next(self, command: str) -> None:
+    def next(self, *words: object) -> None:
+        """Note the command that comes next, by its words after `tpjb` or as typed; it is the last line of all."""
+        texts = [str(word) for word in words]
+        self.following = texts[0] if len(texts) == 1 else shlex.join(["tpjb", *texts])
+
+    def close(self) -> None:
         """Print the command that comes next, unbroken, so that it can be copied."""
-        line = f"Next: {printable(command)}"
+        if not self.following:
+            return
+        line = f"Next: {printable(self.following)}"
         self.lines.append(line)
         if not self._silent:
             _console().print(line, markup=False)
@@ -98,8 +106,9 @@ class Terminal:
         head = texts[:MOST_ROWS] if file else texts
         shown = [[readable(cell) for cell in row] for row in head]
         words = [i for i, column in enumerate(columns) if column.words]
-        lines = table_lines([readable(heading) for heading in headings], shown, words, _width())
-        for line in ("", printable(title), *lines, ""):
+        shown_headings = [readable(heading) for heading in headings]
+        title, lines = _titled_table(printable(title), shown_headings, shown, words)
+        for line in ("", title, *lines, ""):
             _console().print(line, markup=False)
         if len(head) < len(texts):
             _console().print(f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}", markup=False)
@@ -180,10 +189,25 @@ def _width() -> int:
     return max(40, shutil.get_terminal_size((_LOG_WIDTH, 24)).columns)
 
 
+def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> tuple[str, list[str]]:
+    """Title and lines of a table; of one that is too wide, columns of one and the same number go to the title."""
+    common = [i for i in range(len(headings)) if i not in words and rows and len({row[i] for row in rows}) == 1]
+    columns = list(range(len(headings)))
+    while True:
+        chosen = [[row[i] for i in columns] for row in rows]
+        texts = [columns.index(i) for i in words]
+        lines = table_lines([headings[i] for i in columns], chosen, texts, _width())
+        if not common or max(map(cell_len, lines)) <= _width():
+            return "\n".join(wrapped(title, _width())), lines
+        constant = common.pop(0)
+        columns.remove(constant)
+        title += f"; {headings[constant]} {rows[0][constant].strip()}"
+
+
 def _fitted(text: str, stderr: bool = False) -> str:
-    """Lines with whole words on a terminal; as they are in a log, which has no edge, and for who searches messages."""
+    """Lines with whole words, as wide as a table; messages in a log stay whole, for who searches them."""
     lines = [readable(line) for line in text.split("\n")]
-    if _console(stderr).is_terminal or ("COLUMNS" in os.environ and not stderr):
+    if _console(stderr).is_terminal or not stderr:
         lines = [part for line in lines for part in wrapped(line, _width())]
     return "\n".join(lines)
 

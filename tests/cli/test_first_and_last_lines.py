@@ -1,0 +1,54 @@
+"""Every command begins with its verdict and ends with the command that comes next, typed out with real paths."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from tests.command_line import tpjb
+from tpjb_ident.cli.app import app
+from tpjb_ident.cli.common.command import Command
+from tpjb_ident.cli.common.identification import with_half
+from tpjb_ident.cli.common.options import DEMO, ROCKER
+from tpjb_ident.errors import NotTrustedError
+
+VERDICTS = {
+    "check": (("check", DEMO), "errors"),
+    "show": (("show", DEMO), "runs"),
+    "pivot": (("pivot", DEMO), "pads with dry tests have a pivot curve"),
+    "locus": (("locus", DEMO), "is measured"),
+    "identify": (("identify", DEMO), "to be trusted"),
+    "predict": (("predict", ROCKER), "all converged"),
+    "plan": (("plan", ROCKER, "--load", "5 kN", "--excitation", "25 Hz", "--locus", "0"), "would be seen"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", VERDICTS)
+def test_first_the_verdict_last_the_next_command(name, tmp_path):
+    words, verdict = VERDICTS[name]
+    result = tpjb(*words, *(() if name == "show" else ("--out", tmp_path / "out")))
+    assert result.exit_code == 0, result.output
+    first, *_, last = result.stdout.strip().splitlines()
+    assert verdict in first
+    program, command, *arguments = shlex.split(last.removeprefix("Next: "))
+    assert (program, command in {c.name for c in app.registered_commands}) == ("tpjb", True)
+    assert str(words[1]) in arguments or str(tmp_path / "out") in arguments
+
+
+def test_after_a_result_that_is_not_to_be_trusted_the_records_are_checked(tmp_path, capsys):
+    def untrusted(c):
+        c.next("compare", "somewhere")
+        c._sources.append(tmp_path)
+        raise NotTrustedError("no run is usable")
+
+    c = Command("identify", {})
+    assert c.run(untrusted, {}) == 3
+    assert capsys.readouterr().out.splitlines()[-1] == shlex.join(["Next:", "tpjb", "check", str(tmp_path)])
+
+
+def test_no_answer_has_no_interval():
+    assert with_half(float("nan"), 1.0) == "no answer"
+    assert with_half(0.0, float("nan")) == "no answer"
+    assert with_half(0.0, 1.0) == "0 ±1"
