@@ -54,6 +54,9 @@ def test_it_says_yes_no_and_cannot_tell():
     moved[3] *= 1.05
     changed = difference_of(side("a", TRUE), side("b", moved)).points.iloc[0]
     assert changed["kyy_N_per_m_difference"] == pytest.approx(0.05 * TRUE[3])
+    limits = [changed[f"kyy_N_per_m_difference{ending}"] for ending in ("_lo", "_hi")]
+    width = 1.96 * np.sqrt(2) * 1e-3 * TRUE[3]
+    assert limits == pytest.approx([0.05 * TRUE[3] - width, 0.05 * TRUE[3] + width], rel=1e-3)
     assert [changed["kyy_changed"], changed["kxx_changed"]] == ["yes", "no"]
     unsure = difference_of(side("a", TRUE, random=0.05), side("b", moved, random=0.05)).points.iloc[0]
     assert unsure["kyy_changed"] == "cannot tell"
