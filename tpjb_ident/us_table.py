@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _US = SYSTEMS["us"]
 #: Unit in a column's name: unit there in US units, its size in SI, and the zero of its scale in SI.
-_UNITS = {
+UNITS = {
     "N_per_m": ("lbf_per_in", _US["stiffness"][1], 0.0),
     "Ns_per_m": ("lbfs_per_in", _US["damping"][1], 0.0),
     "N": ("lbf", _US["load"][1], 0.0),
@@ -22,7 +22,7 @@ _UNITS = {
     "degC": ("degF", 5 / 9, -160 / 9),
     "K": ("degF", 5 / 9, 459.67 * 5 / 9),
 }
-_NAMES = re.compile(rf"(.+?)_({'|'.join(_UNITS)})((?:_[a-z0-9]+)*)")
+_NAMES = re.compile(rf"(.+?)_({'|'.join(UNITS)})((?:_[a-z0-9]+)*)")
 #: Endings of what is a difference, which has no zero.
 _WIDTHS = re.compile(r"_se|_difference|95")
 
@@ -43,7 +43,7 @@ def us_table(frame: pd.DataFrame) -> pd.DataFrame:
         if name == "shaft_speed_Hz":
             names[name], converted[name] = "shaft_speed_rpm", 60.0 * frame[name]
         elif match is not None:
-            unit, size, zero = _UNITS[match[2]]
+            unit, size, zero = UNITS[match[2]]
             names[name] = f"{match[1]}_{unit}{match[3]}"
             converted[name] = (frame[name] - (0.0 if _WIDTHS.search(match[3]) else zero)) / size
     return converted.rename(columns=names)

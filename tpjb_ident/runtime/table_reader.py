@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from rigdata.near_names import nearest_name
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
+from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,15 +31,9 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", r
 _NOTHING = ("", "nan", "NaN")
 _INFINITE = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf}
 _TRUTH = {"True": True, "False": False, "": None}
-#: Ends of columns in US units: the same in SI, and the size of the unit in it.
-_US = {
-    "_lbf_s_per_in": ("_Ns_per_m", 4.4482216152605 / 0.0254),
-    "_lbfs_per_in": ("_Ns_per_m", 4.4482216152605 / 0.0254),  # as our own tables in US units have it
-    "_lbf_per_in": ("_N_per_m", 4.4482216152605 / 0.0254),
-    "_lbf": ("_N", 4.4482216152605),
-    "_mil": ("_m", 25.4e-6),
-    "_rpm": ("_Hz", 1.0 / 60.0),
-}
+#: Ends of columns in US units, ours and as people write them: the same in SI, and the size of the unit in it.
+_US = {f"_{us}": (f"_{si}", size) for si, (us, size, zero) in UNITS.items() if not zero}
+_US |= {"_lbf_s_per_in": _US["_lbfs_per_in"], "_rpm": ("_Hz", 1.0 / 60.0)}
 _US_NAME = re.compile(rf"(\w+?)({'|'.join(_US)})(_lo|_hi|_se|)")
 #: Name, column of the schema, ending, and the size of its unit.
 _Header = list[tuple[str, Column | None, str, float]]
