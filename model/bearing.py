@@ -121,6 +121,8 @@ class Pad:
     back_convection : float
         Film coefficient on the pad's free surfaces [W/m^2/K].
     backing, babbitt : Material
+    pivot : Pivot, optional
+        Where the bearing's pivots differ.
     """
 
     pivot_angle: float
@@ -136,6 +138,7 @@ class Pad:
     back_convection: float = 50.0
     backing: Material = STEEL
     babbitt: Material = BABBITT
+    pivot: Pivot | None = None
 
     def __str__(self) -> str:
         return (
@@ -212,6 +215,24 @@ class Bearing:
     def journal_radius(self) -> float:
         """R [m]."""
         return 0.5 * self.journal_diameter
+
+    def pivot_of(self, pad: Pad) -> Pivot:
+        """Return the pivot of a pad: its own, or the one that all have.
+
+        Parameters
+        ----------
+        pad : Pad
+
+        Returns
+        -------
+        Pivot
+        """
+        return pad.pivot or self.pivot
+
+    @property
+    def like_pivots(self) -> bool:
+        """Whether all pads have one kind and size of pivot."""
+        return all(pad.pivot in (None, self.pivot) for pad in self.pads)
 
     def pivot_radius(self, pad: Pad) -> float:
         """R_P = journal radius + Cp + pad thickness [m] (docs/theory.md).

@@ -74,7 +74,13 @@ _TOLERANCES = {
 _KEYS["tolerances"] = _TOLERANCES
 _MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",
                 "moment_of_inertia", "conductivity"}  # fmt: skip
-_PER_PAD = {"pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance"}
+#: Lengths of a pivot.
+_PIVOT_SIZES = ("contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter")
+#: Entries that may be a list, one value per pad.
+_PER_PAD = {
+    "pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance", "thickness", "babbitt_thickness",
+    "elastic_thickness", "mass", "moment_of_inertia", *_PIVOT_SIZES,
+}  # fmt: skip
 
 
 def load_bearing(source: str | Path) -> Bearing:
@@ -125,16 +131,13 @@ def parse_bearing(text: str, name: str) -> Bearing:
         raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
     values = {key: _read_section(section, key, name) for key, section in sections.items()}
     pads = _pads(values, name)
-    pivot = values["pivot"]
-    kind = pivot.pop("kind")
-    _check_pivot(kind, pivot, name)
     oil, rotation = values["oil"], values["bearing"].get("rotation", "")
     bearing = Bearing(
         name=values[""].get("name", name),
         journal_diameter=values["journal"]["diameter"],
         length=values["bearing"]["length"],
         pads=pads,
-        pivot=Pivot(kind=kind, **pivot),
+        pivot=_pivots(values["pivot"], len(pads), name)[0],
         oil=Oil(
             viscosity_40=oil["viscosity_40C"],
             viscosity_exponent=oil["viscosity_exponent"],
@@ -226,48 +229,62 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
     if not isinstance(angles, tuple) or not 1 <= len(angles) <= 40:
         raise BearingError(f"{name}, [pads] pivot_angles: must be a list of 1 to 40 angles, pad #1 first.")
 
-    def per_pad(value: Any, key: str) -> tuple[float, ...]:
-        if not isinstance(value, tuple):
-            return (value,) * len(angles)
-        if len(value) != len(angles):
-            raise BearingError(
-                f"{name}, {key}: {len(value)} values for {len(angles)} pads. Give one each, or one for all."
-            )
-        return value
+    count = len(angles)
+    sizes = {key: _per_pad(pads[key], count, f"{name}, [pads] {key}") for key in ("arc", "mass", "moment_of_inertia")}
+    for key in ("assembled_clearance", "pad_clearance"):
+        sizes[key] = _per_pad(bearing[key], count, f"{name}, [bearing] {key}")
+    sizes["pivot_offset"] = _per_pad(pads.get("pivot_offset", 0.5), count, f"{name}, [pads] pivot_offset")
+    defaults = {"thickness": 0.0, "elastic_thickness": pads["thickness"], "babbitt_thickness": 0.0}
+    for key, default in defaults.items():
+        sizes[key] = _per_pad(pads.get(key, default), count, f"{name}, [pads] {key}")
+    _check_offsets(angles, sizes["arc"], sizes["pivot_offset"], bearing.get("rotation", ""), name)
+    for lining, elastic, thickness in zip(*(sizes[f"{k}thickness"] for k in ("babbitt_", "elastic_", "")), strict=True):
+        if not lining < elastic <= thickness:
+            raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
+    pivots = _pivots(values["pivot"], count, name)
+    return tuple(
+        Pad(
+            pivot_angle=angles[k],
+            **{key: column[k] for key, column in sizes.items()},
+            back_convection=pads.get("back_convection", 50.0),
+            backing=Material(**values["pads.backing"]) if values["pads.backing"] else STEEL,
+            babbitt=Material(**values["pads.babbitt"]) if values["pads.babbitt"] else BABBITT,
+            pivot=pivots[k] if len(set(pivots)) > 1 else None,
+        )
+        for k in range(count)
+    )
 
-    arc = per_pad(pads["arc"], "[pads] arc")
-    offset = per_pad(pads.get("pivot_offset", 0.5), "[pads] pivot_offset")
-    cb = per_pad(bearing["assembled_clearance"], "[bearing] assembled_clearance")
-    cp = per_pad(bearing["pad_clearance"], "[bearing] pad_clearance")
-    rotation = bearing.get("rotation", "")
+
+def _per_pad(value: Any, count: int, place: str) -> tuple[float, ...]:
+    """One value for every pad, of a list or of one for all."""
+    if not isinstance(value, tuple):
+        return (value,) * count
+    if len(value) != count:
+        raise BearingError(f"{place}: {len(value)} values for {count} pads. Give one each, or one for all.")
+    return value
+
+
+def _pivots(values: dict[str, Any], count: int, name: str) -> list[Pivot]:
+    """The pivot of every pad."""
+    kind = values["kind"]
+    columns = {key: _per_pad(v, count, f"{name}, [pivot] {key}") for key, v in values.items() if key != "kind"}
+    pivots = []
+    for k in range(count):
+        sizes = {key: column[k] for key, column in columns.items()}
+        _check_pivot(kind, sizes, name)
+        pivots.append(Pivot(kind=kind, **sizes))
+    return pivots
+
+
+def _check_offsets(
+    angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], rotation: str, name: str
+) -> None:
+    """Check the sense of turning, and with it the arcs, which are laid out from the leading edges."""
     if rotation not in ("", *ROTATIONS):
         choices = hint(rotation, ROTATIONS, "Use one of")
         raise BearingError(f"{name}, [bearing] rotation: {rotation!r} is no sense of turning. {choices}")
     from_lower_edge = tuple(1.0 - f for f in offset) if rotation == ROTATIONS[1] else offset
     _check_arcs(angles, arc, from_lower_edge, name)
-    thickness = pads["thickness"]
-    elastic = pads.get("elastic_thickness", thickness)
-    lining = pads.get("babbitt_thickness", 0.0)
-    if not lining < elastic <= thickness:
-        raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
-    return tuple(
-        Pad(
-            pivot_angle=angles[k],
-            arc=arc[k],
-            pivot_offset=offset[k],
-            pad_clearance=cp[k],
-            assembled_clearance=cb[k],
-            thickness=thickness,
-            babbitt_thickness=lining,
-            elastic_thickness=elastic,
-            mass=pads["mass"],
-            moment_of_inertia=pads["moment_of_inertia"],
-            back_convection=pads.get("back_convection", 50.0),
-            backing=Material(**values["pads.backing"]) if values["pads.backing"] else STEEL,
-            babbitt=Material(**values["pads.babbitt"]) if values["pads.babbitt"] else BABBITT,
-        )
-        for k in range(len(angles))
-    )
 
 
 def _check_arcs(angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], name: str) -> None:

@@ -221,8 +221,9 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     """One law per pad from what a user may say."""
     n = len(bearing.pads)
     if isinstance(choice, str) and choice in NAMED_LAWS:
-        law = RigidPivot() if choice == "rigid" else formula_pivot(bearing.pivot, choice == "kirk-secant")
-        return (law,) * n
+        if choice == "rigid":
+            return (RigidPivot(),) * n
+        return tuple(formula_pivot(bearing.pivot_of(pad), choice == "kirk-secant") for pad in bearing.pads)
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
             advice = hint(str(choice), NAMED_LAWS, "Use one of")

@@ -61,10 +61,10 @@ def check_possible(bearing: Bearing) -> None:
     """Refuse a bearing with a number that no bearing has."""
     _check(bearing, bearing.name)
     _check(bearing.oil, "oil")
-    _check(bearing.pivot, "pivot")
     checked: Any = None
     for k, pad in enumerate(bearing.pads):
         _check(pad, f"pad {k + 1}")
+        _check(bearing.pivot_of(pad), f"pivot of pad {k + 1}")
         if (pad.backing, pad.babbitt) != checked:  # the pads of a bearing are of one make, as a rule
             checked = pad.backing, pad.babbitt
             _check(pad.backing, f"pad {k + 1}, backing")

@@ -14,6 +14,8 @@ def apply(setup: Setup, coefficient: float) -> Setup:
 
 def obstacle(bearing: Bearing) -> str:
     """Rockers roll and knife edges tilt: only spheres slide."""
+    if not bearing.like_pivots:
+        return "its pivots differ from pad to pad, and the model holds the tilt of all pads alike."
     return "" if bearing.pivot.kind == "spherical" else "only a spherical pivot slides; a rocker rolls (pivot_rolling)."
 
 

@@ -14,6 +14,8 @@ def apply(setup: Setup, factor: float) -> Setup:
 
 def obstacle(bearing: Bearing) -> str:
     """A pivot without radii does not roll."""
+    if not bearing.like_pivots:
+        return "its pivots differ from pad to pad, and the model holds the tilt of all pads alike."
     return "" if bearing.pivot.kind in {"rocker", "spherical"} else "the bearing's pivots have no radii to roll on."
 
 

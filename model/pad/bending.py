@@ -57,7 +57,7 @@ def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = F
     return _pad_deformation(geometry, grid.angle.tobytes(), grid.z.tobytes(), grid.area.tobytes(), cooled)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: bytes, cooled: bool) -> PadDeformation:
     # rigid pads need no solid, and need not wait for its algebra
     from model.pad.operators import pad_operators, pad_operators_between

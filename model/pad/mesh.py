@@ -51,10 +51,11 @@ def pivot_face(pad: Pad, bearing: Bearing) -> PivotFace:
     back = bearing.journal_radius + pad.pad_clearance + thickness
     shorter_wing = min(-pad.leading_edge, pad.leading_edge + pad.arc)
     room = 1.6 * shorter_wing * back  # leaves a fifth of the shorter wing beside the face
-    if bearing.pivot.kind == "spherical":
+    pivot = bearing.pivot_of(pad)
+    if pivot.kind == "spherical":
         side = 0.5 * math.sqrt(math.pi) * thickness
         return PivotFace(width=min(side, room), length=min(side, bearing.length))
-    contact = bearing.pivot.contact_length
+    contact = pivot.contact_length
     length = bearing.length if math.isnan(contact) else min(contact, bearing.length)
     return PivotFace(width=min(0.5 * thickness, room), length=length)
 

@@ -19,7 +19,7 @@ from tests.structure.sources import parsed, texts
 #: Thousand tokens and lines of each room.
 LIMITS = {
     "measurement": (138.1, 16_640),
-    "model": (92.4, 12_175),
+    "model": (92.8, 12_220),
     "rigdata": (75.4, 10_140),
     "diagnosis": (42.6, 5_220),
     "cli": (29.0, 4_030),
@@ -30,7 +30,7 @@ LIMITS = {
     "watch": (6.5, 840),
     "top level": (6.7, 1_230),
     "runtime": (8.2, 1_320),
-    "exports": (6.1, 940),
+    "exports": (6.1, 945),
     "view": (4.4, 510),
 }
 MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "identification")

@@ -12,7 +12,7 @@ import numpy as np
 from model.bearing import Bearing
 from model.effects import Effect
 from model.options import Options
-from model.pivots import formula_pivot
+from model.pivots import pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
@@ -208,5 +208,5 @@ def printed_formula(bearing: Bearing | None) -> Formula | None:
     """Kirk and Reedy's formula for a bearing's pivots, Eq. (16) or (17); None if its pivots are rigid, or unknown."""
     if bearing is None or bearing.pivot.kind == "rigid":
         return None
-    printed = formula_pivot(bearing.pivot, secant_vibrations=True)
-    return lambda pad, load: (printed.vibration_stiffness(load), printed.stiffness(load))
+    laws = pivot_laws("kirk-secant", bearing)
+    return lambda pad, load: (laws[pad - 1].vibration_stiffness(load), laws[pad - 1].stiffness(load))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.exports.rotor_programs import ross_version
 from tpjb_ident.runtime.tables import printable, write_text
 
 _ZERO_CELSIUS = 273.15
+_CLOCKWISE = ROTATIONS[1]
 
 
 #: What the versions call the same thing.
@@ -46,6 +49,7 @@ def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -
 def _arguments(bearing: Any) -> dict[str, Any]:
     """What both versions call the same."""
     pads, oil, hot = bearing.pads, bearing.oil, 100.0
+    angles = [pad.pivot_angle for pad in pads]
     lubricant = {
         "liquid_viscosity1": oil.viscosity_40,
         "temperature1": 40.0 + _ZERO_CELSIUS,
@@ -59,7 +63,7 @@ def _arguments(bearing: Any) -> dict[str, Any]:
         "journal_diameter": bearing.journal_diameter,
         "radial_clearance": fmean(pad.assembled_clearance for pad in pads),
         "pad_thickness": fmean(pad.thickness for pad in pads),
-        "pivot_angle": [pad.pivot_angle for pad in pads],
+        "pivot_angle": [math.pi - a for a in angles] if bearing.rotation == _CLOCKWISE else angles,
         "pad_arc": [pad.arc for pad in pads],
         "pad_axial_length": [bearing.length] * len(pads),
         "offset": [pad.pivot_offset for pad in pads],
@@ -81,6 +85,8 @@ def _not_held(bearing: Any, version: int) -> list[str]:
         f"pivots ({bearing.pivot.kind}): rigid here; no law per pad, and none that was measured",
         "mass of pads, their bending, heat into them, thermal expansion of the oil",
     ]
+    if bearing.rotation == _CLOCKWISE:
+        remarks.append("the sense of the drawing, clockwise: this is its mirror image, x to -x")
     if len({pad.assembled_clearance for pad in pads}) > 1:
         clearances = ", ".join(f"{1e6 * pad.assembled_clearance:.4g}" for pad in pads)
         remarks.append(f"assembled clearance by pad ({clearances} um): the mean stands for all")

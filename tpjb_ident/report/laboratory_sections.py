@@ -147,18 +147,27 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
 
 
+def _by_pad(values: Iterable[str]) -> str:
+    """What all pads have, or what each has, pad #1 first."""
+    listed = list(values)
+    return listed[0] if len(set(listed)) == 1 else "; ".join(listed)
+
+
 def _bearing_tables(bearing: Any) -> list[Table]:
     """Geometry of the bearing, its pivots and its oil, as the bearing file states them; none without one."""
     if bearing is None:
         return []
-    pad, oil = bearing.pads[0], bearing.oil
+    oil = bearing.oil
+    arcs = _by_pad(f"{math.degrees(p.arc):.3g}" for p in bearing.pads)
     rows = [
         ["journal diameter", amount(bearing.journal_diameter, "size")],
         ["pad length", amount(bearing.length, "size", ".4g")],
-        ["pads", f"{len(bearing.pads)}, {math.degrees(pad.arc):.3g}° of arc, pivots at "
+        ["pads", f"{len(bearing.pads)}, {arcs}° of arc, pivots at "
                  + ", ".join(f"{math.degrees(p.pivot_angle):g}°" for p in bearing.pads)],
-        ["assembled clearance (radial)", amount(pad.assembled_clearance, "length", ".4g")],
-        ["pad clearance (radial)", f"{amount(pad.pad_clearance, 'length', '.4g')}, preload {pad.preload:.3g}"],
+        ["assembled clearance (radial)",
+         _by_pad(amount(p.assembled_clearance, "length", ".4g") for p in bearing.pads)],
+        ["pad clearance (radial)", _by_pad(f"{amount(p.pad_clearance, 'length', '.4g')}, preload {p.preload:.3g}"
+                                           for p in bearing.pads)],
         ["pivots", bearing.pivot.kind],
         ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at {degrees(40.0)}, "
                 f"supplied at {degrees(oil.supply_temperature)}"],
