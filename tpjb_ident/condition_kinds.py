@@ -33,7 +33,8 @@ ERRORS = {
     "3X on excitation line": "The excitation is on three times the running speed: runout cannot be separated from it. "
     "Excite beside it.",
     "accelerometers-contradict-cells": "The housing's acceleration is not what its springs, the load cells, make of "
-    "their force: accelerometers are exchanged, dead, or have the wrong sign. Check channels, axes and polarity.",
+    "their force, or, where it floats, not what the probes show: accelerometers are exchanged, dead, late, or have the "
+    "wrong sign. Check channels, axes, polarity and delays.",
     "cells-and-accelerometers-out-of-phase": "Between the load cells and the housing on them there is a lag: a device "
     "that records late, or a filter. Damping is wrong by stiffness times that lag. State delay or filter in the "
     "manifest, or filter all channels alike.",

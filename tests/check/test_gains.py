@@ -13,18 +13,18 @@ from rigdata.virtual_rig import Fault, Noise
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.gain_evidence import (
-    Difference,
-    Evidence,
-    PointReadings,
-    common_stiffness,
-    dynamic_difference,
-    static_difference,
-)
 from tpjb_ident.check.lines import excitation_line
 from tpjb_ident.check.observation import observe
-from tpjb_ident.check.one_gain import gain_of_run, wrong_gains
-from tpjb_ident.check.run_gains import probe_centres
+from tpjb_ident.check.point_readings import PointReadings, probe_centres
+from tpjb_ident.check.run_gain import (
+    Difference,
+    Evidence,
+    dynamic_difference,
+    evidence,
+    gain_of_run,
+    static_difference,
+    wrong_gains,
+)
 from tpjb_ident.phasors.run_phasors import run_phasors
 
 OMEGA = 2 * math.pi * 25.0
@@ -75,7 +75,7 @@ def spoilt(readings: PointReadings, run: int, channel: int, gain: float, zero: f
 
 def differences(readings, one, others):
     """How a run differs from the others, dynamically and statically."""
-    stiffness = common_stiffness(readings, others)
+    stiffness = readings.stiffness(others)
     assert stiffness is not None
     return tuple(f(readings, one, others, stiffness) for f in (dynamic_difference, static_difference))
 
@@ -178,13 +178,13 @@ def test_one_direction_of_excitation_tells_nothing():
     readings = point()
     same = {n: np.tile(getattr(readings, n)[:1], (6, 1)) for n in ("probes", "cells", "inertia")}
     alike = replace(readings, **same)
-    assert common_stiffness(alike, range(6)) is None
+    assert alike.stiffness(range(6)) is None
     assert gain_of_run(spoilt(alike, 2, 3, 1.05), 2, [0, 1, 3, 4, 5]) is None
     assert wrong_gains(spoilt(alike, 2, 3, 1.05)) == []
 
 
 def test_stiffness_of_the_others_is_theirs():
-    assert common_stiffness(spoilt(point(), 2, 0, 2.0), [0, 1, 3, 4, 5]) == pytest.approx(H, rel=1e-9)
+    assert spoilt(point(), 2, 0, 2.0).stiffness([0, 1, 3, 4, 5]) == pytest.approx(H, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -197,51 +197,27 @@ def test_estimates_scatter_as_their_standard_errors_say(seed):
     assert 0.05 < np.sqrt(np.mean(off**2)) < 1.6
 
 
-def test_noise_that_the_records_tell_makes_a_run_surer():
-    readings = spoilt(point(scatter=1e-3, seed=4), 2, 0, 1.03, CENTRE[0])
-    others = [0, 1, 3, 4, 5]
-    # as `point` makes it: 1 nm on X and Y, 0.3 N on every cell
-    noise = np.tile([1e-9, 1e-9, 0.3, 0.3], (6, 1))
-    alone, _ = differences(readings, 2, others)
-    told, _ = differences(replace(readings, noise=noise), 2, others)
-    assert alone is not None
-    assert told is not None
-    assert (alone.spare, told.spare) == (12, 12 + 50)
-    assert np.all(np.diag(told.noise) >= np.diag(alone.noise))
-    assert np.diag(told.noise) == pytest.approx(np.diag(alone.noise), rel=1.5)
-    # runs that differ by much more than their noise count by themselves, and so does noise that is not known
-    for unlike in (0.1 * noise, np.nan * noise):
-        same, _ = differences(replace(readings, noise=unlike), 2, others)
-        assert same is not None
-        assert same.spare == 12
-        assert np.array_equal(same.noise, alone.noise)
-
-
 def test_evidence_in_exact_limits():
-    one = Evidence(0.02, 1e4, 0.0)
-    assert one.freedom == math.inf
-    assert one.chance() == pytest.approx(math.erfc(2 / math.sqrt(2)), rel=1e-4)
-    both = one.joined(Evidence(0.04, 1e4, 0.0))
-    assert (both.part, both.information) == (pytest.approx(0.03), 2e4)
-    assert one.joined(Evidence(0.0, 0.0, 0.0)) == one
-    assert Evidence(0.0, 0.0, 0.0).chance() == 1.0
+    assert Evidence(0.02, 1e4, 0.0).chance() == pytest.approx(math.erfc(2 / math.sqrt(2)), rel=1e-4)
+    assert Evidence().chance() == 1.0
     # all of the variance from nine degrees of freedom
-    estimated = Evidence(0.02, 1e4, 1e-8 / 9)
-    assert estimated.freedom == pytest.approx(9.0)
-    assert estimated.chance() == pytest.approx(0.0765, abs=1e-3)  # Student's t of 9, two-sided at 2
-    # two equal ones: the freedom adds up
-    assert estimated.joined(estimated).freedom == pytest.approx(18.0)
+    assert Evidence(0.02, 1e4, 1e-8 / 9).chance() == pytest.approx(0.0765, abs=1e-3)  # Student's t of 9 at 2
 
 
 def test_a_difference_is_weighted_by_its_covariance():
     made = Difference(np.array([1.0, 3.0]), np.diag([1.0, 3.0]), np.zeros((2, 2)), 8)
-    found = made.evidence(np.array([1.0, 1.0]))
+    found = evidence([made], [np.array([1.0, 1.0])])
     assert found.part == pytest.approx(1.5)
     assert found.information == pytest.approx(4 / 3)
-    assert found.freedom == pytest.approx(8.0)
+    assert found.information**-2 / found.doubt == pytest.approx(8.0)
     assert made.misfit(np.array([1.0, 1.0]), 1.0) == pytest.approx(4 / 3 / 2)
-    assert made.widened(1, 3.0).evidence(np.array([0.0, 1.0])).information == pytest.approx(1 / 12)
-    assert made.evidence(np.zeros(2)) == Evidence(0.0, 0.0, 0.0)
+    assert evidence([made], [np.zeros(2)]) == Evidence()
+    # two independent ones: the mean by information, and the freedom adds up
+    second = replace(made, rest=made.rest + 2)
+    both = evidence([made, second], [np.ones(2), np.ones(2)])
+    assert both.part == pytest.approx(2.5)
+    assert both.information == pytest.approx(8 / 3)
+    assert both.information**-2 / both.doubt == pytest.approx(16.0)
 
 
 def test_a_speed_that_misses_its_set_point_leaks_nothing_into_the_line_wanted():

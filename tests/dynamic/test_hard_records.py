@@ -241,3 +241,17 @@ def test_lines_that_drift_make_no_channel_slower():
         size = TURNING[name[0]]
         data[name] = data[name] + size * (np.cos(2 * np.pi * turns) + 0.5 * np.cos(4 * np.pi * turns))
     assert "slower-channels" not in phasors_of(data).conditions
+
+
+@pytest.mark.parametrize("ppm", [0.0, 300.0, -300.0])
+def test_a_device_whose_clock_runs_off_is_fitted_at_its_own_frequencies(ppm):
+    """2X stands 1 Hz beside the drive, and would take up what lines of a wrong frequency leave in the windows."""
+    rng, off, short = np.random.default_rng(3), 1 + 1e-6 * ppm, TIME[:-10]
+    data = {n: reading(n, TIME if n[0] == "D" else off * short, rng, 45.0, shaft=44.0) for n in ALL}
+    point = replace(POINT, excitation=2 * np.pi * 45.0)
+    phasors = run_phasors(run_of(ApartReader(data, None, RATE), channels(QUANTITIES), point), 30.0)
+    middle = phasors.start + 0.5 * phasors.length
+    for k, channel in enumerate(phasors.channels):
+        fast = 1.0 if channel.name[0] == "D" else off
+        true = Z[channel.name] * np.exp(2j * np.pi * (45.0 * fast - phasors.lines.frequencies[0]) * middle)
+        assert abs(np.nanmean(phasors.z[:, 0, k] / true) - 1) < 3e-3

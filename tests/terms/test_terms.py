@@ -13,6 +13,7 @@ from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.temperature import Temperature
 
 SEEDS = range(3)
+_WRONG, _LATE = "accelerometers-contradict-cells", "cells-and-accelerometers-out-of-phase"
 
 
 def stated(**by_sensor):
@@ -274,3 +275,17 @@ def test_the_housing_s_mass_is_considered():
     assert not of(solution, "mass").estimated.any()
     assert held(solution, truth)
     assert solution.shares["mass"][0, 0, 0] > 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    ("late", "share", "named"),
+    [(0.0, 1.0, ()), (0.0, 0.95, ()), (2e-4, 1.0, (_LATE,)), (2e-3, 1.0, (_LATE,)), (0.0, -1.0, (_WRONG,))],
+)
+def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, share, named, seed):
+    rig, blocks, truth = made(Case(mount="floating", hertz=(60.0, 80.0)), seed)
+    z = blocks.z.copy()
+    z[:, rig.of("acceleration")] *= share * np.exp(-1j * blocks.omega * late)[:, None]
+    solution = solved(rig, replace(blocks, z=z), truth)
+    (term,) = [t for t in solution.terms if t.name == "housing"]
+    assert term.conditions(of(solution, "housing")) == named

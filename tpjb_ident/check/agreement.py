@@ -6,7 +6,7 @@ scatter about it themselves, so that a quiet rig shows a gain that is some per c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -16,9 +16,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from tpjb_ident.check.findings import RUN_GAIN
-from tpjb_ident.check.gain_evidence import PointReadings, leverage, stiffness_of
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.one_gain import gain_of_run
+from tpjb_ident.check.point_readings import PointReadings, leverage, stiffness_of
+from tpjb_ident.check.run_gain import gain_of_run, wrong_gains
 from tpjb_ident.check.set_points import excited, oil_force, to_plane
 from tpjb_ident.check.wiring import repairs
 
@@ -121,6 +121,15 @@ def check_agreement(
             hint = f"; as if {group[0].names[gain.channels[0]]} read {abs(gain.gain - 1):.0%} too {direction}"
         _tell(group[i], stiffness if common is None else common, hint)
     return outliers
+
+
+def check_gains(group: Sequence[RunResponse], known_outliers: Collection[int], readings: PointReadings) -> None:
+    """Name runs in which one channel has a gain of its own."""
+    cure = "Check this channel's amplifier, range and cable in this run; leave it out or repeat it"
+    for gain in wrong_gains(readings, known_outliers):
+        names = group[0].names
+        name, report = names[gain.channels[0]], group[gain.run].seen.report
+        report.say(f"{RUN_GAIN}{name}", "warning", f"channel {name}", gain.words(names), cure)
 
 
 def _apart(group: Sequence[RunResponse], known: set[int]) -> set[int]:

@@ -80,6 +80,7 @@ class Verdicts:
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
     gains: dict[str, float] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
+    swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 
 
 def reach(reports: Sequence[Reporter]) -> None:

@@ -16,9 +16,16 @@ from numpy.typing import NDArray
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from tpjb_ident.check.agreement import RunResponse, check_agreement, misfit_of, response_of, robust_stiffness
+from tpjb_ident.check.agreement import (
+    RunResponse,
+    check_agreement,
+    check_gains,
+    misfit_of,
+    response_of,
+    robust_stiffness,
+)
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.run_gains import check_gains, point_readings, probe_centres
+from tpjb_ident.check.point_readings import point_readings, probe_centres
 from tpjb_ident.check.set_points import excited, plane_of, to_plane
 from tpjb_ident.check.wiring import name_fault
 from tpjb_ident.phasors.shaft import shaft_order
@@ -46,7 +53,8 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
         if stiffness is None:
             continue
         _check_signs(group, stiffness)
-        readings = point_readings(group, centres)
+        probes, force = np.stack([a.readings for a in group]), np.stack([a.force for a in group])
+        readings = point_readings([a.seen for a in group], probes, force, centres)
         outliers = check_agreement(group, stiffness, readings)
         if readings is not None:
             check_gains(group, outliers, readings)

@@ -47,7 +47,7 @@ def check_signal(
     """Judge one channel of one run; `alive` are those of the run that show something."""
     spare = is_spare(channel, alive)
     grave: Severity = "error" if needed(report.run, channel) and not spare else "warning"
-    alone = not any(c.quantity == channel.quantity and c.name != channel.name for c in alive)
+    alone = all(c.quantity != channel.quantity or c.name == channel.name for c in alive)
     place = f"channel {channel.name}"
     if statistics.values == 0:
         text = "holds no values at all"

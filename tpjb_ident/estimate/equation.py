@@ -36,7 +36,7 @@ class State:
     slope: ComplexArray  #: (P, 2, 2), N/m: dH / d ln W
     slope_known: np.ndarray  #: (P,) bool
     compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing
-    floating: float  #: kappa
+    floating: complex  #: kappa
     factor: ComplexArray  #: (n, m): T
     shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
     u: ComplexArray  #: (n, 4): true motion

@@ -246,7 +246,7 @@ class Solver:
             part = self.part[term.name]
             own = factors[part]
             shares[term.name] = np.einsum("qpa,qpb->pab", own, own)
-            fitted[term.name] = Fitted(self.theta[part], last.deviation[part], last.estimated[part])
+            fitted[term.name] = Fitted(self.theta[part], last.deviation[part], last.estimated[part], self.housing_noise)
         weight = self.scatter.weights
         chi_square = totals(self.blocks.point, weight * fit.chi_square, points)
         counted = totals(self.blocks.point, fit.rows * (weight > 0.05), points)

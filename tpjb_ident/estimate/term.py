@@ -36,6 +36,7 @@ class Fitted:
     value: FloatArray
     deviation: FloatArray
     estimated: np.ndarray  #: bool: else the records tell too little, and the prior stands
+    unexplained: float = 0.0  #: scatter of the housing's equations over its acceleration
 
 
 class Term:

@@ -12,9 +12,9 @@ from rigdata.vector import zero_uncertainty
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.band_point import BandSettings, is_broadband
 from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
-from tpjb_ident.dynamic.results.gains import swept_probes, with_probe_doubts
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
+from tpjb_ident.dynamic.results.quality import with_probe_doubts
 from tpjb_ident.dynamic.runs.baseline import measured_baseline
 from tpjb_ident.dynamic.runs.checked_runs import check_finished
 from tpjb_ident.dynamic.runs.excluded_runs import named_runs
@@ -143,7 +143,6 @@ def assemble(
     digests = finished.digests
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
     sources = [replace(source, baseline=baseline) for source in point_sources(finished)]
-    sweeps = swept_probes(campaign)
     report("estimating", 0, len(sources))
     solved = solve_campaign(campaign, sources, digests, workers, settings.correct)
     temperatures = {digest.run: digest.temperatures for digest in digests}
@@ -155,7 +154,7 @@ def assemble(
         report("estimating", len(points), len(sources))
     excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
     conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
-    named = with_probe_doubts(sweeps, named_at_points(points, excluded, several), settings.clearance)
+    named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
     changes, names = systematic_changes(solved)
     remarks = unstated(campaign) + conditions
     return Identification(campaign.id, settings.method, named, changes, remarks, calibration_names=names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,9 +34,14 @@ MAX_JITTER = 0.02
 
 
 def extract(
-    run: Run, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: ShaftCourse | None = None
+    run: Run,
+    housing_mass: float,
+    settings: PhasorSettings,
+    lines: LineSet,
+    follow: ShaftCourse | None = None,
+    clocks: Mapping[str, float] | None = None,
 ) -> RunPhasors:
-    """Fit all windows of a run."""
+    """Fit all windows of a run; `clocks`: by how much lines turn faster by a device's clock, relative."""
     readers = device_readers(run)
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     seconds = length / run.sample_rate
@@ -49,8 +55,12 @@ def extract(
         for k, reader in enumerate(readers):
             if k and (reader.rate, reader.length) != (readers[0].rate, readers[0].length):
                 firsts, length = reader.first_samples(start), int(seconds * reader.rate + 1e-6)
-            work = _DeviceFit(reader, length, firsts, lines, speeds)
+            fast = (clocks or {}).get(reader.device.name, 0.0)
+            work = _DeviceFit(reader, length, firsts, lines.faster(fast), speeds)
             fit, times, turning = work.all_windows(run.point.shaft_speed_hz)
+            if fast:  # phases count by the lines' common frequencies
+                ahead = np.multiply.outer(times + 0.5 * seconds, fast * lines.frequencies)
+                fit = replace(fit, z=fit.z * np.exp(2j * np.pi * ahead)[:, :, None])
             start = times if not k else start
             tach = np.where(np.isfinite(tach), tach, turning)
             fits.append(fit)

@@ -25,6 +25,8 @@ MAX_SLIP = 0.01
 #: Phase advance within a window [cycles] up to which a line's frequency can be put right in the phasors themselves:
 #: what the fit has lost of its amplitude (4e-5) is the same for all channels.
 MAX_RETUNED = 0.005
+#: Phase [cycles] by which a device's clock may run ahead within one window: lines beside the drive would take it up.
+MAX_CLOCK_SLIP = 5e-4
 #: Phase [cycles] by which the shaft may run ahead or behind within one window.
 MAX_WINDOW_SLIP = 0.005
 
@@ -132,6 +134,20 @@ def _line_slip(result: RunPhasors, line: int, rate: float, places: list[int] | N
     # a channel without noise must not stand for all
     least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
     return frequency_slip(z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny), result.start, 1.0)
+
+
+def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
+    """How much faster the clocks of several devices let the excitation turn than the lines have it, relative."""
+    devices = tuple(dict.fromkeys(result.device))
+    if len(devices) < 2:
+        return {}
+    frequency = result.lines.excitation[0].frequency
+    rates = {}
+    for device in devices:
+        places = [k for k, name in enumerate(result.device) if name == device]
+        rates[device] = _line_slip(result, 0, rate, places) / frequency
+    ahead = max(abs(value) for value in rates.values()) * frequency * result.length
+    return rates if ahead > MAX_CLOCK_SLIP else {}
 
 
 def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> FloatArray:

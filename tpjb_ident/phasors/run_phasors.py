@@ -6,6 +6,7 @@ looked for in its beginning, and small errors of their frequencies put right in 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from tpjb_ident.phasors.compensation import compensated, refuse_clipped
 from tpjb_ident.phasors.extra_lines import lines_beside, unexpected_lines
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.filled import filled_channels, slower_condition
-from tpjb_ident.phasors.frequency import DRIFT, retuned, tuned
+from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.near_lines import near_line
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
@@ -63,12 +64,13 @@ def _continued(run: Run, inspection: _Inspection, settings: PhasorSettings) -> R
     first, mass = inspection.result, inspection.result.housing_mass
     lines = first.lines
     conditions = tuple(c for c in first.conditions if c not in lines.conditions and c != DRIFT)
-    result = _stretch(run, mass, settings, lines, None)
+    clocks = inspection.clocks
+    result = _stretch(run, mass, settings, lines, None, clocks)
     better = tuned(run, result, inspection.driven, lines.speed, settings)
     if better is not None:
         conditions = merged(conditions, better.conditions)
         quick = retuned(result, better.lines) if better.follow is None else None
-        result = quick or _stretch(run, mass, settings, better.lines, better.follow)
+        result = quick or _stretch(run, mass, settings, better.lines, better.follow, clocks)
     # the noise of a phasor of the whole record is less than that of its beginning
     share = np.sqrt(inspection.run.length / run.length)
     residual = tuple(share * bins for bins in first.residual)
@@ -77,10 +79,15 @@ def _continued(run: Run, inspection: _Inspection, settings: PhasorSettings) -> R
 
 
 def _stretch(
-    run: Run, housing_mass: float, settings: PhasorSettings, lines: LineSet, follow: ShaftCourse | None
+    run: Run,
+    housing_mass: float,
+    settings: PhasorSettings,
+    lines: LineSet,
+    follow: ShaftCourse | None,
+    clocks: Mapping[str, float] | None = None,
 ) -> RunPhasors:
     """Windows of the run's longest stretch of one excitation."""
-    return longest_stretch(extract(run, housing_mass, settings, lines, follow), run.sample_rate)
+    return longest_stretch(extract(run, housing_mass, settings, lines, follow, clocks), run.sample_rate)
 
 
 class _Inspection:
@@ -88,6 +95,7 @@ class _Inspection:
 
     result: RunPhasors
     records: tuple[WholeRecord, ...]
+    clocks: Mapping[str, float] | None = None
 
     def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
         self.run, self.mass, self.settings = run, housing_mass, settings
@@ -101,6 +109,9 @@ class _Inspection:
         if better is not None:
             self.conditions += better.conditions
             self._fit(better.lines, better.follow)
+        self.clocks = device_rates(self.result, run.sample_rate)
+        if self.clocks:
+            self._fit(self.result.lines, self.follow)
         if settings.find_lines:
             self._add_near()
         channels, lines = len(self.result.channels), self.result.lines
@@ -114,7 +125,7 @@ class _Inspection:
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
         self.follow: ShaftCourse | None = follow
-        self.result = _stretch(self.run, self.mass, self.settings, lines, follow)
+        self.result = _stretch(self.run, self.mass, self.settings, lines, follow, self.clocks)
         self.records = whole_records(self.run, self.result)
 
     def _add_unexpected(self, speed: float) -> None:

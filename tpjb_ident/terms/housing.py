@@ -20,12 +20,18 @@ _CELLS = (2.0, 20.0, 5.0, 0.3)
 _SOFT = 3.3
 #: Nothing is known of a housing that neither manifest nor accelerometer tells of: it stands still, or it floats.
 _UNKNOWN = 1.0
+#: Motion of a floating stator's shaft over that of the stator, and lag of the accelerometers [rad], one deviation.
+_SHAFT = 0.1
+#: Difference of the two from which one of them is wrong.
+_OTHERWISE = 0.5
 #: A sign is beyond doubt from so many standard errors on.
 _CLEAR = 5.0
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
 _LOSS = 0.04
 #: No housing stands on springs as stiff as this [nm/N]: a steel bar of 1 m^2 and 2 m has it.
 _STIFFEST = 0.01
+#: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05.
+_UNEXPLAINED = 0.2
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
 HARMLESS = 2e-3
 
@@ -51,6 +57,8 @@ class Housing(Term):
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
+        elif len(rig.of("acceleration")) > 1:
+            self.parameters = (Parameter("motion of the shaft", "1", _SHAFT), Parameter("lag", "rad", _SHAFT))
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Compliance or kappa of the state."""
@@ -58,15 +66,18 @@ class Housing(Term):
             xx, yy, xy, loss = (float(v) for v in value)
             state.compliance = np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
         elif self.rig.mount == "unknown":
-            state.floating = float(value[0])
+            state.floating = complex(value[0])
+        else:
+            state.floating = complex(1 + value[0], -value[1])
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows."""
         columns = self.no_columns(blocks)
         m, square = blocks.z.shape[1], blocks.omega**2
         d, a = state.u[:, :2], state.u[:, 2:]
-        if self.rig.mount == "unknown":
+        if self.rig.mount != "cells":
             columns[:, m:, 0] = -square[:, None] * d
+            columns[:, m:, 1:] = -1j * columns[:, m:, :1]
             return columns
         force = np.einsum("nij,nj->ni", state.at_run(blocks), d) - self.rig.mass * a
         loss = complex(1 - 1j * state.parameters[self.name][3])
@@ -78,8 +89,18 @@ class Housing(Term):
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
-        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+        if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
+        share = f"inertia is {100 * self._inertia:.2g} % of the force"
+        if fitted.unexplained > _UNEXPLAINED and self._inertia > HARMLESS:
+            moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
+            text = f"{min(100 * fitted.unexplained, 100):.0f} % of the housing's motion is not what {moves}; {share}"
+            return (Condition("accelerometers-contradict-cells", text),)
+        if self.rig.mount != "cells" and abs(fitted.value[0]) > _OTHERWISE:
+            text = f"they show {1 + fitted.value[0]:.2g} times the motion that the probes show; {share}"
+            return (Condition("accelerometers-contradict-cells", text),)
+        if self.rig.mount != "cells":
+            return _out_of_step(fitted.value[1], fitted.deviation[1], "probes", self._omega)
         (xx, yy, xy, loss), error = fitted.value, fitted.deviation
         faults = []
         if min(xx + _CLEAR * error[0], yy + _CLEAR * error[1]) < 0:
@@ -90,21 +111,13 @@ class Housing(Term):
         if silent:
             faults.append(f"they show nothing along {' and '.join(silent)}: are they connected?")
         if faults:
-            text = f"{'; '.join(faults)}; inertia is {100 * self._inertia:.2g} % of the force"
+            text = f"{'; '.join(faults)}; {share}"
             springs = max((abs(c) for axis, c in zip("XY", (xx, yy)) if axis not in silent), default=_SOFT)
             missing = self.rig.mass * self._omega**2 * springs * _NANOMETRE if silent else 0.0
             grave = max(self._inertia, missing) > HARMLESS
             name = "accelerometers-contradict-cells" if grave else "accelerometers-doubtful"
             return (Condition(name, text),)
-        if abs(loss) < _LOSS + 3 * error[3]:
-            return ()
-        late = "cells" if loss < 0 else "accelerometers"
-        lag = 1e3 * abs(loss) / self._omega
-        text = (
-            f"{np.degrees(abs(loss)):.1f} deg, as if the {late} were {lag:.2g} ms late or behind a filter; between "
-            "springs and their housing there is none. State `delay` or `filter` of the channels"
-        )
-        return (Condition("cells-and-accelerometers-out-of-phase", text),)
+        return _out_of_step(loss, error[3], "cells", self._omega)
 
     def lag_of_cells(self, fitted: Fitted) -> float:
         """By how much the cells come late [s]: a spring's loss is positive, late cells make it negative."""
@@ -122,6 +135,18 @@ class Housing(Term):
             for k, p in enumerate(self.parameters)
             if fitted.estimated[k]
         )
+
+
+def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tuple[Condition, ...]:
+    """Accelerometers against the sensors that tell the housing's motion: `phase` [rad] by which they lag."""
+    if abs(phase) < _LOSS + 3 * error:
+        return ()
+    late = sensors if phase < 0 else "accelerometers"
+    text = (
+        f"{np.degrees(abs(phase)):.1f} deg, as if the {late} were {1e3 * abs(phase) / omega:.2g} ms late or behind a "
+        f"filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the channels"
+    )
+    return (Condition("cells-and-accelerometers-out-of-phase", text),)
 
 
 def _inertia_share(rig: Rig, blocks: Blocks) -> float:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.conditions import Condition
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.housing_balance import HARMLESS, SOFT
-from tpjb_ident.dynamic.results.point_result import WindowVerdict
+from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
 from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Share of the windows without phasors beyond which what is left may not stand for the record.
 _MAX_LOST = 0.6
@@ -18,6 +22,12 @@ _MAX_LOST = 0.6
 _MAX_DISAGREEMENT = 0.06
 #: What a few runs show of a force of random phase may be so many times its size.
 _KNOWN_SCATTERS = 1.5
+#: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
+_TRAVEL = (0.5, 2.5)
+#: Distance between two mean positions over the clearance, at most.
+_APART = 3.0
+#: Clearance times stiffness over load, at least: pivots that give let the shaft move by more than the clearance.
+_LEAST_STIFF = 0.5
 
 
 def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
@@ -99,17 +109,26 @@ def _inertia_left(mass: float, omega: float) -> Condition:
 
 
 def _missing(data: PointData) -> list[Condition]:
-    """Windows without phasors, pointed out when they are many or a whole run's."""
+    """Windows of the excitation without phasors, pointed out when they are many or a whole run's."""
     complete = data.whole
+    driven = np.concatenate([_in_stretch(run) for run in data.runs])
     empty = [run.run for i, run in enumerate(data.runs) if not complete[data.run_index == i].any()]
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
+    complete = complete[driven]
     if complete.mean() < 1 - _MAX_LOST:
         text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
         return [Condition("most-windows-lost", text)]
     if complete.mean() < 0.9:
         return [Condition("windows-missing", f"{int((~complete).sum())} of {len(complete)} windows gave no phasors")]
     return []
+
+
+def _in_stretch(run: RunPhasors) -> BoolArray:
+    """Windows within the part of the record that has the run's excitation (n,)."""
+    if run.span is None:
+        return np.ones(len(run.start), dtype=bool)
+    return (run.start >= run.span[0] - 1e-9) & (run.start + run.length <= run.span[1] + 1e-9)
 
 
 def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
@@ -172,3 +191,81 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, know
         return None
     text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
     return Condition("runs-disagree", text)
+
+
+def with_probe_doubts(
+    swept: Mapping[tuple[str, str], float], points: Sequence[PointResult], clearance: float | None
+) -> tuple[PointResult, ...]:
+    """The points, each with the doubt that the probes' readings are no lengths in this bearing, where there is one.
+
+    Coefficients alone never show a wrong scale of the probes: stiffness and damping shrink alike. The drawing's
+    clearance is a length that they can be held against, in three ways:
+
+    - in a clearance sweep a probe travels once through the clearance, and little more (`swept`: half of it by run and
+      probe [m]);
+    - the shaft does not leave the clearance between one operating point and another;
+    - a film stiffens as it is loaded, so that the load W moved the shaft by more than W / K, which the clearance must
+      hold.
+    """
+    if clearance is None or not clearance > 0:
+        return tuple(points)
+    sentences = [*_sweeps(swept, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
+    if not sentences:
+        return tuple(points)
+    cure = "is the probes' sensitivity right in the manifest?"
+    doubt = Condition(
+        "probes-contradict-clearance", f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
+    )
+    return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
+
+
+def _sweeps(swept: Mapping[tuple[str, str], float], clearance: float) -> list[str]:
+    table: dict[str, str] = {}
+    for (run, name), half in swept.items():
+        if half <= _TRAVEL[0] * clearance or half >= _TRAVEL[1] * clearance:
+            table[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
+    return list(table.values())
+
+
+def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
+    places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
+    if len(places) < 2:
+        return []
+    distance = float(np.hypot(*np.ptp(places, axis=0)))
+    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > _APART * clearance else []
+
+
+def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
+    soft_points = []
+    for load, direction, stiffness in _static_stiffness(points):
+        along = np.array([np.cos(direction), np.sin(direction)])
+        value = float(along @ stiffness @ along)
+        if load > 0 and 0 < value < _LEAST_STIFF * load / clearance:
+            soft_points.append((value * clearance / load, load, value))
+    if not soft_points:
+        return []
+    _, load, value = min(soft_points)
+    return [
+        f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m would move the shaft by more than "
+        f"{1e6 * load / value:.3g} um"
+    ]
+
+
+def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float, FloatArray]]:
+    """Load, direction and stiffness (2, 2) at rest: Re h = K - omega^2 M, extrapolated over the frequencies of a load.
+
+    With a single frequency Re h itself stands in.
+    """
+    groups: dict[tuple[object, ...], list[PointResult]] = {}
+    for p in points:
+        if np.isfinite(p.stiffness.h).all():
+            groups.setdefault(p.point.static_key, []).append(p)
+    result = []
+    for members in groups.values():
+        load, direction = members[0].point.static_load, members[0].point.static_load_direction
+        square = np.array([p.stiffness.omega**2 for p in members])
+        k = np.array([p.stiffness.k.ravel() for p in members])
+        several = len(members) > 1 and np.ptp(square) > 0
+        at_rest = np.polynomial.polynomial.polyfit(square, k, 1)[0] if several else k[0]
+        result.append((load, direction, at_rest.reshape(2, 2)))
+    return result

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem
 from tpjb_ident.check.campaign import judged
@@ -35,6 +37,9 @@ def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -
     reports = [observation.report for observation in judged(campaign, [*observations, *static])]
     reach(reports)
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
+    for observation in static:
+        for i in observation.pick("displacement") if observation.run.kind == "clearance" else ():
+            result.swept[observation.run.id, observation.channels[i].name] = float(np.ptp(observation.spread[:, i])) / 2
     # without accelerometers the inertia stays in the force: that is told, and no reason to refuse
     optional = {f"channel {c.name}" for c in campaign.channels.values() if c.quantity == "acceleration"}
     for run, problems in result.shared.items():
