@@ -60,8 +60,13 @@ def test_a_campaign_can_be_browsed_and_the_model_moved(chromium):
         tab.size(1280)
         tab.open(address)
         tab.until(IDLE, 90)
+        assert tab.js(model("tabs", "tabs.map((t) => t.title)"))[:2] == ["verdict", "records"]
+        tab.until(f"{model('tabs', 'tabs.length')} === 4", 120)
         assert tab.js(model("tabs", "tabs.map((t) => t.title)")) == [
-            "records", "points and windows", "prediction and measurement"]  # fmt: skip
+            "verdict", "records", "points and windows", "prediction and measurement"]  # fmt: skip
+        verdict = tab.js(model("verdict", "text"))
+        for words in ("7 operating points, all to be trusted", "22 Hz (1320 rpm)", "66.00 ± 0.55", "measured pivots"):
+            assert words in verdict
         before = tab.js(model("run-facts", "text"))
         assert "dynamic, 2.5 kN" in before
         tab.js(model("run", "value = 'p-1-up'"))
@@ -84,7 +89,8 @@ def test_a_campaign_can_be_browsed_and_the_model_moved(chromium):
         assert "3 measured points" in curves
         assert "<title>rigid pivots: kyy" in curves
         tab.prefer("dark")
-        tab.js(model("tabs", "active = 2"))
+        assert "invert(1)" in tab.js("getComputedStyle(document.body).filter")
+        tab.js(model("tabs", "active = 3"))
         tab.until(f"{DEEP} !== null", 30)
         assert tab.js(f"getComputedStyle({DEEP}).color") == "rgb(232, 234, 237)"
         assert [r for r in tab.requested if not r.startswith((address, "data:"))] == []

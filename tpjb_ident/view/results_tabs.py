@@ -10,15 +10,19 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import measured_table
+from tpjb_ident.report.drawing.colours import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
-from tpjb_ident.report.page import Section, render_section
+from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
+from tpjb_ident.report.page import Section, Table, render_section
 from tpjb_ident.report.plots.coefficient import coefficient
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
 from tpjb_ident.report.plots.residual_map import residual_map
 from tpjb_ident.report.plots.window_weights import window_weights
-from tpjb_ident.schema import COEFFICIENT_COLUMNS
+from tpjb_ident.rounding import counted, percent
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +35,41 @@ if TYPE_CHECKING:
 _LINES = np.arange(5.0, 85.0, 5.0)
 #: Points are shown at the slider's load where theirs differs by no more than this share.
 _NEAR = 0.02
+
+
+def verdict_tab(session: Session) -> Any:
+    """Build the first tab: what was tested, how far to trust it, K and C at one point, predictions against it."""
+    identification, campaign = session.identification, session.campaign
+    assert identification is not None
+    assert campaign is not None
+    points = identification.points
+    facts = tested_facts(campaign, session.bearing, points)
+    notes = [f"{name}: {value}" for name, value in facts.items()]
+    notes.append(flags_line([("", p.quality) for p in points], len(points)))
+    values = values_table(points)
+    tables = [] if values is None else [values]
+    if session.bearing is not None and points:
+        tables.append(_deviation_table(_compared(session, [p.point for p in points], identification.to_frame())))
+    bad = sum(bool(untrusted(p.quality)) for p in points)
+    title = f"{counted(len(points), 'operating point')}, {f'{bad} NOT to be trusted' if bad else 'all to be trusted'}"
+    return _text("verdict", render_section(Section(title, notes, tables=tables)))
+
+
+def _deviation_table(table: pd.DataFrame) -> Table:
+    """Predicted / measured - 1 of every pivot model: median and largest."""
+    rows = []
+    for pivots, group in table.groupby("pivots", sort=False):
+        cells = []
+        for name in DIRECT:
+            column = coefficient_column(name)
+            off = (group[f"{column}_predicted"] / group[column] - 1.0).dropna().to_numpy(float)
+            if not len(off):
+                cells.append("–")
+                continue
+            worst = float(off[np.argmax(np.abs(off))])
+            cells.append(f"{percent(float(np.median(off)))} ({percent(worst)})")
+        rows.append([VARIANT_LABEL.get(str(pivots), str(pivots)), *cells])
+    return Table("Predicted / measured - 1: median (largest)", ["", *DIRECT], rows)
 
 
 def points_tab(identification: Identification) -> Any:
@@ -54,7 +93,9 @@ def _text(name: str, html: str = "") -> Any:
     from bokeh.models import Div
 
     wide = ".bk-clearfix { display: block; width: 100%; }"  # otherwise as narrow as the text
-    return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide])
+    # the page is inverted as a whole; sections of the report know dark screens themselves
+    back = "@media (prefers-color-scheme: dark) { :host { filter: invert(1) hue-rotate(180deg); } }"
+    return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide, back])
 
 
 def _label(p: PointResult) -> str:

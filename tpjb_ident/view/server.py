@@ -14,8 +14,10 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any
 
+from rigdata.problem import RigError
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.tables import printable
 
@@ -30,7 +32,9 @@ _LOOPBACK = "127.0.0.1"
 #: Without the first a phone shows the page as wide as a desk's and small; no link tells the path; no icon is asked for.
 _META = (
     '{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">'
-    '<meta name="referrer" content="no-referrer"><link rel="icon" href="data:,">{% endblock %}'
+    '<meta name="referrer" content="no-referrer"><link rel="icon" href="data:,">'
+    "<style>@media (prefers-color-scheme: dark) { html { background: #000; } "
+    "body { background: #fff; filter: invert(1) hue-rotate(180deg); } }</style>{% endblock %}"
 )
 #: Bytes of the random path.
 _TOKEN = 24
@@ -52,6 +56,7 @@ class Session:
     bearing: Any = None
     #: Pivot models by name, as `tpjb_ident.compare.predictions.ModelSettings` takes them.
     pivots: Mapping[str, Any] = field(default_factory=dict)
+    lock: Any = field(default_factory=Lock)  #: one page identifies, the others wait for it
 
     @functools.cached_property
     def identification(self) -> Identification | None:
@@ -124,22 +129,44 @@ def build(document: Any, session: Session) -> None:
 
     document.template = _META
     document.title = f"tpjb: {printable(session.name)}"
-    panels = []
+    panels, verdict = [], Div(text="Identifying; the records can be browsed meanwhile.")
+    if session.identify is not None:
+        panels.append(TabPanel(child=verdict, title="verdict"))
     if session.campaign is not None and session.campaign.runs:
         from tpjb_ident.view.records_tab import records_tab
 
         panels.append(TabPanel(child=records_tab(session.campaign), title="records"))
-    if session.identification is not None:
-        from tpjb_ident.view.results_tabs import model_tab, points_tab
-
-        panels.append(TabPanel(child=points_tab(session.identification), title="points and windows"))
-        if session.bearing is not None:
-            panels.append(TabPanel(child=model_tab(session), title="prediction and measurement"))
     if session.tables:
         panels.append(TabPanel(child=_tables_tab(session.tables), title="tables"))
+    tabs = Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width")
     head = Div(text=f"<h1 style='font-size:1.3rem;margin:.3rem 0'>{html.escape(printable(session.name))}</h1>")
-    document.add_root(column(head, Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width"),
-                             sizing_mode="stretch_width"))  # fmt: skip
+    document.add_root(column(head, tabs, sizing_mode="stretch_width"))
+    if session.identify is not None:
+        # beside the server's loop: the page is there at once
+        Thread(target=_add_results, args=(document, session, tabs), daemon=True).start()
+
+
+def _add_results(document: Any, session: Session, tabs: Any) -> None:
+    """Identify, and put the verdict and the tabs of results into the page."""
+    from bokeh.models import Div, TabPanel
+
+    from tpjb_ident.view.results_tabs import model_tab, points_tab, verdict_tab
+
+    try:
+        with session.lock:
+            identification = session.identification
+        assert identification is not None
+        children = {"verdict": verdict_tab(session), "points and windows": points_tab(identification)}
+        if session.bearing is not None:
+            children["prediction and measurement"] = model_tab(session)
+    except (RigError, TpjbError, ValueError) as error:  # what is wrong with the records stands on the page
+        children = {"verdict": Div(text=html.escape(printable(error)), name="verdict")}
+    found = [TabPanel(child=child, title=title) for title, child in children.items()]
+
+    def show() -> None:
+        tabs.tabs = [found[0], *tabs.tabs[1:], *found[1:]]
+
+    document.add_next_tick_callback(show)
 
 
 def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
