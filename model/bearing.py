@@ -50,6 +50,8 @@ class Oil:
     supply_temperature : float
         [degC]
     grade : str
+    supply_flow : float
+        To the whole bearing, a share alike to every groove [m^3/s]; infinite: as much as the films take.
     """
 
     viscosity_40: float
@@ -60,6 +62,7 @@ class Oil:
     conductivity: float
     supply_temperature: float
     grade: str = ""
+    supply_flow: float = math.inf
 
     def viscosity(self, temperature: Any) -> Any:
         """mu(T) [Pa s], Eq. (4); temperature in degC, scalar or array.
@@ -120,6 +123,8 @@ class Pad:
         About the pivot [kg m^2].
     back_convection : float
         Film coefficient on the pad's free surfaces [W/m^2/K].
+    leading_edge_pressure : float
+        Of the oil in the groove at the leading edge [Pa].
     backing, babbitt : Material
     pivot : Pivot, optional
         Where the bearing's pivots differ.
@@ -136,6 +141,7 @@ class Pad:
     mass: float
     moment_of_inertia: float
     back_convection: float = 50.0
+    leading_edge_pressure: float = 0.0
     backing: Material = STEEL
     babbitt: Material = BABBITT
     pivot: Pivot | None = None

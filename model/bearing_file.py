@@ -36,6 +36,7 @@ _KEYS: dict[str, dict[str, str]] = {
         "mass": "mass",
         "moment_of_inertia": "moment of inertia",
         "back_convection": "heat transfer",
+        "leading_edge_pressure": "pressure",
     },
     "pads.backing": _MATERIAL_KEYS,
     "pads.babbitt": _MATERIAL_KEYS,
@@ -51,6 +52,7 @@ _KEYS: dict[str, dict[str, str]] = {
     "oil": {
         "grade": "text",
         "supply_temperature": "temperature",
+        "supply_flow": "flow",
         "viscosity_40C": "viscosity",
         "viscosity_exponent": "per kelvin",
         "density_40C": "density",
@@ -62,7 +64,7 @@ _KEYS: dict[str, dict[str, str]] = {
 _OPTIONAL = {
     "schema", "name", "grade", "rotation", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
     "contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter", "youngs_modulus", "poissons_ratio",
-    "pads.backing", "pads.babbitt", "tolerances",
+    "pads.backing", "pads.babbitt", "tolerances", "supply_flow", "leading_edge_pressure",
 }  # fmt: skip
 #: How well drawing and data sheet are known, one standard deviation each (`rig-export.md`).
 _TOLERANCES = {
@@ -73,13 +75,13 @@ _TOLERANCES = {
 }  # fmt: skip
 _KEYS["tolerances"] = _TOLERANCES
 _MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",
-                "moment_of_inertia", "conductivity"}  # fmt: skip
+                "moment_of_inertia", "conductivity", "leading_edge_pressure"}  # fmt: skip
 #: Lengths of a pivot.
 _PIVOT_SIZES = ("contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter")
 #: Entries that may be a list, one value per pad.
 _PER_PAD = {
     "pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance", "thickness", "babbitt_thickness",
-    "elastic_thickness", "mass", "moment_of_inertia", *_PIVOT_SIZES,
+    "elastic_thickness", "mass", "moment_of_inertia", "leading_edge_pressure", *_PIVOT_SIZES,
 }  # fmt: skip
 
 
@@ -147,6 +149,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
             conductivity=oil["conductivity"],
             supply_temperature=oil["supply_temperature"],
             grade=oil.get("grade", ""),
+            supply_flow=oil.get("supply_flow", math.inf),
         ),
         rotation=rotation,
         source=name,
@@ -235,7 +238,7 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
         sizes[key] = _per_pad(bearing[key], count, f"{name}, [bearing] {key}")
     sizes["pivot_offset"] = _per_pad(pads.get("pivot_offset", 0.5), count, f"{name}, [pads] pivot_offset")
     defaults = {"thickness": 0.0, "elastic_thickness": pads["thickness"], "babbitt_thickness": 0.0}
-    for key, default in defaults.items():
+    for key, default in (defaults | {"leading_edge_pressure": 0.0}).items():
         sizes[key] = _per_pad(pads.get(key, default), count, f"{name}, [pads] {key}")
     _check_offsets(angles, sizes["arc"], sizes["pivot_offset"], bearing.get("rotation", ""), name)
     for lining, elastic, thickness in zip(*(sizes[f"{k}thickness"] for k in ("babbitt_", "elastic_", "")), strict=True):

@@ -28,6 +28,7 @@ _LISTED: dict[Severity, dict[str, str]] = {
         "film not laminar: Re {number:.0f}": "turbulence, which is off unless asked for, carries and heats",
         "oil beyond its data: {number:.0f} degC": "mu(T) of Eq. (4) holds from 20 to 120 degC",
         "interference: no clearance at pads {pads}": "a concentric journal would touch them",
+        "pads {pads} are short of oil": "they ask for more than the grooves give, {number}",
         "pads {pads} overlap": "no room for oil to enter",
         "pads {pads} touch": "no room for oil to enter",
     },

@@ -45,6 +45,7 @@ SI_UNITS = {
     "specific heat": "J/kg/K",
     "conductivity": "W/m/K",
     "heat transfer": "W/m^2/K",
+    "flow": "m^3/s",
     "voltage": "V",
     "current": "A",
     "ratio": "",

@@ -13,7 +13,7 @@ def fluid_fraction(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float = 1.0
 ) -> FloatArray:
     """Filling theta of a film that `solve_film_jfo` has solved; (nt + 1, nz + 1), 1 where it is full."""
-    faces = face_flows(grid, work, wedge, speed, filling)
+    faces = face_flows(grid, work, wedge, speed, (filling, np.inf))
     p, ruptured = work.pressure, work.ruptured
     theta = np.ones_like(p)
     theta[0] = np.where(ruptured[0], filling, 1.0)

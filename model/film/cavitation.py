@@ -34,7 +34,7 @@ from model.film.cavitation_matrix import (
 )
 from model.film.matrix import assemble, factorise
 from model.film.mesh import FilmGrid, FilmWork
-from model.film.reynolds import FilmForces, solve_film
+from model.film.reynolds import FilmForces, _integrate, solve_film
 from model.film.slopes import net_inflow
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -112,7 +112,7 @@ def _displaced(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, 
     for i in range(nt):
         for j in range(grid.first, nz):
             if i == 0 and work.ruptured[0, j]:  # the supply follows the gap at the edge itself
-                slope, cos, sin = faces.supply[j] / h[0, j], grid.cos[0], grid.sin[0]
+                slope, cos, sin = faces.follows[j], grid.cos[0], grid.sin[0]
             else:
                 upstream = (i - 1) * width + j - grid.first
                 filling = 1.0 + (x[upstream, 0] if i > 0 and work.ruptured[i, j] else 0.0)
@@ -149,7 +149,7 @@ def _stored(
                 rhs[k, 0] = size * work.density[i, j] * grid.cos[i]
                 rhs[k, 1] = size * work.density[i, j] * grid.sin[i]
             if i == 1 and work.ruptured[0, j]:  # and the half volume at the edge
-                filling = faces.supply[j] / faces.couette[0, j] * faces.height[0, j] / work.thickness[0, j]
+                filling = faces.follows[j] / faces.couette[0, j] * faces.height[0, j]
                 mass = 0.25 * size * filling * (work.density[0, j] + work.density[1, j])
                 rhs[k, 0] += mass * grid.cos[0]
                 rhs[k, 1] += mass * grid.sin[0]
@@ -178,13 +178,13 @@ def solve_film_jfo(
     wedge: tuple[float, float, float],
     speed: float,
     sharp: bool,
-    filling: float,
+    supplied: tuple[float, float],
 ) -> FilmForces:
-    """Pressure of one film and its derivatives, mass conserved where it is ruptured."""
+    """Pressure of one film and its derivatives, mass conserved where it is ruptured; `supplied`: see `face_flows`."""
     forces = solve_film(grid, work, wedge, speed, sharp)
     if forces.steps < 0:
         return forces
-    steps, force, stiffness, damping = _conserve(grid, work, wedge, speed, sharp, filling)
+    steps, force, stiffness, damping = _conserve(grid, work, wedge, speed, sharp, supplied)
     if steps == 0:
         return forces
     return FilmForces(force, stiffness, damping, forces.min_film, steps)
@@ -195,17 +195,23 @@ def solve_flooded_film(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
 ) -> FilmForces:
     """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`."""
-    return solve_film_jfo(grid, work, wedge, speed, sharp, 1.0)
+    return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, np.inf))
 
 
 @compiled
 def _conserve(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool, filling: float
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    sharp: bool,
+    supplied: tuple[float, float],
 ) -> tuple[int, FloatArray, FloatArray, FloatArray]:
     """Go on from Swift and Stieber's film: steps (0: it was right; -2: not settled), force, stiffness, damping."""
     force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
-    faces = face_flows(grid, work, wedge, speed, filling)
-    if not _any_ruptured(work.ruptured) and _starved(work, faces) == 0:
+    faces = face_flows(grid, work, wedge, speed, supplied)
+    _starved(work, faces)
+    if not _any_ruptured(work.ruptured):
         return 0, force, stiffness, damping
     x = np.empty((work.unknown.shape[0], 1))
     band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
@@ -214,13 +220,13 @@ def _conserve(
     if steps > 0:
         weight, slopes = _jfo_slopes(grid, work, faces, x, sharp)
         _leave_behind(grid, work, faces, slopes)
-        _integrate(grid, work, weight, slopes, (force, stiffness, damping))
+        force, stiffness, damping = _integrate(grid, work, weight)
     return steps, force, stiffness, damping
 
 
 @inner
 def _any_ruptured(ruptured: BoolArray) -> bool:
-    for i in range(1, ruptured.shape[0]):
+    for i in range(ruptured.shape[0]):
         for j in range(ruptured.shape[1]):
             if ruptured[i, j]:
                 return True
@@ -236,7 +242,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
     for step in range(1, _MAX_STEPS + 1):
         assemble_columns(band, faces, ruptured, first)
         factorise_columns(band)
-        _drag(faces, ruptured, first, x)
+        _drag(work, faces, first, x)
         substitute_columns(band, x)
         wrong = _misplaced(x, ruptured, first)
         _read(work, x, first)
@@ -260,7 +266,7 @@ def _starved(work: FilmWork, faces: FaceFlows) -> int:
     """
     changed = 0
     for j in range(len(faces.supply)):
-        asked = faces.couette[0, j] - faces.along[0, j] * work.pressure[1, j]
+        asked = faces.couette[0, j] - faces.along[0, j] * (work.pressure[1, j] - work.pressure[0, j])
         lacking = asked > faces.supply[j]
         if lacking != work.ruptured[0, j]:
             work.ruptured[0, j] = lacking
@@ -269,13 +275,15 @@ def _starved(work: FilmWork, faces: FaceFlows) -> int:
 
 
 @inner
-def _drag(faces: FaceFlows, ruptured: BoolArray, first: int, x: FloatArray) -> None:
+def _drag(work: FilmWork, faces: FaceFlows, first: int, x: FloatArray) -> None:
     """Right-hand side: what the journal drags into each control volume of a full film less what it drags out."""
-    couette = faces.couette
+    couette, p = faces.couette, work.pressure
     width = faces.across.shape[1] - first
     for i in range(1, couette.shape[0]):
         for j in range(first, faces.across.shape[1]):
-            into = faces.supply[j] if i == 1 and ruptured[0, j] else couette[i - 1, j]
+            into = couette[i - 1, j]
+            if i == 1:  # the groove's pressure pushes where the gap is full
+                into = faces.supply[j] if work.ruptured[0, j] else into + faces.along[0, j] * p[0, j]
             x[(i - 1) * width + j - first, 0] = into - couette[i, j]
 
 
@@ -327,26 +335,3 @@ def _leave_behind(grid: FilmGrid, work: FilmWork, faces: FaceFlows, slopes: Floa
             k = (i - 1) * (nz - grid.first) + j - grid.first
             for m in range(4):
                 work.slopes[k, m] = 0.0 if work.ruptured[i, j] else slopes[k, m]
-
-
-@inner
-def _integrate(
-    grid: FilmGrid,
-    work: FilmWork,
-    weight: FloatArray,
-    slopes: FloatArray,
-    totals: tuple[FloatArray, FloatArray, FloatArray],
-) -> None:
-    force, stiffness, damping = totals
-    nt, nz = work.pressure.shape[0] - 1, work.pressure.shape[1] - 1
-    for i in range(1, nt):
-        for j in range(grid.first, nz):
-            k = (i - 1) * (nz - grid.first) + j - grid.first
-            if work.ruptured[i, j]:
-                continue
-            for n in range(2):
-                direction = grid.cos[i] if n == 0 else grid.sin[i]
-                force[n] += direction * grid.area[i, j] * work.unknown[k]
-                for m in range(2):
-                    stiffness[n, m] += direction * weight[i, j] * slopes[k, m]
-                    damping[n, m] += direction * weight[i, j] * slopes[k, m + 2]

@@ -26,16 +26,20 @@ class FaceFlows(NamedTuple):
     across: FloatArray
     couette: FloatArray  #: (nt, nz + 1): What the journal drags through a face along the arc that is full [kg/s].
     height: FloatArray  #: (nt, nz + 1): Film thickness at those faces [m].
-    #: (nz + 1,): What the journal drags over the leading edge at most [kg/s]: a gap that opens there is not
-    #: filled.
+    #: (nz + 1,): What the journal drags over the leading edge at most [kg/s], be it that a gap that opens there is
+    #: not filled, or that the groove gives no more; and how that grows with the gap [kg/s/m].
     supply: FloatArray
+    follows: FloatArray
 
 
 @compiled
 def face_flows(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, filling: float
+    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, supplied: tuple[float, float]
 ) -> FaceFlows:
-    """Conductances and drag of a film that is full everywhere but for its supply: `filling` of the gap there."""
+    """Conductances and drag of a film that is full everywhere but for its supply.
+
+    `supplied`: share of the gap there that is filled at most, and what the groove gives at most [kg/s/m].
+    """
     along, across = conductances(grid, work, wedge[0], wedge[1], wedge[2])
     couette, height = np.empty_like(along), np.empty_like(along)
     for i in range(along.shape[0]):
@@ -44,10 +48,14 @@ def face_flows(
             height[i, j] = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
             density = 0.5 * (work.density[i, j] + work.density[i + 1, j])
             couette[i, j] = 0.5 * speed * height[i, j] * density * grid.height[j]
-    supply = np.empty(along.shape[1])
+    supply, follows = np.empty(along.shape[1]), np.zeros(along.shape[1])
     for j in range(len(supply)):
-        supply[j] = 0.5 * filling * speed * work.thickness[0, j] * work.density[0, j] * grid.height[j]
-    return FaceFlows(along, across, couette, height, supply)
+        dragged = 0.5 * supplied[0] * speed * work.density[0, j] * grid.height[j]
+        supply[j] = supplied[1] * grid.height[j]
+        # a groove without pressure fills no gap that opens
+        if work.pressure[0, j] == 0.0 and dragged * work.thickness[0, j] <= supply[j]:
+            supply[j], follows[j] = dragged * work.thickness[0, j], dragged
+    return FaceFlows(along, across, couette, height, supply, follows)
 
 
 @inner

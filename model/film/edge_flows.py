@@ -7,8 +7,8 @@ from model.film.mesh import FilmGrid, FilmWork
 
 
 @compiled
-def edge_flows(grid: FilmGrid, work: FilmWork) -> tuple[float, float]:
-    """What enters at the leading edge, and what leaves over both sides [kg/s].
+def edge_flows(grid: FilmGrid, work: FilmWork, supplied: float) -> tuple[float, float]:
+    """What enters at the leading edge, no more than is supplied there [kg/s/m], and what leaves over both sides [kg/s].
 
     The difference leaves at the trailing edge, in streaks where the film is ruptured: by balance, because the rupture
     line of a mesh moves by whole nodes and what is found behind it jumps.
@@ -16,7 +16,7 @@ def edge_flows(grid: FilmGrid, work: FilmWork) -> tuple[float, float]:
     rows, last = work.flow_x.shape[0], work.flow_z.shape[1]
     entering, corners, leaving_corners, inside, leaving = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(last + 1):
-        flow = work.flow_x[0, j]
+        flow = min(work.flow_x[0, j], supplied * grid.height[j])
         entering += flow
         if j == last or j < grid.first:
             corners += flow

@@ -10,6 +10,8 @@ the mass flows used here are those of the full film.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from model.compilation import compiled, inner
@@ -103,7 +105,7 @@ def _march_lines(
                 if j < nz:
                     value -= high * t[i, j + 1]
                 rhs[j, m] = value
-        _tridiagonal(lower, main, upper, rhs)
+        tridiagonal(lower, main, upper, rhs)
         for m in range(rhs.shape[1]):
             for j in range(nz + 1):
                 fields[m, i + 1, j] = rhs[j, m]
@@ -144,33 +146,39 @@ def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
 @inner
 def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
     """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
-    p, h, mu = work.pressure, work.thickness, work.viscosity
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            # mean of the squared slopes on both sides: what the box between two stations sees, to second order
-            squared, sides = 0.0, 0
-            if i > 0:
-                squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
-                sides += 1
-            if i < nt:
-                squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
-                sides += 1
-            if j == nz:
-                slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
-            elif j == 0:
-                slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
-            else:
-                slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+    h, mu = work.thickness, work.viscosity
+    for i in range(h.shape[0]):
+        for j in range(h.shape[1]):
+            downstream, sideways = squared_slopes(grid, work.pressure, i, j)
             shear = mu[i, j] * speed**2 / h[i, j]
-            pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (squared / sides + slope**2)
+            pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (downstream + sideways)
             station = grid.dx * grid.height[j]
             dissipated[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
 
 
 @inner
-def _tridiagonal(lower: FloatArray, main: FloatArray, upper: FloatArray, rhs: FloatArray) -> None:
-    """Thomas' algorithm in place for the columns of `right`, (n, m); the solutions are left there."""
+def squared_slopes(grid: FilmGrid, p: FloatArray, i: int, j: int) -> tuple[float, float]:
+    """Squared slopes of the pressure at a node: along, the mean of both sides, which the box scheme sees; across."""
+    nt, nz = p.shape[0] - 1, p.shape[1] - 1
+    squared, sides = 0.0, 0
+    if i > 0:
+        squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
+        sides += 1
+    if i < nt:
+        squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
+        sides += 1
+    if j == nz:
+        slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
+    elif j == 0:
+        slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
+    else:
+        slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+    return squared / sides, slope**2
+
+
+@inner
+def tridiagonal(lower: Any, main: Any, upper: Any, rhs: Any) -> None:
+    """Thomas' algorithm in place, real or complex, for the columns of `rhs`, (n, m); the solutions are left there."""
     n, count = rhs.shape
     for j in range(n):
         if j > 0:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.energy import tridiagonal
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
@@ -230,7 +231,7 @@ def _temperature(
         np.zeros(nz + 1, dtype=np.complex128),
         np.zeros(nz + 1, dtype=np.complex128),
         np.zeros(nz + 1, dtype=np.complex128),
-        np.zeros(nz + 1, dtype=np.complex128),
+        np.zeros((nz + 1, 1), dtype=np.complex128),
     )
     _march_lines(grid, work, running, change, march)
     return march.response
@@ -284,23 +285,10 @@ def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Chan
                     changed -= 0.5 * pass_on * thick
                 value -= changed * (t[i + 1, j + 1] - t[i + 1, j] + t[i, j + 1] - t[i, j])
                 value -= high * (out[i, j + 1] - out[i, j])
-            rhs[j] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
+            rhs[j, 0] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
             lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-        _tridiagonal(lower, main, upper, rhs)
-        out[i + 1] = rhs
-
-
-@inner
-def _tridiagonal(lower: ComplexArray, main: ComplexArray, upper: ComplexArray, rhs: ComplexArray) -> None:
-    """Thomas' algorithm in place; the solution is left in `right`, (n,)."""
-    last = rhs.shape[0] - 1
-    for j in range(1, last + 1):
-        scale = lower[j] / main[j - 1]
-        main[j] -= scale * upper[j - 1]
-        rhs[j] -= scale * rhs[j - 1]
-    rhs[last] /= main[last]
-    for j in range(last - 1, -1, -1):
-        rhs[j] = (rhs[j] - upper[j] * rhs[j + 1]) / main[j]
+        tridiagonal(lower, main, upper, rhs)
+        out[i + 1] = rhs[:, 0]
 
 
 @inner

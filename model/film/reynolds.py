@@ -97,7 +97,7 @@ def solve_film(
             assemble(work.band, gx, gz, work.ruptured, grid.first)
             add_diagonal(work.band, diagonal, grid.first)
             factorise(work.band)
-        derivatives(grid, work, wedge, (gx, gz))
+        derivatives(grid, work, wedge, (gx, gz), None)
     force, stiffness, damping = _integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)
 
@@ -171,6 +171,8 @@ def _active_set(grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, 
             for j in range(first, nz):
                 k = (i - 1) * width + j - first
                 x[k] = 0.0 if ruptured[i, j] else source[i, j]
+                if i == 1 and not ruptured[i, j]:
+                    x[k] += gx[0, j] * p[0, j]  # the groove's
         substitute(work.band, x)
         for i in range(1, nt):
             for j in range(first, nz):
@@ -211,6 +213,9 @@ def _integrate(grid: FilmGrid, work: FilmWork, weight: FloatArray) -> tuple[Floa
     first = grid.first
     width = nz - first
     total = np.zeros(5)
+    for j in range(first, nz):
+        force[0] += grid.cos[0] * grid.area[0, j] * work.pressure[0, j]
+        force[1] += grid.sin[0] * grid.area[0, j] * work.pressure[0, j]
     for i in range(1, nt):
         for m in range(5):
             total[m] = 0.0

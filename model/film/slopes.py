@@ -83,8 +83,12 @@ def derivatives(
     work: FilmWork,
     wedge: tuple[float, float, float],
     conductance: tuple[FloatArray, FloatArray],
+    powers: tuple[FloatArray, FloatArray] | None,
 ) -> None:
-    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows."""
+    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows.
+
+    Conductances grow with these powers of the film thickness along and across; without them, laminar, with the third.
+    """
     p, rhs, h = work.pressure, work.slopes, work.thickness
     gx, gz = conductance
     nt, nz = gx.shape[0], gz.shape[1]
@@ -94,15 +98,15 @@ def derivatives(
         for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
             thickness = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
-            # couette flow is as h, poiseuille flow as h^3; dh/da = -cos, dh/db = -sin
-            slope = (work.flow_x[i, j] - 3.0 * poiseuille) / thickness
+            # couette flow is as h; dh/da = -cos, dh/db = -sin
+            slope = (work.flow_x[i, j] - _power(powers, 0, i, j) * poiseuille) / thickness
             work.flow_x[i, j] -= poiseuille
             along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
     for i in range(nt + 1):
         for j in range(nz):
             poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
             work.flow_z[i, j] = -poiseuille
-            slope = -3.0 * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
+            slope = -_power(powers, 1, i, j) * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
             across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
     net_inflow(along, across, grid.first, rhs)
     for i in range(1, nt):
@@ -112,6 +116,13 @@ def derivatives(
             rhs[k, 2], rhs[k, 3] = squeeze * grid.cos[i], squeeze * grid.sin[i]
     keep_ruptured(work, grid.first, rhs)
     substitute_four(work.band, rhs)
+
+
+@inner
+def _power(powers: tuple[FloatArray, FloatArray] | None, side: int, i: int, j: int) -> float:
+    if powers is None:
+        return 3.0
+    return powers[side][i, j]
 
 
 @compiled

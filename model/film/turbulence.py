@@ -20,10 +20,11 @@ from __future__ import annotations
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.matrix import add_diagonal, assemble, factorise, substitute_four
+from model.film.energy import squared_slopes
+from model.film.matrix import add_diagonal, assemble, factorise
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, _active_set, _integrate, _source, _thickness, conductances
-from model.film.slopes import keep_ruptured, net_inflow, rupture_line
+from model.film.slopes import derivatives, rupture_line
 from rigdata.arrays import FloatArray
 
 #: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
@@ -67,7 +68,7 @@ def solve_turbulent_film(
             assemble(work.band, gx, gz, work.ruptured, grid.first)
             add_diagonal(work.band, diagonal, grid.first)
             factorise(work.band)
-        _derivatives(grid, work, wedge, (gx, gz), powers)
+        derivatives(grid, work, wedge, (gx, gz), powers)
         _heat_beyond(grid, work, speed)
     force, stiffness, damping = _integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)
@@ -108,67 +109,16 @@ def _resist(
 
 
 @inner
-def _derivatives(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    conductance: tuple[FloatArray, FloatArray],
-    powers: tuple[FloatArray, FloatArray],
-) -> None:
-    """As `model.film.slopes.derivatives`, for conductances that grow with other powers of h than the third."""
-    p, rhs, h = work.pressure, work.slopes, work.thickness
-    gx, gz = conductance
-    px, pz = powers
-    nt, nz = gx.shape[0], gz.shape[1]
-    along, across = np.empty((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
-    for i in range(nt):
-        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
-        for j in range(nz + 1):
-            poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
-            thickness = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
-            slope = (work.flow_x[i, j] - px[i, j] * poiseuille) / thickness
-            work.flow_x[i, j] -= poiseuille
-            along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
-    for i in range(nt + 1):
-        for j in range(nz):
-            poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
-            work.flow_z[i, j] = -poiseuille
-            slope = -pz[i, j] * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
-            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
-    net_inflow(along, across, grid.first, rhs)
-    for i in range(1, nt):
-        for j in range(grid.first, nz):
-            k = (i - 1) * (nz - grid.first) + j - grid.first
-            squeeze = work.density[i, j] * grid.dx * grid.height[j]
-            rhs[k, 2], rhs[k, 3] = squeeze * grid.cos[i], squeeze * grid.sin[i]
-    keep_ruptured(work, grid.first, rhs)
-    substitute_four(work.band, rhs)
-
-
-@inner
 def _heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     """Heat beyond that of a laminar film per station of length dx and control-volume height [W]."""
-    p, h, mu = work.pressure, work.thickness, work.viscosity
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    for i in range(nt + 1):
-        for j in range(nz + 1):
+    h, mu = work.thickness, work.viscosity
+    for i in range(h.shape[0]):
+        for j in range(h.shape[1]):
             reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
             along, across = excess(reynolds, ALONG[0], ALONG[1])[0], excess(reynolds, ACROSS[0], ACROSS[1])[0]
-            squared, sides = 0.0, 0
-            if i > 0:
-                squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
-                sides += 1
-            if i < nt:
-                squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
-                sides += 1
-            if j == nz:
-                slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
-            elif j == 0:
-                slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
-            else:
-                slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
+            downstream, sideways = squared_slopes(grid, work.pressure, i, j)
             shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR[0], SHEAR[1])[0]
-            less = along / (12.0 + along) * squared / sides + across / (12.0 + across) * slope**2
+            less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways
             pressed = -(h[i, j] ** 3) / (12.0 * mu[i, j]) * less
             work.gained[i, j] = (shear + pressed) * grid.dx * grid.height[j]
 

@@ -45,6 +45,7 @@ class PadFilm:
     cross: CrossFilm | None = None
     outlet: float = math.nan
     axial_tilt: float = 0.0
+    supplied: float = math.inf  #: Oil there is at the leading edge [kg/s/m].
 
     @property
     def heat_state(self) -> tuple[FloatArray, ...]:
@@ -95,6 +96,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
     shifts = np.zeros_like(works.unknown)
     bent = np.zeros_like(works.extra)
     for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
+        work.pressure[0, grid.first : -1] = pad.leading_edge_pressure
         if not symmetric:
             # the axis leans by `angle` towards `toward`: at z the journal stands z * angle further that way
             work.extra[:, :] = -np.outer(np.cos(grid.angle + pad.pivot_angle - toward), grid.z * angle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from model.film.edge_flows import edge_flows
 from model.film.mesh import FilmWork
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import BoolArray, FloatArray
+
+#: Share by which a film may ask for more than there is: what a mesh does not tell.
+_PLENTY = 1e-3
 
 
 class PadFlow(NamedTuple):
@@ -44,15 +48,31 @@ def through_flow(film: PadFilm) -> tuple[float, float]:
         return film.resting.flow, film.resting.flow
     if film.forces is None:
         return math.nan, math.nan
-    entering, sides = edge_flows(film.grid, film.work)
+    entering, sides = edge_flows(film.grid, film.work, _limit(film))
     return entering, entering - sides
+
+
+def _limit(film: PadFilm) -> float:
+    """What a film takes at most [kg/s/m]: films that do not conserve mass take what they ask for."""
+    return film.supplied if film.rupture == "jfo" else math.inf
+
+
+def starved(films: Sequence[PadFilm]) -> list[int]:
+    """Numbers of the pads that carry and ask for more oil than their grooves give."""
+    carrying = [f for f in films if f.forces is not None and math.isfinite(f.supplied)]
+    asked = [edge_flows(f.grid, f.work, math.inf)[0] for f in carrying]
+    return [
+        f.number
+        for f, flow in zip(carrying, asked, strict=True)
+        if flow > (1.0 + _PLENTY) * f.supplied * float(f.grid.z[-1] - f.grid.z[0]) * (2.0 if f.grid.first == 0 else 1.0)
+    ]
 
 
 def side_flow(film: PadFilm) -> float:
     """What leaves over both sides [kg/s]."""
     if film.forces is None:
         return 0.0 if film.resting is not None else math.nan
-    sides: float = edge_flows(film.grid, film.work)[1]
+    sides: float = edge_flows(film.grid, film.work, _limit(film))[1]
     return sides
 
 

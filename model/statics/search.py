@@ -47,6 +47,7 @@ from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat, stacked_conduction
 from model.statics.pad_film import oil_constants, pad_films
+from model.statics.pad_flow import starved, through_flow
 from model.tilt_hold import hold_numbers
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
@@ -110,6 +111,11 @@ class Search:
             journal=bool(setup.options.isothermal_journal),
             closing=0.0 if growth is None else float(growth.closing(setup.bearing)),
             axial=setup.pads_follow,
+            fresh=oil.supply_flow
+            * float(oil.density(setup.inlet_temperature))
+            / len(self.films)
+            / setup.bearing.length,
+            length=setup.bearing.length,
             asks_laws=bool((encoded(setup.pivots)[0][:, 0] == OTHER).any()),
         )
 
@@ -131,10 +137,11 @@ class Search:
         numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance) for f in films]
         preload, radius, clearance = np.array(numbers, dtype=float).T.copy()
         angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
+        flattest = np.array([-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films])
         laws, curves = encoded(self.setup.pivots)
         return PadStack(
             frame, preload, radius, clearance, np.argsort(angles, kind="stable"), laws, curves,
-            np.zeros((count, 4, _ROWS)), np.zeros(count, dtype=np.int64),
+            np.zeros((count, 4, _ROWS)), flattest, np.zeros(count, dtype=np.int64),
         )  # fmt: skip
 
     def _state(self, shifts: FloatArray) -> PadState:
@@ -162,6 +169,8 @@ class Search:
             tilt=np.zeros(n),
             deflection=np.zeros(n),
             axial=axial,
+            supplied=np.full(n, math.inf),
+            passed=np.zeros(n),
             idle=np.zeros(n, dtype=np.bool_),
             solved=np.zeros(n, dtype=np.bool_),
             rescues=np.zeros(n, dtype=np.int64),
@@ -281,6 +290,8 @@ class Search:
         if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
             return False
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
+            if self.case.mixing and math.isfinite(self.case.fresh):
+                state.passed[m] = through_flow(other)[1]
             state.tilt[m], state.deflection[m], state.idle[m] = other.tilt, other.deflection, other.idle
             film.work.temperature[:] = other.work.temperature
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
@@ -288,7 +299,7 @@ class Search:
             for own, known in zip(film.heat_state, other.heat_state, strict=False):
                 own[:] = known
             film.work.ruptured[:] = other.work.ruptured
-            film.work.pressure[:] = other.work.pressure
+            film.work.pressure[1:] = other.work.pressure[1:]
             if self.setup.flexible_pads:
                 state.bent[m] = other.bent
                 film.work.extra[:] += other.bent
@@ -346,6 +357,7 @@ class Search:
             film.tilt, film.deflection = float(state.tilt[m]), float(state.deflection[m])
             film.idle, film.axial_tilt = bool(state.idle[m]), float(state.axial[m])
             film.temperature_change, film.inlet = float(state.heating[m]), float(state.inlet[m])
+            film.supplied = float(state.supplied[m])
             film.forces = film.resting = None
             if self.setup.flexible_pads:
                 film.bent = state.bent[m]
@@ -378,6 +390,10 @@ class Search:
             names.append(named("idle pads {pads}", idle))
         if figures[BACKFLOW] > 0.0:
             names.append(named("flow back at a leading edge"))
+        short = starved(films)
+        if short:
+            ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
+            names.append(named("pads {pads} are short of oil", short, ends))
         names += conditions.regimes(self.setup, films, self.surface_speed)
         trail = memory.trail
         return Equilibrium(

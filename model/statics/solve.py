@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,7 +47,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
         result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and couples_heat(setup):
         result = _raise_heat(setup, load, speed, result)
-    for what in ("load", "speed"):
+    for what in ("load", "speed", "want"):
         if not result.converged:
             result = _raise(setup, load, speed, what)[0] or result
     if not result.converged and setup.friction:
@@ -150,15 +151,21 @@ def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibriu
 
 
 def _raise(setup: Setup, load: FloatArray, speed: float, what: str) -> tuple[Equilibrium | None, float]:
-    """Raise load, heat or speed from `_FIRST_SHARE` to 1, each step started from the one before.
+    """Raise load, heat, speed or want of oil from `_FIRST_SHARE` to 1, each step started from the one before.
 
     The equilibrium at the end, and the share reached.
     """
+    oil = setup.bearing.oil
+    if what == "want" and math.isinf(oil.supply_flow):
+        return None, 0.0
     reached, step = 0.0, _FIRST_SHARE
     last: Equilibrium | None = None
     while reached < 1.0 and step > _LEAST_STEP:
         share = min(1.0, reached + step)
         shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, what: share}
+        if what == "want":
+            fed = replace(oil, supply_flow=oil.supply_flow / share)
+            setup = setup.change(bearing=replace(setup.bearing, oil=fed))
         search = Search(setup, shares["load"] * load, shares["speed"] * speed, shares["heat"])
         if last is None or not search.start_from(last):
             search.stand()

@@ -36,7 +36,7 @@ def lengths(wedge: tuple[float, float]) -> tuple[float, float, float]:
 def solve(one: tuple[FilmGrid, FilmWork], wedge: tuple[float, float], sharp: bool = True, filling: float = 1.0):
     """Solve from a full film; `wedge` is (a, b) over the clearance."""
     one[1].ruptured[:] = False
-    forces = solve_film_jfo(*one, lengths(wedge), SPEED, sharp, filling)
+    forces = solve_film_jfo(*one, lengths(wedge), SPEED, sharp, (filling, np.inf))
     assert forces.steps > 0
     return forces
 
@@ -200,7 +200,7 @@ def test_upper_film_of_a_two_groove_bearing_carries_nothing(ratio, eccentricity,
     work.viscosity[:], work.density[:] = MU, RHO
     assert solve_film(grid, work, (CLEARANCE, *wedge), SPEED, True).force[0] > 0.1
     work.ruptured[:] = False
-    assert (solve_film_jfo(grid, work, (CLEARANCE, *wedge), SPEED, True, 1.0).force == 0.0).all()
+    assert (solve_film_jfo(grid, work, (CLEARANCE, *wedge), SPEED, True, (1.0, np.inf)).force == 0.0).all()
 
 
 CASES = [((0.9, 0.08), 1.0), ((-1.0, 0.1), 1.0), ((-0.8, 0.1), 1.0), ((0.3, 0.4), 0.7), ((0.85, 0.1), 0.8)]
@@ -379,7 +379,7 @@ def test_random_films_settle_from_anywhere():
         found = []
         for start in (np.zeros_like(work.ruptured), rng.random(work.ruptured.shape) < 0.5):
             work.ruptured[:] = start
-            forces = solve_film_jfo(*one, lengths(wedge), SPEED, False, 0.9)
+            forces = solve_film_jfo(*one, lengths(wedge), SPEED, False, (0.9, np.inf))
             found.append(forces.force)
             assert forces.steps != -2
         solved += forces.steps > 0

@@ -71,12 +71,12 @@ class Case:
         return b.oil.viscosity_40 * self.speed / (2 * math.pi) * b.length * b.journal_diameter * ratio**2 / self.load
 
 
-def draw(cases: int, seed: int) -> list[Case]:
+def draw(cases: int, seed: int, ranges: dict[str, tuple[float, float, bool]] = RANGES) -> list[Case]:
     """The first `cases` physical ones of a Latin hypercube."""
     out: list[Case] = []
-    sampler = qmc.LatinHypercube(len(RANGES), seed=seed)
+    sampler = qmc.LatinHypercube(len(ranges), seed=seed)
     while len(out) < cases:
-        out += [case for row in sampler.random(cases) if physical(case := _case(row))]
+        out += [case for row in sampler.random(cases) if physical(case := _case(row, ranges))]
     return out[:cases]
 
 
@@ -88,9 +88,9 @@ def physical(case: Case) -> bool:
     return give < 1.0 and 0.03 < case.sommerfeld < 30.0 and reynolds < 2000.0
 
 
-def _case(row: np.ndarray) -> Case:
+def _case(row: np.ndarray, ranges: dict[str, tuple[float, float, bool]]) -> Case:
     v = {}
-    for u, (name, (low, high, logarithmic)) in zip(row, RANGES.items(), strict=True):
+    for u, (name, (low, high, logarithmic)) in zip(row, ranges.items(), strict=True):
         v[name] = low * (high / low) ** u if logarithmic else low + u * (high - low)
     n = int(v["pads"])
     radius = 0.5 * v["diameter"]

@@ -32,6 +32,8 @@ class Case(NamedTuple):
     journal: bool  #: It takes up heat and gives it back.
     closing: float  #: What a kelvin of the journal's takes from every clearance [m/K].
     axial: bool  #: Pads tilt along the shaft.
+    fresh: float  #: What a groove gives of fresh oil [kg/s/m].
+    length: float  #: Of the pads [m].
     asks_laws: bool  #: Some pivots have laws that only Python knows.
 
 

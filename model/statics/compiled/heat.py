@@ -28,7 +28,7 @@ from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.film.slopes import pressure_change
 from model.statics.compiled.case import Case, rigid_approach
-from model.statics.compiled.constants import BOUNDLESS, HEATING_STEP
+from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP
 from model.statics.compiled.elimination import solve
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
 from rigdata.arrays import BoolArray, FloatArray, IntArray
@@ -100,11 +100,16 @@ def exchange_heat(
             continue
         grid, work = grid_of(grids, m), work_of(works, m)
         _answer(grid, work, bodies, state, case, m, answers[m])
-        entering, sides = edge_flows(grid, work)
+        entering, sides = edge_flows(grid, work, state.supplied[m])
         flows[m, 0], flows[m, 1] = entering, entering - sides
         _pass_on(work, answers[m], outlets[m], taken[m])
-    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), state.solved, case.supply, case.mixing)
     change = 0.0
+    for m in range(n):
+        if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
+            more = case.mixing * abs(flows[m, 1] - state.passed[m]) / (case.fresh * case.length)
+            change = max(change, HEAT_PER_FORCE * more)
+        state.passed[m] = flows[m, 1]
+    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), state.solved, case.supply, case.mixing)
     for m in range(n):
         state.inlet[m], state.heating[m] = inlets[m], 0.0
         if not state.solved[m]:

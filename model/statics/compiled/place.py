@@ -68,11 +68,12 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
     """Whether film and pivot push a pad back from a small change of tilt and deflection.
 
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
-    with what holds the tilt back added to the film's moment. An unloaded film leaves a wedge that opens, or a load
-    that is not told from none.
+    with what holds the tilt back added to the film's moment. These slopes are those of a film that stays as warm as it
+    is; on the heated film the branch that comes back from the fold is unstable, whose wedges are flatter than the
+    fold's. An unloaded film leaves a wedge that opens, or a load that is not told from none.
     """
     none = case.accuracy * math.hypot(case.load[0], case.load[1])
-    if case.hold.slip == 0.0 and (state.wedge[m, 1] <= 0.0 or state.force[m, 0] <= none):
+    if case.hold.slip == 0.0 and (state.wedge[m, 1] <= pads.flattest[m] or state.force[m, 0] <= none):
         return False
     k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))

@@ -39,6 +39,7 @@ class PadStack(NamedTuple):
     laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
     curves: FloatArray  #: (n, 5, m): Measured ones.
     attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
+    flattest: FloatArray  #: (n,): Wedges b up to here are none of a pad that is stable in tilt [m].
     rows: IntArray  #: (n,) of int: How many of the r there are; 0 where they were not asked for.
 
 
@@ -49,6 +50,10 @@ class PadState(NamedTuple):
     tilt: FloatArray  #: (n,): t [rad], eta [m], tilt along the shaft [rad].
     deflection: FloatArray
     axial: FloatArray
+    supplied: (
+        FloatArray  #: (n,): What there is of oil at the leading edge [kg/s/m], and leaves the trailing one [kg/s].
+    )
+    passed: FloatArray
     idle: BoolArray  #: (n,) of bool: Carries nothing; has a pressure.
     solved: BoolArray
     rescues: IntArray  #: (n,) of int: How often the pad was put back on its loaded attitude.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.cavitation import solve_flooded_film
+from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import least_share, set_viscosity
 from model.film.reynolds import FilmForces, solve_film
@@ -26,14 +26,20 @@ from rigdata.arrays import FloatArray
 
 @inner
 def _film(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool, rupture: int | None
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    case: Case,
+    sharp: bool,
+    rupture: int | None,
+    supplied: float,
 ) -> FilmForces:
     """Pressure of one film; what is None when a search is compiled leaves the other films out of it."""
     if rupture is None:
-        return solve_film(grid, work, wedge, speed, sharp)
+        return solve_film(grid, work, wedge, case.running.speed, sharp)
     if rupture == TURBULENT:
-        return solve_turbulent_film(grid, work, wedge, speed, sharp)
-    return solve_flooded_film(grid, work, wedge, speed, sharp)
+        return solve_turbulent_film(grid, work, wedge, case.running.speed, sharp)
+    return solve_film_jfo(grid, work, wedge, case.running.speed, sharp, (1.0, supplied))
 
 
 @inner
@@ -43,14 +49,16 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
     A film without force is that of the unloaded attitude, in which nothing holds the pad: the loaded one counts.
     """
     lost = False
-    for m in range(len(state.tilt)):
+    for k in range(len(pads.order)):
+        m = pads.order[k]
         grid, work = grid_of(shapes.grids, m), work_of(works, m)
+        state.supplied[m] = case.fresh + case.mixing * state.passed[pads.order[k - 1]] / case.length
         while not state.idle[m]:
             if not sharp and case.thermal != ACROSS:
                 set_viscosity(work, case.running.oil)
             a = rigid_approach(pads, state, m) - state.deflection[m]
             b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
-            found = _film(grid, work, (pads.clearance[m], a, b), case.running.speed, sharp, case.rupture)
+            found = _film(grid, work, (pads.clearance[m], a, b), case, sharp, case.rupture, state.supplied[m])
             state.wedge[m, 0], state.wedge[m, 1], state.solved[m] = a, b, True
             state.least[m], state.steps[m] = found.min_film, found.steps
             for i in range(2):
@@ -65,7 +73,7 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
                 let_idle(state, m)
         if state.idle[m]:
             state.solved[m] = False
-            work.pressure[:] = 0.0
+            work.pressure[1:] = 0.0
         elif state.steps[m] < 0:
             lost = True
     rest_films(shapes.grids, pads, state, case)
