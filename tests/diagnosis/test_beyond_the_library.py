@@ -10,11 +10,11 @@ import pytest
 from model.effects import Effect, known_effects, load_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.planned import planned_observations
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "probe_rotation", *TERMS}
 SETTINGS = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)

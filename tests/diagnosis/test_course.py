@@ -6,14 +6,13 @@ import pytest
 from model.effects import Effect
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison.amplitude_path import path_through
+from tpjb_ident.diagnosis.comparison.search import compare
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import pose
 from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.planned import planned_observations
-from tpjb_ident.diagnosis.search.amplitude_path import path_through
-from tpjb_ident.diagnosis.search.fit import InitialFit
-from tpjb_ident.diagnosis.search.minimise import fit
-from tpjb_ident.diagnosis.search.search import baseline_fit
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
 NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 
@@ -60,25 +59,17 @@ def test_slopes_are_those_of_the_course():
     assert known.slope(0.5) == pytest.approx(numeric[2], abs=1e-6)
 
 
-def test_neutral_slope_is_a_parabolas():
-    assert path(lambda x: 2.0 * x + x**2).neutral_slope == pytest.approx([2.0])
-    one_sided = path_through((0.8, 1.6), [np.array([0.8 * 2 + 0.64]), np.array([1.6 * 2 + 2.56])])
-    assert one_sided.neutral_slope == pytest.approx([2.0])
-
-
 @pytest.mark.slow  # seconds: the bearing model itself
-@pytest.mark.parametrize("start", [1e-6, 5e-6, 1.9e-5])
-def test_a_fit_finds_its_way_past_pads_that_come_out_of_contact(start):
+def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact():
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
     setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
     layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0), sweep_first=False)
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)
     hidden = forward.fresh()([Effect("thermal_growth", clearance_change=1.1e-5)])
-    problem = pose(noisy(planned, hidden, 7), forward, DiagnoseSettings(workers=1))
-    growth = next(c for c in problem.pool if c.name == "thermal_growth")
-    nothing = baseline_fit(problem)
-    slope = (forward.fresh()([growth.effect(1e-7)]) - problem.base) / 1e-7
-    begin = InitialFit((growth,), (np.array([start]),), slope[:, None], nothing.nuisance, nothing.columns)
-    found = fit(forward.fresh(), problem, begin)
-    assert found.amplitudes[0][0] == pytest.approx(1.1e-5, abs=3e-7)
+    settings = DiagnoseSettings(workers=1)
+    problem = pose(noisy(planned, hidden, 7), forward, settings)
+    with workers(forward, problem, 1) as run:
+        best = compare(run, problem, settings).best
+    assert best.label == "thermal_growth"
+    assert best.amplitudes[0][0] == pytest.approx(1.1e-5, abs=3e-7)

@@ -8,6 +8,7 @@ import pytest
 from model.effects import Effect, known_effects, load_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import diagnose
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
@@ -18,8 +19,6 @@ from tpjb_ident.diagnosis.observations.gap import gap, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
 from tpjb_ident.diagnosis.planned import dynamic, planned_observations
-from tpjb_ident.diagnosis.search.selection import Selection
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.remainder import localise
 
 #: A part of the library, so that a test takes seconds.
@@ -204,24 +203,3 @@ def test_a_direction_between_those_of_the_grid_is_named_where_a_generic_term_lea
     assert found.name == "structure_compliance"
     assert found.parameters["direction"].value == pytest.approx(math.radians(20.0), abs=0.02)
     assert found.parameters["stiffness"].lo < 5e8 < found.parameters["stiffness"].hi
-
-
-@pytest.mark.slow
-def test_what_a_search_leaves_wrong_is_sought_from_the_drawing(setup, observations, monkeypatch):
-    forward = Selection.forward
-    asked = []
-
-    def stuck_at_first(self, say, afar=False):
-        asked.append(afar)
-        return forward(self, say, afar) if afar else (self.baseline, ())
-
-    monkeypatch.setattr(Selection, "forward", stuck_at_first)
-    given = campaign(observations, setup, [Effect("thermal_growth", clearance_change=-12e-6)], 7)
-    (found,) = diagnose(given, setup, few()).verdict.effects
-    assert found.name == "thermal_growth"
-    assert found.parameters["clearance_change"].value == pytest.approx(-12e-6, abs=0.3e-6)
-    assert asked == [False, True]
-    # nothing is sought where nothing is wrong
-    asked.clear()
-    assert not diagnose(campaign(observations, setup, (), 8), setup, few()).verdict.effects
-    assert asked == [False]

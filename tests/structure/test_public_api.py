@@ -77,7 +77,7 @@ def test_the_names_are_the_public_ones_only():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", ["", "import tpjb_ident.diagnosis.search.fit, tpjb_ident.exports.formats\n"])
+@pytest.mark.parametrize("first", ["", "import tpjb_ident.diagnosis.comparison.fit, tpjb_ident.exports.formats\n"])
 def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_imported_first(first):
     code = (
         f"import inspect\n{first}import tpjb_ident as ti\n"

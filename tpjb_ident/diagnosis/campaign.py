@@ -16,12 +16,12 @@ from rigdata.manifest.fields import MAINS_FREQUENCIES
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.measured_pivots import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.forward import SENSOR
 from tpjb_ident.diagnosis.forward.tolerances import StatedTolerance, Tolerances
 from tpjb_ident.diagnosis.observations.from_table import observe_table
 from tpjb_ident.diagnosis.observations.observe import observe
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
@@ -131,9 +131,9 @@ def diagnose_campaign(
     Examples
     --------
     >>> from model.effects import known_effects
-    >>> from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+    >>> from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     >>> campaign = ti.load_campaign(demo)
-    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "oil_viscosity"}
+    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "soft_pivot"}
     >>> bearing = ti.load_bearing(campaign.bearing_text)
     >>> found = diagnose_campaign(campaign, bearing, settings=DiagnoseSettings(skip=others))
     >>> print(found.diagnosis.verdict.effects[0].name)

@@ -1,4 +1,4 @@
-"""Diagnose: observe -> screen -> fit -> decide, in one call."""
+"""Diagnose: observe -> compare -> decide, in one call."""
 
 from __future__ import annotations
 
@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from model.effects import Effect, apply_effects
-from model.setup import Mesh, Setup
+from model.setup import Setup
 from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.comparison.fit import Fit
+from tpjb_ident.diagnosis.comparison.problem import Problem, loosened
+from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.candidates import candidates
-from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
 from tpjb_ident.diagnosis.observations.observe import Layout, Observations
-from tpjb_ident.diagnosis.search.fit import Fit
-from tpjb_ident.diagnosis.search.problem import Problem, loosened
-from tpjb_ident.diagnosis.search.search import Search, search
-from tpjb_ident.diagnosis.search.selection import Progress
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.decide import decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
 from tpjb_ident.dynamic.results.identification import coefficient_columns, point_columns
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
 
 #: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
 ACCURACY = 1e-5
-#: Film mesh while models are compared: 0.02 % from the default in the coefficients, at half the time.
-MESH = Mesh(48, 4)
 #: Other explanations that a confirming test is chosen against.
 _IMPOSTORS = 2
 #: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
@@ -52,7 +49,7 @@ class Diagnosis:
 
     verdict: Verdict
     problem: Problem = field(repr=False)
-    found: Search = field(repr=False)
+    comparison: Comparison = field(repr=False)
     after: FloatArray = field(repr=False)  #: (n,): what the model predicts with exactly the effects that are named
 
     @property
@@ -67,26 +64,15 @@ def diagnose(
     """Find the effects that a baseline lacks to describe a campaign."""
     settings = settings or DiagnoseSettings()
     observations = _thinned(observations)
-    quick = setup.change(accuracy=ACCURACY, mesh=MESH if setup.mesh == Mesh() else setup.mesh)
+    quick = setup.change(accuracy=ACCURACY)
     forward = Forward(quick, observations.layout, observations.elements)
     problem = pose(observations, forward, settings)
     with workers(forward, problem, settings.workers) as run:
-        search_result = search(run, problem, settings, progress)
-        exact = _exact(forward, search_result)
-        verdict = decide(problem, search_result, settings, exact)
-        verdict = replace(
-            verdict, next_test=_next_test(run, verdict, search_result, (quick, observations.layout), settings)
-        )
-    after = problem.base if not verdict.effects or exact is None else exact
-    return Diagnosis(verdict, problem, search_result, after)
-
-
-def _exact(forward: Forward, found: Search) -> FloatArray | None:
-    """What the model predicts with the effects of a search and nothing else; None where it has no equilibrium."""
-    try:
-        return forward.fresh()(found.effects.effects)
-    except NoEquilibriumError:
-        return None
+        comparison = compare(run, problem, settings, progress)
+        decision = decide(run, problem, comparison, settings)
+        campaign = quick, observations.layout
+        words = _next_test(run, decision.verdict, comparison, decision.model, campaign, settings)
+    return Diagnosis(replace(decision.verdict, next_test=words), problem, comparison, decision.after)
 
 
 def pose(observations: Observations, forward: Forward, settings: DiagnoseSettings) -> Problem:
@@ -104,28 +90,26 @@ def _column(forward: ForwardModel, base: FloatArray, unknowns: tuple[Nuisance, .
 
 
 def _next_test(
-    run: Map, verdict: Verdict, result: Search, baseline: tuple[Setup, Layout], settings: DiagnoseSettings
-) -> str:
+    run: Map, verdict: Verdict, comparison: Comparison, model: Fit, campaign: tuple[Setup, Layout],
+    settings: DiagnoseSettings,
+) -> str:  # fmt: skip
     """What one more test would tell, in words: which explanation it is, or that it is the one named."""
     if verdict.verdict == "consistent":
         return "none needed"
     if not verdict.effects:
         worst = verdict.disagreement[0]
         return f"repeat {worst.observable} at {worst.where}, where the unknown shows most, with another sensor set"
-    setup, layout = baseline
-    rivals = _rivals(result)
-    if not rivals:
+    setup, layout = campaign
+    rivals = [fit for fit in _rivals(comparison, model) if _possible(setup, fit)]
+    if not rivals or not _possible(setup, model):
         return ""
-    model = _possible(setup, result.model)
-    alternatives = [e for r in rivals if (e := _possible(setup, r)) is not None]
-    if model is None or not alternatives:
-        return ""
+    explanations = (model.effects, *(fit.effects for fit in rivals))
     count = len(options_for(setup, layout))
-    tried = run(_separated, [(setup, i, (model, *alternatives), settings.tolerances) for i in range(count)])
+    tried = run(_separated, [(setup, i, explanations, settings.tolerances) for i in range(count)])
     tests = ranked([separation for separation in tried if separation is not None])
     if not tests:
         return ""
-    text = say(suggested(tests), result.model.label, *(r.label for r in rivals))
+    text = say(suggested(tests), model.label, *(fit.label for fit in rivals))
     return f"to confirm: {text}" if verdict.verdict == "named" else text
 
 
@@ -136,21 +120,21 @@ def _separated(
     return separated(setup, options_for(setup, forward.layout)[index], told[0], told[1:], known)
 
 
-def _possible(setup: Setup, fitted: Fit):  # type: ignore[no-untyped-def]
+def _possible(setup: Setup, fit: Fit) -> bool:
+    """Whether the model takes the effects of a fit."""
     try:
-        apply_effects(setup, fitted.effects)
+        apply_effects(setup, fit.effects)
     except ValueError:
-        return None
-    return fitted.effects
+        return False
+    return True
 
 
-def _rivals(result: Search) -> list[Fit]:
-    """The likeliest other explanations, one per name."""
-    rows = sorted((r for row in result.rivals for r in row if not r.at_bound), key=lambda f: -f.evidence)
+def _rivals(comparison: Comparison, model: Fit) -> list[Fit]:
+    """The likeliest other explanations, one per set of names; those that hold all of the model's say nothing else."""
     by_names: dict[frozenset[str], Fit] = {}
-    for r in rows:
-        if r.names != result.model.names:
-            by_names.setdefault(r.names, r)
+    for fit in comparison.fits:
+        if fit.faults and not fit.on_bound and not model.labels <= fit.labels:
+            by_names.setdefault(fit.names, fit)
     return list(by_names.values())[:_IMPOSTORS]
 
 

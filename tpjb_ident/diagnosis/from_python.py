@@ -20,11 +20,11 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.units import to_si
 from tpjb_ident.arguments import as_bearing, as_campaign
 from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis, diagnose_campaign
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout
 from tpjb_ident.diagnosis.plan import CampaignPlan
 from tpjb_ident.diagnosis.plan import plan as work_out
 from tpjb_ident.diagnosis.planned import around, dry, dynamic
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 from tpjb_ident.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -76,11 +76,11 @@ def diagnose(
     Asked about two effects; without settings about all of the library.
 
     >>> from model.effects import known_effects
-    >>> from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
-    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "oil_viscosity"}
+    >>> from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+    >>> others = frozenset(known_effects()) - {"pivot_flexibility", "soft_pivot"}
     >>> result = ti.diagnose(demo, settings=DiagnoseSettings(skip=others))
-    >>> print(result.summary().splitlines()[0])
-    demo: All pivots have 39.3 ± 1.8 % of the formula's stiffness. That explains the disagreement.
+    >>> print(result.summary().split(" and ")[0])
+    demo: All pivots have 37.6 ± 1.9 % of the formula's stiffness
     """
     opened = as_campaign(campaign, "campaign")
     chosen = settings or DiagnoseSettings()

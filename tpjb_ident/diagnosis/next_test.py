@@ -28,9 +28,9 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout, Observations
 from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
-from tpjb_ident.diagnosis.search.components import usual_factor
 
 HZ = 2 * math.pi
 #: Step of the supply temperature that a cooler can make [K].

@@ -19,9 +19,9 @@ from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.planned import planned_observations
-from tpjb_ident.diagnosis.search.components import usual_factor
 from tpjb_ident.presentation import json_data
 
 if TYPE_CHECKING:

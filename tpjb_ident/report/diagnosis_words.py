@@ -76,7 +76,9 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
     if verdict.verdict == "consistent":
         return f"{name}: model and measurement agree within noise and tolerance."
     if verdict.verdict == "named":
-        return f"{name}: {found}. That explains the disagreement."
+        gap = verdict.gap
+        shrunk = f"from {gap['heldout_before']:.1f} to {gap['heldout_after']:.1f} standard deviations"
+        return f"{name}: {found}. That explains the disagreement: on points left out of the fit it shrinks {shrunk}."
     if verdict.verdict == "ambiguous":
         rivals = dict.fromkeys(label_in_words(n) for group in verdict.indistinguishable for n in group[1:])
         return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."

@@ -27,24 +27,24 @@ import numpy as np
 from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
-from model.setup import Setup
+from model.setup import Mesh, Setup
 from rigdata.arrays import FloatArray
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.tables import tables
 from tests.studies.results import Rows
-from tpjb_ident.diagnosis.diagnose import ACCURACY, MESH, pose
+from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.search import Comparison, compare
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.diagnose import ACCURACY, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.observations.gap import coordinate, direct_scale
+from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations
-from tpjb_ident.diagnosis.search.problem import Problem
-from tpjb_ident.diagnosis.search.screen import visible
-from tpjb_ident.diagnosis.search.search import Search, baseline_fit, search
-from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.verdict.decide import decide
+from tpjb_ident.diagnosis.verdict.decide import Decision, decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 HERE, BEARINGS = Path(__file__).parent, Path(__file__).parents[3] / "model" / "bearings"
@@ -102,7 +102,7 @@ def plan_between() -> tuple[Layout, Layout]:
 def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Bench:
     """Pose a bearing's plan, on an emulator whose table is kept in a folder, or on the model."""
     bearing = load_bearing((HERE if name == "between" else BEARINGS) / f"{name}.toml")
-    setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=MESH, accuracy=ACCURACY)
+    setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(48, 4), accuracy=ACCURACY)
     layout, new = plan_between() if name == "between" else plan_of_the_paper()
     observations = planned_observations(setup, layout)
     model = Forward(setup, layout, observations.elements)
@@ -114,11 +114,11 @@ def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Ben
     forward = Forward(setup, layout, observations.elements, cache)
     elsewhere = Forward(setup, new, planned_observations(setup, new).elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=skip))
-    base = baseline_fit(problem)
+    factor = usual_factor(problem.observations, problem.columns)
     seen = {}
     for c in problem.pool:
         columns = [_slope(forward.fresh(), problem.base, c, i) for i in range(len(c.steps))]
-        seen[c.label] = visible(problem, base, c, np.column_stack(columns))
+        seen[c.label] = float(np.linalg.norm(np.linalg.solve(factor, np.column_stack(columns) @ c.steps)))
     return Bench(problem, forward, elsewhere, seen)
 
 
@@ -239,11 +239,11 @@ def _noise(observations: Observations, value: FloatArray, rng: np.random.Generat
     return np.asarray(smooth + factor * rng.standard_normal(len(value)))
 
 
-def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Verdict, Search]:
-    """Search and decide in this process, whatever stands behind the model; without a next test."""
+def solve(problem: Problem, forward: ForwardModel, settings: DiagnoseSettings) -> tuple[Decision, Comparison]:
+    """Compare and decide in this process, whatever stands behind the model; without a next test."""
     with workers(forward, problem, 1) as run:
-        found = search(run, problem, settings)
-    return decide(problem, found, settings), found
+        comparison = compare(run, problem, settings)
+        return decide(run, problem, comparison, settings), comparison
 
 
 def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[str, Any] | None:
@@ -253,15 +253,13 @@ def run(one: Bench, kind: str, seed: int, settings: DiagnoseSettings) -> dict[st
     if drawn is None:
         return None
     began = time.process_time()
-    verdict, found = solve(drawn.problem, one.forward, settings)
+    decision, comparison = solve(drawn.problem, one.forward, settings)
+    verdict = decision.verdict
     return {
         "kind": kind, "seed": seed, **hidden(drawn), **said(verdict), "gap": verdict.gap,
         "remainder": verdict.remainder.sigma, "p": verdict.remainder.p, "reasons": list(verdict.reasons),
-        "worth": [
-            (c.label, w.unseen, w.beside) for c, w in zip(found.model.candidates, found.effect_gain, strict=True)
-        ],
-        "singles": [(f.label, f.evidence - found.baseline.evidence) for f in found.singles[:5]],
-        "elsewhere": _elsewhere(one, drawn, found.effects.effects if verdict.effects else ()),
+        "fits": [(f.label, f.posterior.total, p) for f, p in zip(comparison.fits[:5], comparison.probabilities)],
+        "elsewhere": _elsewhere(one, drawn, [e.effect for e in verdict.effects]),
         "seconds": time.process_time() - began,
     }  # fmt: skip
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis
-    from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
+    from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
@@ -109,8 +109,8 @@ def diagnose(
 def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers: int | None) -> DiagnoseSettings:
     if model_tolerance is not None and not 1e-4 <= model_tolerance <= 0.5:
         raise BadInputError(f"--model-tolerance {model_tolerance:g}: must lie between 0.0001 and 0.5 (0.015 is 1.5 %).")
+    from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-    from tpjb_ident.diagnosis.search.settings import DiagnoseSettings
 
     typed: dict[str, str | float] = {}
     for text in tolerances:

@@ -28,7 +28,7 @@ from tpjb_ident.terms.mains import MAINS_CORRECTED, MAINS_ON_LINE
 class Tolerance:
     """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
 
-    How much of it a campaign really needs is learnt (`search.assessment`); what is needed beyond it is a remainder.
+    How much of it a campaign really needs is summed over (`comparison.evidence`).
     """
 
     stiffness: float = 0.015

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.forward.candidates import TERMS
-from tpjb_ident.diagnosis.search.assessment import Linear, assess
-from tpjb_ident.diagnosis.search.effect_gain import STAND_IN
-from tpjb_ident.diagnosis.search.fit import Fit
-from tpjb_ident.diagnosis.search.problem import Problem
-from tpjb_ident.diagnosis.search.search import Search
+from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
+from tpjb_ident.diagnosis.comparison.faults import Fault
+from tpjb_ident.diagnosis.comparison.fit import Fit
 
 #: A smaller principal value below this share of the larger one makes a term one of one direction.
 _ONE_WAY = 0.2
@@ -28,8 +25,8 @@ _PADS = {
 }
 #: What an amplitude could change over, with the number of levels it takes to tell.
 OVER = (("static_load", "load", 3), ("shaft_speed", "speed", 2), ("excitation", "excitation", 4))
-#: Rise of the log evidence from which a drift counts: odds of 150.
-_NOTABLE = 5.0
+#: Deviations from which a pad by itself is more than its tolerance: a chance of 1 in 370 each.
+_BEYOND = 3.0
 #: Relative change over the range below which an amplitude is the same for all practical ends.
 _SAME = 0.1
 
@@ -48,31 +45,29 @@ class Behaviour:
     parameters: dict[str, float]
 
 
-def behaviours(problem: Problem, result: Search, beyond: bool = False) -> tuple[Behaviour, ...]:
-    """Describe the generic terms of a search's model, and the pads that are further off than stated."""
-    model = result.model
+def behaviours(fit: Fit) -> tuple[Behaviour, ...]:
+    """Describe the generic terms of a fit, and the pads that are further off than stated."""
     out = []
-    for candidate, amplitudes, at in zip(model.candidates, model.amplitudes, model.slices, strict=True):
-        if candidate.name not in TERMS:
+    for fault, amplitudes, errors in zip(fit.faults, fit.amplitudes, fit.errors, strict=True):
+        if not fault.is_term:
             continue
-        values = candidate.values(amplitudes)
+        values = fault.values(amplitudes)
         matrix = np.array([[values["xx"], values["xy"]], [values.get("yx", values["xy"]), values["yy"]]])
-        errors = model.errors[at]
         spread = float(np.max(errors) / max(np.max(np.abs(amplitudes)), 1e-300))
-        out.append(_described(candidate.name, candidate.form, matrix, spread, values))
-    return (*out, *(_pads(problem, result.effects) if beyond else ()))
+        out.append(_described(fault.name, fault.candidate.form, matrix, spread, values))
+    return (*out, *_pads(fit))
 
 
-def _pads(problem: Problem, fitted: Fit) -> list[Behaviour]:
-    """Pads whose clearance or pivot is off by more than `STAND_IN` standard deviations of what is stated."""
-    count = fitted.jacobian.shape[1]
-    free = fitted.assessment.free[count:]
-    variance = np.diag(fitted.assessment.covariance)[count:]
+def _pads(fit: Fit) -> list[Behaviour]:
+    """Pads whose clearance or pivot is off by more than `_BEYOND` standard deviations of what is stated."""
+    nuisances = {f"{n.name} {n.place}".strip(): n for n in fit.problem.nuisances}
     out = []
-    for nuisance, m, v in zip(problem.nuisances, free, variance, strict=True):
-        if nuisance.name not in _PADS or abs(m) < STAND_IN * math.sqrt(max(1.0 - v, 1e-12)):
+    for deviation in fit.tolerances:
+        nuisance = nuisances.get(deviation.name)
+        if nuisance is None or nuisance.name not in _PADS or abs(deviation.significance) < _BEYOND:
             continue
-        pad, change, spread = int(nuisance.place.split()[-1]), float(m * nuisance.sigma), float(math.sqrt(v) / abs(m))
+        pad, change = int(nuisance.place.split()[-1]), deviation.size * nuisance.sigma
+        spread = math.sqrt(max(1.0 - deviation.heard, 0.0)) / abs(deviation.size)
         kind, effect, parameter, unit = _PADS[nuisance.name]
         if effect == "pad_offset":
             size, words = change, f"pad #{pad} stands {1e6 * change:+.1f} um from where the drawing has it"
@@ -127,49 +122,58 @@ class Drift:
                 "to": self.end, "words": self.words}  # fmt: skip
 
 
-def drifts(problem: Problem, fitted: Fit) -> tuple[Drift, ...]:
+def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:
     """Look for drifts of the first amplitude of every effect of a fit, the most telling per effect."""
     out = []
-    for candidate, at in zip(fitted.candidates, fitted.slices, strict=True):
-        if candidate.name in TERMS or candidate.basis:
+    for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
+        if fault.is_term:
             continue
-        found = [_over(problem, fitted, candidate, at.start, row) for row in OVER]
-        best = max((f for f in found if f is not None), key=lambda f: f[0], default=None)
-        if best is not None and best[0] > _NOTABLE:
+        rows = [_over(fit, fault, at.start, row) for row in OVER]
+        best = max((row for row in rows if row is not None), key=lambda row: row[0], default=None)
+        if best is not None and best[0] > notable:
             out.append(best[1])
     return tuple(out)
 
 
-def _over(problem, fitted: Fit, candidate, index: int, row) -> tuple[float, Drift] | None:  # type: ignore[no-untyped-def]
+def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tuple[float, Drift] | None:
+    """Rise of the log evidence where an amplitude may grow over a coordinate, and how it does."""
     name, coordinate, levels = row
-    coordinates = np.array([abs(e.place(coordinate)) if e.family in {"h", "temperature"} else math.nan
-                      for e in problem.observations.elements])  # fmt: skip
-    finite_values = sorted(set(coordinates[np.isfinite(coordinates)]))
+    elements = fit.problem.observations.elements
+    places = np.array([abs(e.place(coordinate)) if e.family in {"h", "temperature"} else math.nan for e in elements])
+    finite_values = sorted(set(places[np.isfinite(places)]))
     if len(finite_values) < levels:
         return None
     middle = float(np.mean(finite_values))
-    slope = np.nan_to_num(coordinates / middle - 1.0)
-    linear = fitted.assessment.linear
+    slope = np.nan_to_num(places / middle - 1.0)
+    linear, moved = fit.linear, float(fit.posterior.mean[index])
     # per unit of relative growth; a prior of one: up to twice, down to nothing
-    moved = float(
-        np.concatenate(fitted.amplitudes)[index] - np.concatenate([c.origin for c in fitted.candidates])[index]
-    )
-    column = linear.columns[:, index] * slope * moved
-    wider = Linear(linear.residual, np.column_stack([linear.columns, column]), np.append(linear.width, 1.0))
-    assessment = assess(problem.basis, wider, fitted.assessment.scales)
-    growth = float(assessment.free[-1])
-    origin = float(candidate.origin[0])
-    ends = [_value(candidate, origin, moved, growth, v / middle - 1.0) for v in (finite_values[0], finite_values[-1])]
+    column = linear.jacobian[:, index] * slope * moved
+    wider = Linear(
+        linear.residual, np.append(linear.theta, 0.0), np.column_stack([linear.jacobian, column]),
+        np.append(linear.width, 1.0),
+    )  # fmt: skip
+    state = posterior(fit.problem.errors, wider)
+    plain = posterior(fit.problem.errors, linear)
+    growth = float(state.mean[-1])
+    ends = [
+        _value(fault, index, fit, moved * (1.0 + growth * (v / middle - 1.0)))
+        for v in finite_values[:: len(finite_values) - 1]
+    ]
     size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
     if size < _SAME:
         return None
-    parameter = candidate.free[0]
+    parameter = fault.candidate.free[0]
     words = _words(ends, finite_values, name)
-    return assessment.evidence - fitted.evidence, Drift(candidate.label, parameter.name, name, ends[0], ends[1], words)
+    rise = state.promised - plain.promised
+    return rise, Drift(fault.label, parameter.name, name, ends[0], ends[1], words)
 
 
-def _value(candidate, origin: float, moved: float, growth: float, share: float) -> float:  # type: ignore[no-untyped-def]
-    return float(candidate.free[0].from_linear(origin + moved * (1.0 + growth * share)))
+def _value(fault: Fault, index: int, fit: Fit, amplitude: float) -> float:
+    """The fault's first parameter at an amplitude counted from where nothing happens."""
+    at = next(s for s in fit.unknowns.slices if s.start == index)
+    amplitudes = fit.posterior.mean[at] + fault.origin
+    amplitudes[0] = amplitude + fault.origin[0]
+    return fault.values(amplitudes)[fault.candidate.free[0].name]
 
 
 def _words(ends: list[float], known: list[float], over: str) -> str:

@@ -21,6 +21,7 @@ class FoundEffect:
     name: str
     parameters: dict[str, Estimate]
     stands_in: str = ""
+    probability: float = 1.0  #: inclusion probability of the name, on whichever pad or direction
 
     @property
     def label(self) -> str:
@@ -35,7 +36,9 @@ class FoundEffect:
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as in the contract."""
         parameters = {k: vars(p) for k, p in self.parameters.items()}
-        return {"name": self.name, "parameters": parameters, "stands_in": self.stands_in}
+        return {
+            "name": self.name, "probability": self.probability, "parameters": parameters, "stands_in": self.stands_in,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class RankedCandidate:
     score: float
     heldout_gap: float
     parameters: dict[str, Any] = field(default_factory=dict)
+    probability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ class Assumption:
     fitted: float | list[float]
     unit: str
     source: str
+    deviation: float = 0.0  #: standard deviations by which its farthest number is out
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Problem: all that a search needs, whether the model behind it is the real one or a stand-in."""
+"""Problem: all that a comparison needs, whether the model behind it is the real one or a stand-in."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
+from tpjb_ident.diagnosis.comparison.faults import Fault, faults_of
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
-from tpjb_ident.diagnosis.observations.folds import Fold, folds, held_out
+from tpjb_ident.diagnosis.observations.folds import held_out
+from tpjb_ident.diagnosis.observations.model_error import model_error
 from tpjb_ident.diagnosis.observations.observe import Observations, Tolerance
-from tpjb_ident.diagnosis.search.assessment import Basis
-from tpjb_ident.diagnosis.search.components import components
 
 #: Share of the static load below which a pad hardly carries: its attitude, and so its temperature, is not unique.
 _HARDLY = 0.10
@@ -21,7 +22,7 @@ _HARDLY = 0.10
 
 @dataclass(frozen=True)
 class Problem:
-    """A campaign beside a baseline."""
+    """A campaign next to a baseline."""
 
     observations: Observations
     base: FloatArray = field(repr=False)  #: (n,): prediction of the baseline
@@ -31,33 +32,33 @@ class Problem:
 
     @functools.cached_property
     def sigma(self) -> FloatArray:
-        """Measurement and stated model tolerance together: the unit of everything in a search, (n,)."""
+        """Measurement and stated model tolerance together: the unit of everything in a comparison, (n,)."""
         return self.observations.total_sigma
 
     @functools.cached_property
-    def basis(self) -> Basis:
-        """What every assessment shares."""
+    def errors(self) -> ErrorModel:
+        """Covariance of noise and model error at every scale."""
         noise = self.observations.covariance / np.outer(self.sigma, self.sigma)
-        return Basis(noise, components(self.observations), self.folds)
+        return ErrorModel(noise + 1e-9 * np.eye(len(noise)), model_error(self.observations))
 
     @functools.cached_property
-    def folds(self) -> tuple[Fold, ...]:
-        """Blocks that are left out in turn."""
-        return folds(self.observations)
+    def faults(self) -> tuple[Fault, ...]:
+        """What may be wrong."""
+        return faults_of(self.pool, self.nuisances)
 
     @functools.cached_property
     def held(self) -> BoolArray:
         """Elements to which a model must extrapolate."""
         return held_out(self.observations)
 
+    @functools.cached_property
+    def measured(self) -> FloatArray:
+        """The observations in units of `sigma`, (n,)."""
+        return self.scaled(self.observations.value)
+
     def scaled(self, vector: FloatArray) -> FloatArray:
         """A vector (n,) or columns (n, k) in units of `sigma`."""
         return np.asarray(vector / (self.sigma if vector.ndim == 1 else self.sigma[:, None]))
-
-    def aliases(self, candidate: Candidate) -> list[int]:
-        """Nuisances that do what a candidate does."""
-        names = {candidate.name, candidate.label}
-        return [i for i, nuisance in enumerate(self.nuisances) if names & nuisance.aliases]
 
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:

@@ -1,4 +1,4 @@
-"""Course: what one amplitude does to the prediction, over all sizes that a rig may have."""
+"""Amplitude path: what one amplitude does to the prediction, over all sizes that a rig may have."""
 
 from __future__ import annotations
 
@@ -9,10 +9,6 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from rigdata.arrays import FloatArray
-
-#: Amplitudes at which a course is asked for, in typical sizes: the nearest where a rig is expected, the others as far
-#: as the prior reaches (`candidates.PRIOR_WIDTH`).
-NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 
 
 @dataclass(frozen=True)
@@ -39,17 +35,6 @@ class AmplitudePath:
     def slope(self, amplitude: float) -> FloatArray:
         """Derivative at an amplitude, (n,)."""
         return np.asarray(self.columns @ self.slope_weights(np.array([amplitude]))[0])
-
-    @property
-    def neutral_slope(self) -> FloatArray:
-        """Derivative where nothing happens yet, of a parabola through the neighbours, (n,)."""
-        neutral = int(np.searchsorted(self.at, 0.0))
-        nodes = [i for i in (neutral - 1, neutral, neutral + 1) if 0 <= i < len(self.at)]
-        if len(nodes) < 3:
-            nodes = list(range(3)) if neutral == 0 else list(range(len(self.at) - 3, len(self.at)))
-        scale = float(np.abs(self.at[nodes]).max())
-        powers = np.vander(self.at[nodes] / scale, 3, increasing=True)
-        return np.asarray(np.linalg.solve(powers, self.columns[:, nodes].T)[1] / scale)
 
     def _inside(self, amplitudes: FloatArray) -> FloatArray:
         return np.clip(amplitudes, self.at[0], self.at[-1])
@@ -78,7 +63,7 @@ _SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]]
 
 
 def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> AmplitudePath:
-    """Lay a course through what the model said; `changes` (n,) each."""
+    """Lay a path through what the model said; `changes` (n,) each."""
     order = np.argsort([0.0, *amplitudes])
     at = np.array([0.0, *amplitudes])[order]
     values = np.array([np.zeros_like(changes[0]), *changes])[order]

@@ -1,0 +1,1 @@
+"""One comparison: every explanation is a Gaussian-linear model of all observations, with other numbers free."""

@@ -1,0 +1,269 @@
+"""Fit: an explanation at its solved point, all free numbers moved together."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from model.effects import Effect
+from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, Posterior, posterior
+from tpjb_ident.diagnosis.comparison.faults import Fault
+from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.scores import Strain
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
+from tpjb_ident.diagnosis.forward.workers import Map
+
+#: Steps on one set of derivatives, which every step corrects.
+_STEPS = 4
+#: Stated deviations of a tolerance while a coarse start passes the jumps of pads that empty.
+HELD = 0.2
+#: Share of its deviation within which a number has arrived.
+_ARRIVED = 0.1
+#: Of a tolerance of which the data say less than this share of its variance nothing is asked.
+_SILENT = 0.05
+#: Scatters whose mean is a tolerance of the whole bearing, with that tolerance where there is one.
+_MEANS = {"clearance_scatter": "assembled_clearance", "pivot_stiffness_scatter": ""}
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a model was solved."""
+
+    theta: FloatArray
+    prediction: FloatArray
+    jacobian: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An explanation with what the data say of it."""
+
+    problem: Problem = field(repr=False)
+    unknowns: Unknowns = field(repr=False)
+    point: Point = field(repr=False)
+    posterior: Posterior = field(repr=False)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Its faults."""
+        return self.unknowns.faults
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Labels of its faults: what makes two fits the same explanation."""
+        return frozenset(fault.label for fault in self.faults)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of its effects."""
+        return frozenset(fault.name for fault in self.faults)
+
+    @property
+    def label(self) -> str:
+        """Labels, joined."""
+        return " + ".join(fault.label for fault in self.faults) or "baseline"
+
+    @property
+    def has_terms(self) -> bool:
+        """Whether a generic term takes part."""
+        return any(fault.is_term for fault in self.faults)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects at their fitted sizes."""
+        return self.unknowns.effects(self.point.theta)
+
+    @property
+    def linear(self) -> Linear:
+        """The model about its solved point."""
+        return _linear(self.problem, self.unknowns, self.point)
+
+    @property
+    def amplitudes(self) -> tuple[FloatArray, ...]:
+        """Posterior means of every fault's amplitudes, within their bounds."""
+        unknowns = self.unknowns
+        mean = np.clip(self.posterior.mean, unknowns.low, unknowns.high) + unknowns.origin
+        return tuple(mean[at] for at in unknowns.slices)
+
+    @property
+    def errors(self) -> tuple[FloatArray, ...]:
+        """Standard errors of every fault's amplitudes; those on a tolerance's number hold its own scatter besides."""
+        deviation = np.sqrt(np.maximum(np.diag(self.posterior.covariance), 0.0))
+        pairs = zip(self.faults, self.unknowns.slices, strict=True)
+        return tuple(np.hypot(deviation[at], 1.0 if fault.own >= 0 else 0.0) for fault, at in pairs)
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Posterior means of all tolerances in stated deviations, zero for one that a fault has taken over, (m,)."""
+        out = np.zeros(len(self.problem.nuisances))
+        out[self.unknowns.tolerances] = self.posterior.mean[self.unknowns.amplitudes :]
+        return out
+
+    @property
+    def on_bound(self) -> bool:
+        """Whether an amplitude is on its bound: the linear form counts the forbidden side too."""
+        own = slice(0, self.unknowns.amplitudes)
+        near, theta = 1e-6 * self.unknowns.width[own], self.point.theta[own]
+        low, high = self.unknowns.low[own], self.unknowns.high[own]
+        return bool(np.any((theta <= low + near) | (theta >= high - near)))
+
+    @functools.cached_property
+    def tolerances(self) -> tuple[Deviation, ...]:
+        """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
+        names, rows = _combinations(self.problem, self.unknowns)
+        count = self.unknowns.amplitudes
+        stated = np.sqrt(np.sum(rows**2, axis=1))
+        sizes = rows @ self.posterior.mean[count:] / stated
+        heard = 1.0 - np.sum((rows @ self.posterior.covariance[count:, count:]) * rows, axis=1) / stated**2
+        listed = [Deviation(*row) for row in zip(names, map(float, sizes), map(float, heard), strict=True)]
+        return tuple(sorted(listed, key=lambda d: -abs(d.significance)))
+
+    @functools.cached_property
+    def strain(self) -> Strain:
+        """The tolerances of which the data say something."""
+        _, rows = _combinations(self.problem, self.unknowns)
+        count = self.unknowns.amplitudes
+        stated = np.sum(rows**2, axis=1)
+        heard = stated - np.sum((rows @ self.posterior.covariance[count:, count:]) * rows, axis=1)
+        asked = heard > _SILENT * stated
+        whole = np.column_stack([np.zeros((len(rows), count)), rows])
+        return Strain(whole[asked], np.sqrt(heard[asked]))
+
+    @property
+    def p(self) -> float:
+        """Probability that a tolerance is as far out as the farthest one, all of them considered."""
+        return self.strain.p(self.posterior.mean)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a tolerance is from what is stated."""
+
+    name: str
+    size: float  #: in stated deviations
+    heard: float  #: share of its variance that the data take away
+
+    @property
+    def significance(self) -> float:
+        """A posterior mean of something with prior variance 1 and posterior variance v scatters with 1 - v."""
+        return self.size / float(np.sqrt(self.heard)) if self.heard > _SILENT else 0.0
+
+
+def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], FloatArray]:
+    """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, m)."""
+    listed = [problem.nuisances[i] for i in unknowns.tolerances]
+    names, rows = [f"{n.name} {n.place}".strip() for n in listed], list(np.eye(len(listed)))
+    sigma = {n.name: n.sigma for n in listed}
+    for scatter, common in _MEANS.items():
+        members = np.array([n.name == scatter for n in listed], dtype=float)
+        if members.sum() > 1:
+            whole = np.array([n.name == common for n in listed], dtype=float)
+            names.append(f"{scatter}, mean of all pads")
+            rows.append(sigma[scatter] * members / members.sum() + sigma.get(common, 0.0) * whole)
+    return names, np.array(rows)
+
+
+def _linear(problem: Problem, unknowns: Unknowns, point: Point) -> Linear:
+    return Linear(problem.measured - point.prediction, point.theta, point.jacobian, unknowns.width)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a fit begins, on derivatives known from nearby."""
+
+    faults: tuple[Fault, ...]
+    theta: FloatArray = field(repr=False)
+    jacobian: FloatArray = field(repr=False)
+    coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
+
+
+def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
+    """Fit from a start; None where there is no equilibrium."""
+    unknowns = Unknowns(problem, start.faults)
+    theta = np.clip(start.theta, unknowns.low, unknowns.high)
+    (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
+    if predicted is None:
+        return None
+    point = Point(theta, predicted, start.jacobian)
+    if start.coarse:
+        held = unknowns.width.copy()
+        held[unknowns.amplitudes :] = HELD
+        coarse = problem.errors.coarse
+        point = _renewed(run, problem, unknowns, point)  # those from before the jump say nothing behind it
+        point = _stepped(run, problem, unknowns, point, coarse, held)
+        point = _stepped(run, problem, unknowns, point, coarse, unknowns.width)
+    point = _stepped(run, problem, unknowns, point, problem.errors, unknowns.width)
+    return Fit(problem, unknowns, point, posterior(problem.errors, _linear(problem, unknowns, point)))
+
+
+def refined(run: Map, fit: Fit) -> Fit:
+    """The same with derivatives of its own, and moved on by them."""
+    problem, unknowns = fit.problem, fit.unknowns
+    point = _renewed(run, problem, unknowns, fit.point)
+    moved = _stepped(run, problem, unknowns, point, problem.errors, unknowns.width)
+    return Fit(problem, unknowns, moved, posterior(problem.errors, _linear(problem, unknowns, moved)))
+
+
+def _renewed(run: Map, problem: Problem, unknowns: Unknowns, point: Point) -> Point:
+    """A point with derivatives of its own; what acts on readings has them already."""
+    asked = [i for i, reading in enumerate(unknowns.is_reading(problem)) if not reading]
+    parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
+    jacobian = point.jacobian.copy()
+    jobs = [(unknowns.faults, point.theta, part) for part in parts]
+    for part, columns in zip(parts, run(derivatives, jobs), strict=True):
+        for index, column in zip(part, columns, strict=True):
+            if column is not None:
+                jacobian[:, index] = column
+    return Point(point.theta, point.prediction, jacobian)
+
+
+def _stepped(
+    run: Map, problem: Problem, unknowns: Unknowns, point: Point, errors: ErrorModel, width: FloatArray
+) -> Point:
+    """Steps to the most probable point; each is solved, and corrects the derivatives."""
+    for _ in range(_STEPS):
+        linear = Linear(problem.measured - point.prediction, point.theta, point.jacobian, width)
+        state = posterior(errors, linear)
+        target = np.clip(state.mean, unknowns.low, unknowns.high)
+        deviation = np.sqrt(np.maximum(np.diag(state.covariance), 1e-300))
+        if np.all(np.abs(target - point.theta) < _ARRIVED * deviation):
+            return point
+
+        def cost(theta: FloatArray, predicted: FloatArray, scale: int = state.leading) -> float:
+            white = errors.white(problem.measured - predicted, scale)
+            return float(white @ white + np.sum((theta / width) ** 2))
+
+        moved = _step(run, problem, unknowns, point, target, cost)
+        if moved is None:
+            return point
+        point = moved
+    return point
+
+
+def _step(
+    run: Map, problem: Problem, unknowns: Unknowns, point: Point, target: FloatArray,
+    cost: Callable[[FloatArray, FloatArray], float],
+) -> Point | None:  # fmt: skip
+    """A step towards a target, shorter where it does not pay, with derivatives corrected by what it showed."""
+    most = cost(point.theta, point.prediction)
+    for share in (1.0, 0.4, 0.1):
+        theta = point.theta + share * (target - point.theta)
+        (new,) = tuple(run(prediction, [(unknowns.faults, theta)]))
+        if new is not None and cost(theta, new) < most:
+            return Point(theta, new, _corrected(problem, unknowns, point, theta, new))
+    return None
+
+
+def _corrected(problem: Problem, unknowns: Unknowns, point: Point, theta: FloatArray, new: FloatArray) -> FloatArray:
+    """Derivatives that would have foretold a step, the least change in units of the priors' widths (Broyden)."""
+    step = (theta - point.theta) / unknowns.width
+    surprise = new - point.prediction - point.jacobian @ (theta - point.theta)
+    step[unknowns.is_reading(problem)] = 0.0  # these are linear
+    length = float(step @ step)
+    if length < 1e-20:
+        return point.jacobian
+    return np.asarray(point.jacobian + np.outer(surprise, step / length) / unknowns.width)

@@ -1,0 +1,129 @@
+"""Paths: what every fault does to the prediction over all sizes that a rig may have, laid once per campaign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.comparison.amplitude_path import AmplitudePath, path_through
+from tpjb_ident.diagnosis.comparison.faults import Fault
+from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.unknowns import derivatives, path_changes
+from tpjb_ident.diagnosis.forward.workers import Map
+
+#: Nodes of a path in widths of the prior: typical sizes first, the ends only on the side that the data ask for.
+_NEAR, _FAR = (1.0 / 3.0, -1.0 / 3.0), 1.0
+#: Parts of the way from one direction of the grid to the next.
+_BETWEEN = 3
+#: Amplitudes of a path at which a score is asked for.
+_POINTS = 41
+#: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
+_SLOW = frozenset({"pad_bending", "pad_conduction"})
+
+
+@dataclass(frozen=True)
+class Path:
+    """Change of the prediction by one fault: cubic pieces along one amplitude, or straight columns for several."""
+
+    fault: Fault
+    columns: FloatArray = field(repr=False)  #: (n, c)
+    curve: AmplitudePath | None = field(default=None, repr=False)
+
+    def weights(self, amplitudes: FloatArray) -> FloatArray:
+        """Of the columns in the change at amplitudes (t, k), (t, c)."""
+        return amplitudes if self.curve is None else self.curve.weights(amplitudes[:, 0])
+
+    def slopes(self, amplitudes: FloatArray) -> FloatArray:
+        """Of the columns in the derivatives at amplitudes (t, k), (t, c, k)."""
+        if self.curve is None:
+            return np.tile(np.eye(amplitudes.shape[1]), (len(amplitudes), 1, 1))
+        return self.curve.slope_weights(amplitudes[:, 0])[:, :, None]
+
+    @property
+    def neutral_slope(self) -> FloatArray:
+        """Derivatives where nothing happens yet, (n, k)."""
+        if self.curve is None:
+            return self.columns
+        return self.curve.slope(0.0)[:, None]
+
+    def tried(self, pull: FloatArray, square: FloatArray) -> FloatArray:
+        """Amplitudes to look at, (t, k): a grid, or the likeliest ones of straight columns.
+
+        `pull` (c,) and `square` (c, c): columns' products with the residual and with each other.
+        """
+        fault = self.fault
+        low = np.maximum(fault.low - fault.origin, -fault.width)
+        high = np.minimum(fault.high - fault.origin, fault.width)
+        if self.curve is not None:
+            return np.linspace(low, high, _POINTS)
+        likeliest = np.linalg.solve(square + np.diag(1.0 / fault.width**2), pull)
+        return np.clip(likeliest, low, high)[None, :]
+
+
+def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
+    """Lay the path of every fault about its typical sizes; those without an equilibrium anywhere are left out."""
+    curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in _SLOW]
+    straight = [f for f in problem.faults if f not in curved]
+    nodes = [[share * float(f.width[0]) for share in _NEAR] for f in curved]
+    changes = run(path_changes, list(zip(curved, nodes, strict=True)))
+    paths = [_curved(fault, row) for fault, row in zip(curved, changes, strict=True) if row]
+    jobs = [((fault,), _start(problem, fault), tuple(range(len(fault.width)))) for fault in straight]
+    for fault, columns in zip(straight, run(derivatives, jobs), strict=True):
+        whole = [column for column in columns if column is not None]
+        if len(whole) == len(fault.width):
+            paths.append(Path(fault, np.column_stack(whole)))
+    return _between_directions(paths)
+
+
+def _between_directions(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """Paths of directions between those of the grid, by the second harmonic through all of the grid."""
+    groups: dict[str, list[Path]] = {}
+    for path in paths:
+        if "direction" in path.fault.candidate.fixed and path.curve is not None:
+            groups.setdefault(path.fault.label, []).append(path)
+    out = list(paths)
+    for group in groups.values():
+        grid = np.array([path.fault.candidate.fixed["direction"] for path in group])
+        curves = [path.curve for path in group if path.curve is not None]
+        alike = all(np.array_equal(curve.at, curves[0].at) for curve in curves)
+        if len(grid) < 3 or not alike:
+            continue
+        for turn in np.arange(1, _BETWEEN) * math.pi / len(grid) / _BETWEEN:
+            for path, angle in zip(group, grid, strict=True):
+                share = (1.0 + 2.0 * np.cos(2.0 * (angle + turn - grid))) / len(grid)
+                columns = np.tensordot(share, [curve.columns for curve in curves], 1)
+                fixed = {**path.fault.candidate.fixed, "direction": float(angle + turn)}
+                fault = replace(path.fault, candidate=replace(path.fault.candidate, fixed=fixed))
+                out.append(Path(fault, columns, AmplitudePath(curves[0].at, columns)))
+    return tuple(out)
+
+
+def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:
+    """Paths with one more node, at the end towards which a score went beyond what was laid."""
+    asked = [i for i, (path, size) in enumerate(zip(paths, sizes, strict=True)) if _beyond(path, size)]
+    jobs = [(paths[i].fault, [_FAR * float(np.sign(sizes[i]) * paths[i].fault.width[0])]) for i in asked]
+    out = list(paths)
+    for i, row in zip(asked, run(path_changes, jobs), strict=True):
+        curve = paths[i].curve
+        if row and curve is not None:
+            known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
+            out[i] = _curved(paths[i].fault, [*known, *row])
+    return tuple(out)
+
+
+def _beyond(path: Path, size: float) -> bool:
+    return path.curve is not None and not path.curve.at[0] <= size <= path.curve.at[-1]
+
+
+def _curved(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:
+    curve = path_through([float(at) for at, _ in changes], [change for _, change in changes])
+    return Path(fault, curve.columns, curve)
+
+
+def _start(problem: Problem, fault: Fault) -> FloatArray:
+    gone = fault.own >= 0
+    return np.zeros(len(fault.width) + len(problem.nuisances) - gone)

@@ -1,0 +1,284 @@
+"""Search: explanations are fitted in the order of what they promise, until none comes near the leader.
+
+Scores of one more fault beside a fitted model, and of one less, propose the next explanations. The likeliest proposal
+is fitted, and proposes further ones where it comes near the leader: the same step for the first fault and the third.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import logsumexp
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
+from tpjb_ident.diagnosis.comparison.faults import Fault
+from tpjb_ident.diagnosis.comparison.fit import HELD, Fit, Start, fitted, refined
+from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
+from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.scores import Score, scores
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.forward.workers import Map
+
+Progress = Callable[[str, float], None]
+#: Faults of an explanation at the most.
+_MOST_FAULTS = 3
+#: Nats that a fit rises above its score at the most, and so may its rivals: derivatives from elsewhere mistake that.
+_MISTAKEN = 25.0
+#: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.
+_SUSPECT, _COARSE = 0.4, 5
+#: Nats that put a coarse start before all others.
+_FIRST = 1e6
+#: Nats behind the leader within which a fit gets derivatives of its own.
+_WORTH_DERIVATIVES = 15.0
+
+
+@dataclass(frozen=True)
+class Proposal(Start):
+    """An explanation to be fitted, and from where."""
+
+    estimate: float = 0.0  #: log p(y, model) to first order [nats]
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """What makes two proposals the same explanation."""
+        return frozenset(fault.label for fault in self.faults)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All explanations that were fitted, with their probabilities."""
+
+    fits: tuple[Fit, ...]  #: the most probable first; those that are not tenable last
+    probabilities: tuple[float, ...]
+    tenable: tuple[bool, ...]
+    paths: tuple[Path, ...] = field(repr=False)
+
+    @property
+    def nothing(self) -> Fit:
+        """The explanation without a fault."""
+        return next(fit for fit in self.fits if not fit.faults)
+
+    @property
+    def best(self) -> Fit:
+        """The most probable explanation."""
+        return self.fits[0]
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Inclusion probability of every name, on whichever pad or direction."""
+        out: Counter[str] = Counter()
+        for fit, probability in zip(self.fits, self.probabilities, strict=True):
+            for name in fit.names:
+                out[name] += probability  # type: ignore[assignment]
+        return dict(out)
+
+    def probability(self, wanted: Fit) -> float:
+        """Probability of a fit."""
+        return next(p for fit, p in zip(self.fits, self.probabilities, strict=True) if fit is wanted)
+
+    def is_tenable(self, wanted: Fit) -> bool:
+        """Whether no tolerance and no bound speaks against a fit."""
+        return next(t for fit, t in zip(self.fits, self.tenable, strict=True) if fit is wanted)
+
+
+def compare(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Comparison:
+    """Compare explanations with no fault and with up to three; without any where the baseline is good enough."""
+    return _Search(run, problem, settings, progress or (lambda text, share: None)).result()
+
+
+class _Search:
+    """Fits and proposals of one campaign."""
+
+    def __init__(self, run: Map, problem: Problem, settings: DiagnoseSettings, report: Progress) -> None:
+        self.run, self.problem, self.settings, self.report = run, problem, settings, report
+        self.fits: dict[frozenset[str], Fit] = {}
+        self.estimates: dict[frozenset[str], float] = {}
+        self.proposals: dict[frozenset[str], Proposal] = {}
+        self.paths: tuple[Path, ...] = ()
+        self.places: Counter[str] = Counter({name: len(labels) for name, labels in _labels(problem.faults).items()})
+
+    def result(self) -> Comparison:
+        """Search, and weigh what was fitted."""
+        nothing = np.zeros(len(self.problem.nuisances))
+        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)))
+        self.report("every effect of the library", 0.1)
+        self._propose_singles()
+        while (proposal := self._next()) is not None:
+            self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / self.settings.most_fits))
+            self._fit(proposal)
+        return self._weighed()
+
+    def _next(self) -> Proposal | None:
+        """The likeliest proposal; None where none comes near the leader."""
+        if len(self.fits) >= self.settings.most_fits:
+            return None
+        order = sorted(self.proposals.values(), key=lambda p: -p.estimate)
+        leader = self._leader()
+        if leader is not None and leader.posterior.scale <= self.settings.right:
+            order = [p for p in order if self._promising(p, leader)]
+        return self.proposals.pop(order[0].labels) if order else None
+
+    def _promising(self, proposal: Proposal, leader: Fit) -> bool:
+        """Whether a proposal may change the answer: as a rival of a right leader, or by a fault beside it."""
+        plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
+        if proposal.coarse:
+            return plain
+        total = self._log_probability(leader)
+        if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
+            return proposal.estimate > total + math.log(1.0 - self.settings.included)
+        rise = _MISTAKEN if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, _MISTAKEN))
+        return proposal.estimate > total - self.settings.near - rise
+
+    def _fit(self, proposal: Proposal) -> None:
+        fit = fitted(self.run, self.problem, proposal)
+        if fit is None:
+            return
+        leader = self._leader()
+        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
+        if self._near(fit, _WORTH_DERIVATIVES if right else 0.0):
+            again = refined(self.run, fit)
+            fit = again if again.posterior.total > fit.posterior.total - 1.0 else fit
+        self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
+        if fit.faults and self._near(fit, self.settings.near):
+            self._propose_neighbours(fit)
+
+    def _near(self, fit: Fit, nats: float) -> bool:
+        leader = self._leader()
+        return leader is None or self._log_probability(fit) > self._log_probability(leader) - nats
+
+    def _leader(self) -> Fit | None:
+        """The most probable tenable fit so far."""
+        rows = [fit for fit in self.fits.values() if _tenable(fit, self.settings)]
+        return max(rows, key=self._log_probability, default=None)
+
+    def _log_probability(self, fit: Fit) -> float:
+        return fit.posterior.total + self._log_prior(fit.faults)
+
+    def _log_prior(self, faults: Sequence[Fault]) -> float:
+        """Log prior of an explanation: by its number of faults, spread over names, then over a name's places."""
+        sets = max(1, math.comb(len(self.places), len(faults)))
+        spread = sets * math.prod(self.places[fault.name] for fault in faults)
+        terms = sum(fault.is_term for fault in faults)
+        return math.log(self.settings.prior[len(faults)] / spread) + terms * math.log(self.settings.term)
+
+    def _propose_singles(self) -> None:
+        """Every fault by itself, from the baseline as stated."""
+        problem = self.problem
+        columns = problem.scaled(problem.columns)
+        nothing = np.zeros(columns.shape[1])
+        base = problem.scaled(problem.base)
+        linear = Linear(problem.measured - base, nothing, columns, np.ones(columns.shape[1]))
+        self.paths = lay_paths(self.run, problem)
+        strain = self.fits[frozenset()].strain
+        first = scores(problem.errors, linear, self.paths, strain)
+        rows = {id(score.path): score.amplitudes[0] for score in first}
+        self.paths = lengthened(self.run, problem, self.paths, [float(rows[id(path)]) for path in self.paths])
+        singles = scores(problem.errors, linear, self.paths, strain)
+        for score in singles:
+            self._propose(score, (), nothing, columns)
+        if singles and singles[0].scale > _SUSPECT:
+            held = Linear(linear.residual, nothing, columns, np.full(len(nothing), HELD))
+            for score in scores(problem.errors.coarse, held, self.paths, strain)[:_COARSE]:
+                self._propose(score, (), nothing, columns, coarse=True)
+
+    def _propose_neighbours(self, fit: Fit) -> None:
+        """One fault more, and one less."""
+        if len(fit.faults) < _MOST_FAULTS:
+            further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
+            for score in scores(self.problem.errors, fit.linear, further, fit.strain):
+                self._propose(score, fit.faults, fit.point.theta, fit.point.jacobian)
+        if len(fit.faults) > 1:
+            for fault in fit.faults:
+                self._propose_without(fit, fault)
+
+    def _beside(self, path: Path, fit: Fit) -> Path:
+        """A path beside a fit: a tolerance's own number has its derivative there, which large faults change."""
+        own = path.fault.own
+        if own < 0:
+            return path
+        column = fit.unknowns.amplitudes + fit.unknowns.tolerances.index(own)
+        return Path(path.fault, fit.point.jacobian[:, [column]])
+
+    def _propose(
+        self, score: Score, faults: tuple[Fault, ...], theta: FloatArray, jacobian: FloatArray, coarse: bool = False
+    ) -> None:
+        """Add a fault to a model: what its tolerance had found becomes the fault's start."""
+        if not np.any(score.amplitudes):
+            return
+        fault = score.path.fault.turned()
+        faults = (*faults, fault)
+        estimate = score.total + self._log_prior(faults) + (_FIRST if coarse else 0.0)
+        if score.p < self.settings.untenable:  # it would have to be a step on the way
+            estimate -= self.settings.near
+        labels = frozenset(f.label for f in faults)
+        if labels in self.fits or (labels in self.proposals and self.proposals[labels].estimate >= estimate):
+            return
+        start = np.zeros(len(fault.width))
+        start[: len(score.amplitudes)] = score.amplitudes
+        columns = np.zeros((len(jacobian), len(start)))
+        slopes = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
+        columns[:, : slopes.shape[1]] = slopes
+        first = sum(len(f.width) for f in faults[:-1])
+        rest, kept = theta[first:], jacobian[:, first:]
+        if fault.own >= 0:
+            taken = {f.own for f in faults[:-1]}
+            index = sum(i not in taken for i in range(fault.own))
+            start[0] += rest[index]
+            rest, kept = np.delete(rest, index), np.delete(kept, index, axis=1)
+        self.proposals[labels] = Proposal(
+            faults, np.concatenate([theta[:first], start, rest]),
+            np.column_stack([jacobian[:, :first], columns, kept]), coarse, estimate,
+        )  # fmt: skip
+
+    def _propose_without(self, fit: Fit, fault: Fault) -> None:
+        """Take a fault from a model; its tolerance has its stated prior again."""
+        remaining = tuple(f for f in fit.faults if f is not fault)
+        labels = frozenset(f.label for f in remaining)
+        if labels in self.fits:
+            return
+        point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
+        theta, jacobian = np.delete(point.theta, at), np.delete(point.jacobian, at, axis=1)
+        gone = point.jacobian[:, at] @ point.theta[at]
+        if fault.own >= 0:
+            taken = {f.own for f in remaining}
+            first = sum(len(f.width) for f in remaining)
+            index = first + sum(i not in taken for i in range(fault.own))
+            theta = np.insert(theta, index, 0.0)
+            jacobian = np.insert(jacobian, index, point.jacobian[:, at.start], axis=1)
+        width = np.concatenate(
+            [*(f.width for f in remaining), np.ones(len(theta) - sum(len(f.width) for f in remaining))]
+        )
+        residual = self.problem.measured - point.prediction + gone
+        total = posterior(self.problem.errors, Linear(residual, theta, jacobian, width)).total
+        estimate = total + self._log_prior(remaining)
+        if labels not in self.proposals or self.proposals[labels].estimate < estimate:
+            self.proposals[labels] = Proposal(remaining, theta, jacobian, estimate=estimate)
+
+    def _weighed(self) -> Comparison:
+        """Probabilities among the tenable fits; among all where none is."""
+        rows = list(self.fits.values())
+        tenable = [_tenable(fit, self.settings) for fit in rows]
+        logs = np.array([self._log_probability(fit) for fit in rows])
+        counted = np.where(tenable, logs, -np.inf) if any(tenable) else logs
+        probabilities = np.exp(counted - logsumexp(counted))
+        order = sorted(range(len(rows)), key=lambda i: (-probabilities[i], -logs[i]))
+        return Comparison(
+            tuple(rows[i] for i in order), tuple(float(probabilities[i]) for i in order),
+            tuple(tenable[i] for i in order), self.paths,
+        )  # fmt: skip
+
+
+def _tenable(fit: Fit, settings: DiagnoseSettings) -> bool:
+    return fit.p >= settings.untenable and not fit.on_bound
+
+
+def _labels(faults: Sequence[Fault]) -> dict[str, set[str]]:
+    out: dict[str, set[str]] = {}
+    for fault in faults:
+        out.setdefault(fault.name, set()).add(fault.label)
+    return out

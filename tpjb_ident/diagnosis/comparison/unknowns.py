@@ -1,0 +1,127 @@
+"""Unknowns: the free numbers of an explanation, and what the bearing model predicts with them.
+
+Amplitudes of faults come first, then the sizes of the tolerances that no fault has taken over; all are counted from
+their priors' means.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from model.effects import Effect
+from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.comparison.faults import REACH, Fault
+from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
+from tpjb_ident.diagnosis.forward.nuisance import predict
+from tpjb_ident.errors import TpjbError
+
+#: Steps of derivatives: share of a fault's prior width, stated deviations of a tolerance.
+_SHARE, _DEVIATIONS = 1.0 / 30.0, 0.3
+
+
+class Unknowns:
+    """The free numbers of a model with some faults beside all tolerances."""
+
+    def __init__(self, problem: Problem, faults: Sequence[Fault]) -> None:
+        taken = {fault.own for fault in faults}
+        self.faults = tuple(faults)
+        self.tolerances = [i for i in range(len(problem.nuisances)) if i not in taken]
+        count = len(self.tolerances)
+        self.origin = np.concatenate([*(fault.origin for fault in faults), np.zeros(count)])
+        self.width = np.concatenate([*(fault.width for fault in faults), np.ones(count)])
+        self.low = np.concatenate([*(fault.low for fault in faults), np.full(count, -REACH)]) - self.origin
+        self.high = np.concatenate([*(fault.high for fault in faults), np.full(count, REACH)]) - self.origin
+        self.amplitudes = len(self.width) - count
+
+    @property
+    def slices(self) -> list[slice]:
+        """Where every fault's amplitudes are."""
+        ends = np.cumsum([0, *(len(fault.width) for fault in self.faults)])
+        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+
+    def is_reading(self, problem: Problem) -> list[bool]:
+        """Which numbers act on readings alone: their derivative is known without a prediction, (k,)."""
+        columns = [problem.nuisances[i].column is not None for i in self.tolerances]
+        return [False] * self.amplitudes + columns
+
+    def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
+        """The faults as effects."""
+        amplitudes = theta + self.origin
+        values = [fault.values(amplitudes[at]) for fault, at in zip(self.faults, self.slices, strict=True)]
+        return tuple(Effect(fault.name, **table) for fault, table in zip(self.faults, values, strict=True))
+
+    def predict(self, forward: ForwardModel, problem: Problem, theta: FloatArray) -> FloatArray | None:
+        """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
+        sizes, effects = np.zeros(len(problem.nuisances)), []
+        sizes[self.tolerances] = theta[self.amplitudes :]
+        for fault, at in zip(self.faults, self.slices, strict=True):
+            amplitudes = theta[at] + fault.origin
+            if fault.own >= 0:
+                sizes[fault.own] = amplitudes[0]
+            else:
+                effects.append(fault.candidate.effect(amplitudes))
+        try:
+            return problem.scaled(predict(forward, effects, problem.nuisances, sizes))
+        except (ValueError, ArithmeticError, TpjbError):
+            return None
+
+
+def prediction(
+    forward: ForwardModel, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray
+) -> FloatArray | None:
+    """Job: the prediction at a point."""
+    return Unknowns(problem, faults).predict(forward, problem, theta)
+
+
+def derivatives(
+    forward: ForwardModel, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray, indices: Sequence[int]
+) -> list[FloatArray | None]:
+    """Job: derivatives of the prediction by some numbers, each from the point's own solved state, (n,) each."""
+    unknowns = Unknowns(problem, faults)
+    at_point = unknowns.predict(forward, problem, theta)
+    out: list[FloatArray | None] = []
+    for index in indices:
+        if index < unknowns.amplitudes:
+            step = _SHARE * unknowns.width[index]
+        else:  # towards zero: there the model surely has an equilibrium
+            step = -_DEVIATIONS if theta[index] > 0.0 else _DEVIATIONS
+        out.append(
+            None if at_point is None else _difference(forward, problem, unknowns, theta, at_point, (index, step))
+        )
+    return out
+
+
+def _difference(
+    forward: ForwardModel, problem: Problem, unknowns: Unknowns, theta: FloatArray, at_point: FloatArray,
+    moved: tuple[int, float],
+) -> FloatArray | None:  # fmt: skip
+    """One difference; the other way where the first is out of bounds or has no equilibrium."""
+    index, step = moved
+    for signed in (step, -step):
+        there = theta.copy()
+        there[index] += signed
+        if unknowns.low[index] <= there[index] <= unknowns.high[index]:
+            changed = unknowns.predict(forward.fresh(), problem, there)
+            if changed is not None:
+                return np.asarray((changed - at_point) / signed)
+    return None
+
+
+def path_changes(
+    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float]
+) -> list[tuple[float, FloatArray]]:
+    """Job: changes of the prediction along a fault's first amplitude, everything else as stated."""
+    unknowns, base = Unknowns(problem, (fault,)), problem.scaled(problem.base)
+    out = []
+    for node in nodes:
+        theta = np.zeros(len(unknowns.width))
+        theta[0] = node
+        if unknowns.low[0] <= node <= unknowns.high[0]:
+            changed = unknowns.predict(forward.fresh(), problem, theta)
+            if changed is not None:
+                out.append((node, changed - base))
+    return out

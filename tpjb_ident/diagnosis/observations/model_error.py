@@ -1,0 +1,63 @@
+"""Model error: how a model may be wrong within its stated tolerance, smoothly over operating points.
+
+A model that is trusted to 1.5 % is not wrong by 1.5 % at random in every point: it is wrong much the same way at
+neighbouring points. One covariance of the stated tolerance's size holds all kinds of observable; its scale is summed
+over (`comparison.evidence`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.observations.gap import coordinate
+from tpjb_ident.diagnosis.observations.observe import Element, Observations
+
+#: Parts of the variance: the same at all points, smooth over the range that was measured, each point by itself (a
+#: tenth of the standard deviation: programs that solve the same equations differ like that).
+_CONSTANT, _SMOOTH, _ROUGH = 0.5, 0.49, 0.01
+#: Share of the stated tolerance that campaigns turn out to need, for what is planned before any is there: with models
+#: that solve the same equations 0.1 to 0.2, see `docs/diagnosis.md`.
+_USUAL = 0.2
+
+
+def model_error(observations: Observations) -> FloatArray:
+    """Covariance of the stated model tolerance in units of `total_sigma`, (n, n)."""
+    share = observations.sigma / observations.total_sigma
+    families = np.array([e.family for e in observations.elements])
+    out = np.zeros_like(observations.covariance)
+    for family in dict.fromkeys(families):
+        rows = np.flatnonzero(families == family)
+        correlation = _correlation([observations.elements[i] for i in rows])
+        out[np.ix_(rows, rows)] = correlation * np.outer(share[rows], share[rows])
+    return out
+
+
+def _correlation(elements: Sequence[Element]) -> FloatArray:
+    """Correlation between elements of one kind: only the same observable of the same pad has any."""
+    keys = [(e.observable, e.place("pad") if e.place("pad") == e.place("pad") else 0.0) for e in elements]
+    equal = np.array([[a == b for b in keys] for a in keys], dtype=float)
+    distance = np.zeros_like(equal)
+    for name in ("load", "excitation", "speed"):
+        x = coordinate(elements, name)
+        distance += 0.5 * (x[:, None] - x[None, :]) ** 2
+    angle = np.nan_to_num(np.array([e.place("direction") for e in elements]))
+    distance += 1.0 - np.cos(angle[:, None] - angle[None, :])
+    around = elements[0].family in {"locus", "load"}
+    # the constant part of a locus is its centre, which is free
+    constant, smooth = (0.0, _CONSTANT + _SMOOTH) if around else (_CONSTANT, _SMOOTH)
+    return equal * (constant + smooth * np.exp(-distance)) + _ROUGH * np.eye(len(elements))
+
+
+def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
+    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n).
+
+    `columns` (n, m).
+    """
+    scale = observations.total_sigma
+    share = observations.sigma / scale
+    total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)
+    total += _USUAL**2 * model_error(observations) + 1e-6 * np.diag(share**2)
+    return np.asarray(scale[:, None] * np.linalg.cholesky(total))

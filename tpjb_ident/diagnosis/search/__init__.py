@@ -1,1 +1,0 @@
-"""Search for the effects that explain a disagreement: screen, fit, examine."""
