@@ -32,25 +32,25 @@ NUMBERS = 8
 class Sums:
     """Sums of the normal equations over blocks, P points and q parameters."""
 
-    A: FloatArray  #: (P, 8, 8)
-    E: FloatArray  #: (P, 8, q)
-    g_h: FloatArray  #: (P, 8)
+    A: FloatArray  #: (P, k, k), k numbers a point: eight, or those of a model over frequency
+    E: FloatArray  #: (P, k, q)
+    g_h: FloatArray  #: (P, k)
     G: FloatArray  #: (q, q), without the priors
     g_t: FloatArray  #: (q,)
 
     @staticmethod
-    def empty(points: int, parameters: int) -> Sums:
+    def empty(points: int, parameters: int, numbers: int = NUMBERS) -> Sums:
         """All zero."""
         return Sums(
-            np.zeros((points, NUMBERS, NUMBERS)),
-            np.zeros((points, NUMBERS, parameters)),
-            np.zeros((points, NUMBERS)),
+            np.zeros((points, numbers, numbers)),
+            np.zeros((points, numbers, parameters)),
+            np.zeros((points, numbers)),
             np.zeros((parameters, parameters)),
             np.zeros(parameters),
         )
 
     def add(self, point: IntArray, r: FloatArray, J_h: FloatArray, J_t: FloatArray) -> None:
-        """Add weighted rows of blocks: `point` (n,), `r` (n, k), `J_h` (n, k, 8), `J_t` (n, k, q)."""
+        """Add weighted rows of blocks: `point` (n,), `r` (n, k), `J_h` (n, k, numbers), `J_t` (n, k, q)."""
         transposed = J_h.transpose(0, 2, 1)
         np.add.at(self.A, point, transposed @ J_h)
         np.add.at(self.E, point, transposed @ J_t)
@@ -61,7 +61,7 @@ class Sums:
 
     def drop(self, points: BoolArray) -> None:
         """Leave points (P,) out that have no answer."""
-        self.A[points], self.E[points], self.g_h[points] = np.eye(NUMBERS), 0.0, 0.0
+        self.A[points], self.E[points], self.g_h[points] = np.eye(self.A.shape[1]), 0.0, 0.0
 
 
 def are_told(A: FloatArray) -> BoolArray:

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtr, fdtrc, fdtri
 
-from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.estimate.arrowhead import NUMBERS
-from tpjb_ident.estimate.blocks import Blocks, totals
+from rigdata.arrays import BoolArray, FloatArray, IntArray
+from tpjb_ident.estimate.blocks import totals
 
 #: Real force equations of a block.
 FORCE_ROWS = 4.0
@@ -69,19 +68,29 @@ class Scatter:
         """Degrees of freedom of the pooled variance."""
         return max(self.spare, 1.0)
 
-    def updated(self, blocks: Blocks, fit: Residuals, solvable: BoolArray, count: int) -> Scatter:
-        """Weights after the first step, scatter from the third on."""
-        weights = self._weights(blocks, fit, solvable) if count != 1 else self.weights
+    @staticmethod
+    def kept(groups: int, before: Scatter) -> Scatter:
+        """Weights and pooled scatter of an earlier solve of the same blocks, for other groups."""
+        none = np.zeros(groups, dtype=bool)
+        variance, spare = np.full(groups, before.pooled), np.ones(groups)
+        return Scatter(variance, before.weights, before.pooled, before.spare, none, spare)
+
+    def updated(self, group: IntArray, fit: Residuals, solvable: BoolArray, count: int, numbers: int) -> Scatter:
+        """Weights after the first step, scatter from the third on.
+
+        `group` (n,): point of every block, `solvable` (P,), `numbers`: unknowns of a point.
+        """
+        weights = self._weights(group, fit, solvable) if count != 1 else self.weights
         if count < 3:
             return Scatter(self.variance, weights, self.pooled, self.spare, self.own, self.own_spare)
-        points = len(blocks.points)
+        points = len(solvable)
         used = weights > 0.05
         # where too few good runs remain all count in full, and nothing has to be made up for
         kept = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
-        chi = totals(blocks.point, kept * fit.force, points)
-        rows = FORCE_ROWS * totals(blocks.point, np.asarray(used), points)
-        information = totals(blocks.point, kept * fit.information, points)
-        spare = np.where(solvable, rows - NUMBERS, 0.0)
+        chi = totals(group, kept * fit.force, points)
+        rows = FORCE_ROWS * totals(group, np.asarray(used), points)
+        information = totals(group, kept * fit.information, points)
+        spare = np.where(solvable, rows - numbers, 0.0)
         told = (spare > 0) & (information > 0)
         gain = np.where(told, information * spare / np.maximum(rows, 1.0), 1.0)
         unusual = _unusual(chi, spare, told, self.own)
@@ -91,7 +100,7 @@ class Scatter:
         variance = np.full(points, pooled)
         excess = self.variance + (chi - spare) / gain
         variance[own] = np.maximum(excess[own], pooled)
-        runs = totals(blocks.point, used, points)
+        runs = totals(group, used, points)
         return Scatter(variance, weights, pooled, freedom, own, np.maximum(runs - 2.0, 1.0))
 
     def _pooled(self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray) -> tuple[float, float]:
@@ -104,21 +113,21 @@ class Scatter:
         usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + freedom) * _USUAL**2
         return moment + usual, freedom
 
-    def _weights(self, blocks: Blocks, fit: Residuals, solvable: BoolArray) -> FloatArray:
+    def _weights(self, group: IntArray, fit: Residuals, solvable: BoolArray) -> FloatArray:
         freedom = fit.rows * (1 - np.minimum(fit.leverage, _MAX_LEVERAGE))
         distance = fit.chi_square / np.maximum(freedom, 1.0)
-        judged = solvable[blocks.point]
+        judged = solvable[group]
         usual = max(1.0, float(np.median(distance[judged]))) if judged.any() else 1.0
-        points = len(blocks.points)
-        runs = totals(blocks.point, np.ones(len(blocks)), points)
+        points = len(solvable)
+        runs = totals(group, np.ones(len(group)), points)
         freedom_of_others = 2 * float(np.maximum(runs - 2, 0.0).sum())
         # few runs know little of what is usual among them: then only the improbable has no weight
         improbable = float(fdtri(FORCE_ROWS, max(freedom_of_others, 1.0), 1 - _IMPROBABLE))
         limit = max(_NO_WEIGHT**2, improbable)
         weights = np.asarray(np.maximum(1 - distance / usual / limit, 0.0) ** 2, dtype=float)
-        good = totals(blocks.point, np.asarray(weights > _GOOD), points)
+        good = totals(group, np.asarray(weights > _GOOD), points)
         few = good < np.maximum(_MIN_GOOD, _SHARE * runs)
-        return np.where(few[blocks.point], 1.0, weights)
+        return np.where(few[group], 1.0, weights)
 
 
 def _expected(rows: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
 from tpjb_ident.estimate.equation import (
@@ -26,6 +26,7 @@ from tpjb_ident.estimate.equation import (
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
 from tpjb_ident.estimate.scatter import Residuals, Scatter
+from tpjb_ident.estimate.shape import Shape
 from tpjb_ident.estimate.term import Fitted, Term
 
 #: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
@@ -40,7 +41,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True)
 class Solution:
-    """H of every point with its covariance by source."""
+    """H of every point with its covariance by source; points of a shape are its groups, each with its k numbers."""
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
     records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
@@ -66,12 +67,21 @@ class Solution:
 
 
 class Solver:
-    """Gauss-Newton over all blocks, from a start of H."""
+    """Gauss-Newton over all blocks, from a start of H; weights and scatter as `kept` of an earlier solve, else found."""
 
     def __init__(
-        self, rig: Rig, blocks: Blocks, terms: Sequence[Term], start: ComplexArray, to_set_point: bool = True
+        self,
+        rig: Rig,
+        blocks: Blocks,
+        terms: Sequence[Term],
+        start: ComplexArray,
+        to_set_point: bool = True,
+        shape: Shape | None = None,
+        kept: Scatter | None = None,
     ) -> None:
         self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
+        self.shape = shape or Shape(np.arange(len(blocks.points)))
+        self.group = self.shape.group[blocks.point]
         self.terms = tuple(term for term in terms if term.parameters)
         self.parameters = [p for term in self.terms for p in term.parameters]
         ends = np.cumsum([0] + [len(term.parameters) for term in self.terms])
@@ -82,10 +92,13 @@ class Solver:
         self.theta = self.mean.copy()
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & (runs > 1))
+        self.answered = totals(self.shape.group, self.solvable, self.shape.groups) > 0
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
         self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))
         self.u = np.zeros((len(blocks), UNKNOWNS), complex)
-        self.scatter = Scatter.none(len(blocks.points), len(blocks))
+        groups = self.shape.groups
+        self.scatter = Scatter.none(groups, len(blocks)) if kept is None else Scatter.kept(groups, kept)
+        self.follows = kept is None
         self.moved = False
         self.housing_noise = HOUSING_NOISE[rig.mount]
 
@@ -94,20 +107,25 @@ class Solver:
         last: Step | None = None
         count = 0
         # runs that stand apart are told at the robust start, before one of them pulls the others away
-        self.scatter = self.scatter.updated(self.blocks, self._sums(None)[1], self.solvable, 0)
+        first = self._sums(None)[1]
+        if self.follows:
+            self.scatter = self._scatter(first, 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums(last)
             last = step(sums, self.mean - self.theta, self.precision, self.always)
             change = self._move(last)
             if count == 3:
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
-            if count < _SCATTER_STEPS:
-                self.scatter = self.scatter.updated(self.blocks, fit, self.solvable, count)
-            elif change < _CONVERGED:
+            if self.follows and count < _SCATTER_STEPS:
+                self.scatter = self._scatter(fit, count)
+            elif count > 3 and change < _CONVERGED:
                 break
         sums, fit = self._sums(last)
         last = step(sums, self.mean - self.theta, self.precision, self.always)
         return self._solution(last, fit, count)
+
+    def _scatter(self, fit: Residuals, count: int) -> Scatter:
+        return self.scatter.updated(self.group, fit, self.answered, count, self.shape.numbers)
 
     def _housing_misfit(self) -> ComplexArray:
         """What the housing's equations leave at the fitted motion, (n, 2)."""
@@ -129,25 +147,26 @@ class Solver:
             yield slice(first, first + _CHUNK)
 
     def _sums(self, last: Step | None) -> tuple[Sums, Residuals]:
-        sums = Sums.empty(len(self.blocks.points), len(self.parameters))
+        sums = Sums.empty(self.shape.groups, len(self.parameters), self.shape.numbers)
         fits = []
         slope, known = self._load_slopes()
         for places in self._slices():
-            blocks = self.blocks.part(places)
+            blocks, group = self.blocks.part(places), self.group[places]
             state = self._state(blocks, places, slope, known)
-            rows = self._rows(blocks, state, self.scatter.variance[blocks.point])
+            rows = self._rows(blocks, state, self.scatter.variance[group])
             self.u[places] = state.u
             weight = np.sqrt(self.scatter.weights[places] * self.solvable[blocks.point])
             sums.add(
-                blocks.point,
+                group,
                 rows.r * weight[:, None],
                 rows.J_h * weight[:, None, None],
                 rows.J_t * weight[:, None, None],
             )
-            fits.append(self._fit(blocks, rows, weight**2, last))
+            fits.append(self._fit(group, rows, weight**2, last))
         if last is None:  # a point whose readings leave a number untold has no answer
-            self.solvable &= are_told(sums.A)
-        sums.drop(~self.solvable)
+            self.answered &= are_told(sums.A)
+            self.solvable &= self.answered[self.shape.group]
+        sums.drop(~self.answered)
         joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 
@@ -202,7 +221,7 @@ class Solver:
             more = slopes[0].shape[1]
             J_h = np.concatenate([J_h, np.zeros((len(blocks), more, NUMBERS))], axis=1)
         counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
-        return _Rows(r, J_h, J_t, force, counted, 2 * Q2.shape[1])
+        return _Rows(r, self.shape.mapped(J_h, blocks.point), J_t, force, counted, 2 * Q2.shape[1])
 
     def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
         """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
@@ -220,18 +239,17 @@ class Solver:
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
         return r - J @ self.theta, J
 
-    def _fit(self, blocks: Blocks, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
+    def _fit(self, group: IntArray, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
         r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
         if last is None:
-            leverage = np.zeros(len(blocks))
+            leverage = np.zeros(len(group))
         else:
-            taken = np.einsum("nka,nab,nkb->n", J_h, last.A_inverse[blocks.point], J_h)
+            taken = np.einsum("nka,nab,nkb->n", J_h, last.A_inverse[group], J_h)
             leverage = weight * taken / np.maximum(rows.counted, 1.0)
         return Residuals(np.einsum("nk,nk->n", r, r), rows.counted, leverage, rows.force[:, 0], rows.force[:, 1])
 
     def _move(self, taken: Step) -> float:
-        numbers = taken.h * self.unit * self.solvable[:, None]
-        change = (numbers[:, :4] + 1j * numbers[:, 4:]).reshape(-1, 2, 2)
+        change = self.shape.change(taken.h * self.unit) * self.solvable[:, None, None]
         self.h = self.h + change
         self.theta = self.theta + taken.theta
         self.moved = True
@@ -239,7 +257,7 @@ class Solver:
         return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
 
     def _solution(self, last: Step, fit: Residuals, count: int) -> Solution:
-        points = len(self.blocks.points)
+        groups = self.shape.groups
         factors = last.factors() * self.unit
         shares, fitted = {}, {}
         for term in self.terms:
@@ -248,9 +266,9 @@ class Solver:
             shares[term.name] = np.einsum("qpa,qpb->pab", own, own)
             fitted[term.name] = Fitted(self.theta[part], last.deviation[part], last.estimated[part], self.housing_noise)
         weight = self.scatter.weights
-        chi_square = totals(self.blocks.point, weight * fit.chi_square, points)
-        counted = totals(self.blocks.point, fit.rows * (weight > 0.05), points)
-        spare = counted - NUMBERS
+        chi_square = totals(self.group, weight * fit.chi_square, groups)
+        counted = totals(self.group, fit.rows * (weight > 0.05), groups)
+        spare = counted - self.shape.numbers
         return Solution(
             np.where(self.solvable[:, None, None], self.h, np.nan),
             last.records() * self.unit**2,
@@ -262,7 +280,7 @@ class Solver:
             chi_square / np.maximum(spare, 1.0),
             spare,
             weight,
-            np.clip(self.scatter.variance[self.blocks.point] * fit.information / 4, 0.0, 1.0),
+            np.clip(self.scatter.variance[self.group] * fit.information / 4, 0.0, 1.0),
             *self._apart(),
             self.u,
             self.housing_noise,

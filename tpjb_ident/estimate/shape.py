@@ -1,0 +1,87 @@
+"""How H of the points hangs on numbers that groups of points share: each its own H, or a model over frequency.
+
+K-C, h = K + i omega C, and K-C-M, h = K - omega^2 M + i omega C, hold for all lines of a load together; a part of a
+band shares one departure from such a model. Sines, lines of a multi-sine and groups of bins take part alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.arrowhead import NUMBERS
+
+#: Matrices of a model over frequency, four numbers each.
+MODELS = {"K-C": 2, "K-C-M": 3}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """H = start + columns x for P points in G groups, x the k numbers of a group."""
+
+    group: IntArray  #: (P,): group of every point
+    columns: FloatArray | None = None  #: (P, 8, k); None: x is h itself
+
+    @property
+    def groups(self) -> int:
+        """Number of groups."""
+        return int(self.group.max(initial=-1)) + 1
+
+    @property
+    def numbers(self) -> int:
+        """Unknowns of a group."""
+        return NUMBERS if self.columns is None else self.columns.shape[2]
+
+    def mapped(self, J_h: FloatArray, point: IntArray) -> FloatArray:
+        """Columns of the group's numbers (n, rows, k) from those of h (n, rows, 8); `point` (n,)."""
+        return J_h if self.columns is None else J_h @ self.columns[point]
+
+    def change(self, x: FloatArray) -> ComplexArray:
+        """Change of h (P, 2, 2) by the groups' numbers (G, k)."""
+        own = x[self.group]
+        numbers = own if self.columns is None else np.einsum("pak,pk->pa", self.columns, own)
+        return complex_matrix(numbers)
+
+
+def complex_matrix(numbers: FloatArray) -> ComplexArray:
+    """H (.., 2, 2) of its eight numbers (.., 8)."""
+    h = numbers[..., :4] + 1j * numbers[..., 4:]
+    return np.asarray(h.reshape(*numbers.shape[:-1], 2, 2), complex)
+
+
+def real_numbers(h: ComplexArray) -> FloatArray:
+    """The eight numbers (.., 8) of H (.., 2, 2)."""
+    flat = h.reshape(*h.shape[:-2], 4)
+    return np.concatenate([flat.real, flat.imag], axis=-1)
+
+
+def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: float) -> Shape:
+    """A model for every group of points; numbers are K, omega C and omega^2 M at `middle` [rad/s], each xx, xy, yx, yy.
+
+    `group`, `omega` (P,) [rad/s].
+    """
+    w = omega / middle
+    columns = np.zeros((len(w), NUMBERS, 4 * MODELS[model]))
+    for k in range(4):
+        columns[:, k, k] = 1.0
+        columns[:, 4 + k, 4 + k] = w
+        if model == "K-C-M":
+            columns[:, k, 8 + k] = -(w**2)
+    return Shape(group, columns)
+
+
+def nearest(shape: Shape, h: ComplexArray, weight: FloatArray) -> FloatArray:
+    """Numbers (G, k) of the model nearest to h (P, 2, 2), NaN where not known; `weight` (P,)."""
+    assert shape.columns is not None
+    x = np.zeros((shape.groups, shape.numbers))
+    numbers = real_numbers(h)
+    for g in range(shape.groups):
+        used = np.flatnonzero((shape.group == g) & np.isfinite(numbers).all(axis=1) & (weight > 0))
+        if not len(used):
+            continue
+        root = np.sqrt(weight[used])
+        design = (shape.columns[used] * root[:, None, None]).reshape(-1, shape.numbers)
+        x[g] = np.linalg.lstsq(design, (numbers[used] * root[:, None]).ravel(), rcond=None)[0]
+    return x
