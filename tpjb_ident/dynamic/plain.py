@@ -16,7 +16,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from rigdata.campaign import Campaign
-from tpjb_ident.dynamic.broadband.band_point import is_broadband
+from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.estimators.r_matrix import r_matrix
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings, rlm_fit
 from tpjb_ident.dynamic.runs.point_data import PointData, gather

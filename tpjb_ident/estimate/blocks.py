@@ -77,7 +77,7 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.point)
 
-    def part(self, places: slice) -> Blocks:
+    def part(self, places: slice | IntArray) -> Blocks:
         """Some of the blocks."""
         arrays = {name: getattr(self, name)[places] for name in _STACKED}
         return replace(self, **arrays)

@@ -23,11 +23,12 @@ class Shape:
 
     group: IntArray  #: (P,): group of every point
     columns: FloatArray | None = None  #: (P, 8, k); None: x is h itself
+    count: int = 0  #: groups at least: the last may have no point
 
     @property
     def groups(self) -> int:
         """Number of groups."""
-        return int(self.group.max(initial=-1)) + 1
+        return max(self.count, int(self.group.max(initial=-1)) + 1)
 
     @property
     def numbers(self) -> int:
@@ -57,19 +58,19 @@ def real_numbers(h: ComplexArray) -> FloatArray:
     return np.concatenate([flat.real, flat.imag], axis=-1)
 
 
-def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: float) -> Shape:
-    """A model for every group of points; numbers are K, omega C and omega^2 M at `middle` [rad/s], each xx, xy, yx, yy.
+def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: FloatArray) -> Shape:
+    """A model for every group of points; its numbers are K, omega C and omega^2 M at `middle`, each xx, xy, yx, yy.
 
-    `group`, `omega` (P,) [rad/s].
+    `group`, `omega` (P,) [rad/s], `middle` (G,) [rad/s].
     """
-    w = omega / middle
+    w = omega / middle[group]
     columns = np.zeros((len(w), NUMBERS, 4 * MODELS[model]))
     for k in range(4):
         columns[:, k, k] = 1.0
         columns[:, 4 + k, 4 + k] = w
         if model == "K-C-M":
             columns[:, k, 8 + k] = -(w**2)
-    return Shape(group, columns)
+    return Shape(group, columns, len(middle))
 
 
 def nearest(shape: Shape, h: ComplexArray, weight: FloatArray) -> FloatArray:

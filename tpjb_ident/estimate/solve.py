@@ -45,6 +45,7 @@ class Solution:
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
     records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
+    given: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2: of `records`, with the terms' parameters given
     shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
     factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every parameter
     fitted: dict[str, Fitted] = field(repr=False)
@@ -67,7 +68,7 @@ class Solution:
 
 
 class Solver:
-    """Gauss-Newton over all blocks, from a start of H; weights and scatter as `kept` of an earlier solve, else found."""
+    """Gauss-Newton over all blocks, from a start of H; weights and scatter `kept` of an earlier solve, else found."""
 
     def __init__(
         self,
@@ -272,6 +273,7 @@ class Solver:
         return Solution(
             np.where(self.solvable[:, None, None], self.h, np.nan),
             last.records() * self.unit**2,
+            last.A_inverse * self.unit**2,
             shares,
             factors,
             fitted,

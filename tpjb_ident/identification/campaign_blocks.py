@@ -71,7 +71,7 @@ def campaign_blocks(
     noises, freedoms = _pooled_noise(means, [source.digests[0].window for source in sources])
     names: list[str] = []
     known: list[list[Hashable]] = []
-    nothing = _no_blocks(len(means[0].channels[0]))
+    nothing = no_blocks(len(means[0].channels[0]))
     columns: dict[str, list[object]] = {name: [] for name in nothing}
     for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
         w = point.means
@@ -89,8 +89,8 @@ def campaign_blocks(
                 "omega": 2 * np.pi * digest.excitations[line],
                 "z": w.mean[g] * present,
                 "present": present,
-                "along": _axes(channels),
-                "calibration": _calibrations(channels, known),
+                "along": axes_of(channels),
+                "calibration": calibration_numbers(channels, known),
                 "noise": noises[p] / w.count[g],
                 "dof": freedoms[p],
                 "slope": w.slope[g],
@@ -110,13 +110,13 @@ def campaign_blocks(
     return Blocks(points=points, runs=tuple(names), bent=bent, **arrays)
 
 
-def _axes(channels: Sequence[Channel | None]) -> FloatArray:
+def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     """Unit vectors of the axes (m, 2); zero where a run has no such channel."""
     rows = [(0.0, 0.0) if c is None else (np.cos(c.axis or 0.0), np.sin(c.axis or 0.0)) for c in channels]
     return np.array(rows)
 
 
-def _calibrations(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:
+def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:
     """Numbers of the channels' calibrations (m,); `known` holds those of each sensor, new ones join it."""
     numbers = []
     for channel, calibrations in zip(channels, known):
@@ -127,7 +127,7 @@ def _calibrations(channels: Sequence[Channel | None], known: list[list[Hashable]
     return numbers
 
 
-def _no_blocks(m: int) -> dict[str, np.ndarray]:
+def no_blocks(m: int) -> dict[str, np.ndarray]:
     """Columns of the blocks of m sensors where no run says anything."""
     numbers = dict.fromkeys(("omega", "dof", "windows", "time", "temperature", "miss_error"), np.zeros(0))
     places = dict.fromkeys(("point", "run"), np.zeros(0, dtype=int))

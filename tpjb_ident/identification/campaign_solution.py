@@ -110,7 +110,7 @@ def solve_campaign(
     used = [term for term in TERMS if correct or term is not LoadTurn]
     terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
     solution = Solver(rig, blocks, terms, start, correct).run()
-    learnt = _with_gain_spread(_with_lag(rig, solution), solution)
+    learnt = learnt_rig(rig, solution)
     if learnt is not rig:
         rig = learnt
         terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
@@ -126,6 +126,11 @@ def solve_campaign(
     return CampaignSolution(
         rig, task, blocks, means, tuple(misses), common, zero, film, solution, pickup, fits, in_cells, size, shift
     )
+
+
+def learnt_rig(rig: Rig, solution: Solution) -> Rig:
+    """The rig, as uncertain as a solve shows it to be where that contradicts what is stated; itself where not."""
+    return _with_gain_spread(_with_lag(rig, solution), solution)
 
 
 def _with_lag(rig: Rig, solution: Solution) -> Rig:

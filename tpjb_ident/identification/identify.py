@@ -10,8 +10,7 @@ from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.broadband.band_point import BandSettings, is_broadband
-from tpjb_ident.dynamic.broadband.identify_bands import IdentifiedBands, identify_bands
+from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
 from tpjb_ident.dynamic.results.quality import with_probe_doubts
@@ -24,6 +23,9 @@ from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.identification.bands.band_point import BandSettings
+from tpjb_ident.identification.bands.band_tables import Moved
+from tpjb_ident.identification.bands.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.identification.campaign_solution import CampaignSolution, solve_campaign
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import RUN_TERMS, PointTask, finished_point, point_share
@@ -82,7 +84,7 @@ def identify(
         rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
         bands = identify_bands(campaign, _band_settings(settings), report, rig)
     if not sines.of_kind("dynamic"):
-        identification = Identification(campaign.id, settings.method, (), np.zeros((settings.n_calibration, 0)))
+        identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
     else:
         with all_runs(sines, settings.phasors, report, workers, store) as finished:
             identification = assemble(sines, finished, settings, report, workers)
@@ -102,8 +104,8 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
 def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
     """The points of sines and those of bands together, sorted as ever."""
     points = [*result.points, *(p for band in bands.results for p in band.points)]
-    joint = np.concatenate([result.calibration_changes, bands.changes], axis=1)
-    changes = joint.reshape(len(joint), len(points), 8)
+    joint = _side_by_side(Moved(result.calibration_changes, result.calibration_names), bands.moved)
+    changes = joint.changes.reshape(len(joint.changes), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
     table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
     return replace(
@@ -112,14 +114,27 @@ def _with_bands(result: Identification, bands: IdentifiedBands) -> Identificatio
         calibration_changes=changes[:, order].reshape(len(changes), -1),
         conditions=tuple(table.values()),
         bands=bands.results,
-        calibration_names=(),  # what moves a band's lines is drawn, and has no names
+        calibration_names=joint.names,
     )
+
+
+def _side_by_side(first: Moved, second: Moved) -> Moved:
+    """What sources do to two groups of points together; those of one name are one source."""
+    names = tuple(dict.fromkeys((*first.names, *second.names)))
+    count = max(len(names), 1)
+    rows = np.zeros((count, first.changes.shape[1] + second.changes.shape[1]))
+    begin = 0
+    for group in (first, second):
+        end = begin + group.changes.shape[1]
+        for name, row in zip(group.names, group.changes):
+            rows[names.index(name), begin:end] = row * np.sqrt(count / len(group.names))
+        begin = end
+    return Moved(rows, names)
 
 
 def _band_settings(settings: IdentifySettings) -> BandSettings:
     phasors = settings.phasors
-    lines, draws = phasors.lines.mains, (settings.n_calibration, settings.seed)
-    return BandSettings(lines, phasors.delays, settings.correct, *draws, settings.clearance)
+    return BandSettings(phasors.lines.mains, phasors.delays, settings.correct, settings.clearance)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:

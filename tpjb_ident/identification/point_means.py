@@ -139,7 +139,7 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
             if channel is None or values is None or channel.quantity != sensor.quantity or not _usual(values, least):
                 channels.append(None)
                 continue
-            z[:, j] = values / _warm_gain(channel, task.temperatures.get(run.run))
+            z[:, j] = values / warm_gain(channel, task.temperatures.get(run.run))
             channels.append(channel)
         rows.append(z)
         described.append(channels)
@@ -181,7 +181,7 @@ def _usual(values: ComplexArray, least: float) -> bool:
     return bool(finite.mean() > least and np.abs(values[finite]).max(initial=0.0) > 0)
 
 
-def _warm_gain(channel: Channel, temperature: float | None) -> float:
+def warm_gain(channel: Channel, temperature: float | None) -> float:
     """Gain of a channel beside that of its reference temperature."""
     if not channel.temperature_coefficient or temperature is None or channel.temperature_reference is None:
         return 1.0

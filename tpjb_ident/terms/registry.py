@@ -12,11 +12,13 @@ from tpjb_ident.terms.housing import Housing
 from tpjb_ident.terms.load import Load
 from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.mass import Mass
+from tpjb_ident.terms.run_gain import RunGain
 from tpjb_ident.terms.shaft import Shaft
 from tpjb_ident.terms.temperature import Temperature
 
 TERMS: tuple[type[Term], ...] = (
     Gain,
+    RunGain,
     Temperature,
     Axis,
     Delay,

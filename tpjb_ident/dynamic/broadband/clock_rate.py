@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.vector import inverse_directions
 from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_taken
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
 
@@ -51,17 +52,18 @@ def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str
 
 def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
     """The record as if one clock had sampled all of it."""
-    values = dict(samples.values)
-    for quantity in set(clocks) & set(values):
-        at = np.asarray(np.arange(samples.length) / (1 + clocks[quantity].rate), dtype=float)
-        mean = values[quantity].mean(axis=1, keepdims=True)
-        values[quantity] = interpolated(values[quantity] - mean, at) + mean
-    return replace(samples, values=values)
+    rows = samples.rows.copy()
+    for quantity, clock in clocks.items():
+        places = samples.places(quantity)
+        at = np.asarray(np.arange(samples.length) / (1 + clock.rate), dtype=float)
+        mean = rows[places].mean(axis=1, keepdims=True)
+        rows[places] = interpolated(rows[places] - mean, at) + mean
+    return replace(samples, rows=rows)
 
 
 def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> dict[str, ClockRate]:
     """Rates of the clocks of force and acceleration against the probes', as one run shows them."""
-    present = [q for q in ("force", "acceleration") if q in samples.values]
+    present = [q for q in ("force", "acceleration") if samples.places(q)]
     return {q: _clock_rate(samples, q, band, lines) for q in present}
 
 
@@ -75,7 +77,7 @@ def _clock_rate(
     used = (frequency >= band[0]) & (frequency <= band[1]) & ~bins_taken(frequency, lines, seconds, _BESIDE)
     if used.sum() < _PIECES:
         return ClockRate(0.0, np.inf)
-    D, z = (_pieces(samples.values[q], length)[:, :, used] for q in ("displacement", quantity))
+    D, z = (_pieces(vector_rows(samples, q), length)[:, :, used] for q in ("displacement", quantity))
     cross = np.sum(z * D.conj(), axis=0)
     first, second = np.triu_indices(_PIECES, 1)
     apart = (second - first)[:, None] * seconds
@@ -92,6 +94,12 @@ def _clock_rate(
     # bins err apart from each other, pairs of pieces do not
     scores = np.sum(weight * lever * remaining, axis=0)
     return ClockRate(rate, float(np.sqrt(np.sum(scores**2)) / np.sum(weight * lever**2)))
+
+
+def vector_rows(samples: Samples, quantity: str) -> FloatArray:
+    """X and Y of a quantity (2, n)."""
+    places = samples.places(quantity)
+    return inverse_directions(tuple(float(samples.channels[j].axis or 0.0) for j in places)) @ samples.rows[places]
 
 
 def _pieces(rows: FloatArray, length: int) -> ComplexArray:

@@ -63,7 +63,8 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
     waves = [window * np.exp(-2j * np.pi * f * t) for f in grid]
     power = np.zeros(len(grid))
     for q in ("displacement", "force"):
-        rows = samples.values[q] - samples.values[q].mean(axis=1, keepdims=True)
+        rows = samples.rows[samples.places(q)]
+        rows = rows - rows.mean(axis=1, keepdims=True)
         each = np.array([np.sum(np.abs(rows @ wave) ** 2) for wave in waves])
         power += each / max(float(np.sum(rows**2)) * float(np.sum(window**2)), 1e-300)
     k = int(np.argmax(power))
@@ -75,11 +76,9 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
 
 def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], period: int | None = None) -> Samples:
     """The record without the lines and without its mean."""
-    centred = {q: rows - rows.mean(axis=1, keepdims=True) for q, rows in samples.values.items()}
+    stack = samples.rows - samples.rows.mean(axis=1, keepdims=True)
     if not lines:
-        return replace(samples, values=centred)
-    names = list(centred)
-    stack = np.concatenate([centred[q] for q in names])
+        return replace(samples, rows=stack)
     scale = np.sqrt(np.mean(stack**2, axis=1, keepdims=True))
     scale[scale == 0] = 1.0
     columns = _columns(samples, lines)
@@ -91,7 +90,7 @@ def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], perio
     significant = values > 1e-6 * max(float(np.max(np.sum(columns**2, axis=1))), 1e-300)
     inverse = (vectors[:, significant] / values[significant]) @ vectors[:, significant].T
     cleaned = stack - scale * (((target @ basis.T) @ inverse) @ columns)
-    return replace(samples, values={q: cleaned[2 * i : 2 * i + 2] for i, q in enumerate(names)})
+    return replace(samples, rows=cleaned)
 
 
 def _columns(samples: Samples, lines: tuple[Disturbance, ...]) -> FloatArray:

@@ -6,9 +6,6 @@ need not hold a whole number of samples; the record is then resampled, all chann
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
@@ -38,13 +35,8 @@ def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArra
 
 
 def _signals(samples: Samples) -> FloatArray:
-    """What tells the period, (k, n), every row of unit power: the command, else displacement and force."""
-    rows = samples.command
-    if rows is None:
-        rows = np.concatenate([samples.values["displacement"], samples.values["force"]])
-    rows = rows - rows.mean(axis=1, keepdims=True)
-    size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True))
-    return np.asarray(rows[(size > 0)[:, 0]] / size[size[:, 0] > 0])
+    """What tells the period, (k, n)."""
+    return np.concatenate(samples.signals())
 
 
 def _inside(samples: Samples, band: tuple[float, float]) -> BoolArray:
@@ -119,17 +111,6 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     slip = 2 * np.pi * top / samples.rate * abs(period - q) * count
     if slip <= _MAX_SLIP:
         count = samples.length // q
-        return _each(samples, samples.rate, lambda rows: rows[..., : count * q])
+        return samples.each(samples.rate, lambda rows: rows[:, : count * q])
     at = np.asarray(np.arange(count * q) * (period / q), dtype=float)
-    return _each(samples, samples.rate * q / period, lambda rows: interpolated(rows, at))
-
-
-def _each(samples: Samples, rate: float, change: Callable[[FloatArray], FloatArray]) -> Samples:
-    values = {q: change(rows) for q, rows in samples.values.items()}
-    command = None if samples.command is None else change(samples.command)
-    angle = None
-    if samples.angle is not None:
-        n = next(iter(values.values())).shape[1]
-        at = np.arange(n) * samples.rate / rate
-        angle = np.interp(at, np.arange(len(samples.angle)), samples.angle)
-    return replace(samples, rate=rate, values=values, command=command, angle=angle)
+    return samples.each(samples.rate * q / period, lambda rows: interpolated(rows, at))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from rigdata.vector import directions, inverse_directions
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, with_one_clock
+from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, vector_rows, with_one_clock
 from tpjb_ident.dynamic.broadband.disturbing_lines import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
@@ -23,10 +23,9 @@ from tpjb_ident.dynamic.broadband.disturbing_lines import (
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
 from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
-from tpjb_ident.phasors.compensation import SlowerChannel, channel_gains, inspect_readings
+from tpjb_ident.phasors.compensation import compensated, inspect_readings
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors, oil_force, vector_channels
-from tpjb_ident.terms.clock import START
+from tpjb_ident.phasors.run_data import RunPhasors, oil_force
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")
@@ -34,23 +33,40 @@ _MAY_REPEAT = ("multisine", "random", "sweep")
 OPEN_ENDS = ("multisine", "random", "sweep")
 
 
+def is_broadband(run: Run) -> bool:
+    """Whether a run is excited over a band, not by a sine."""
+    return getattr(run, "excitation_kind", "sine") != "sine"
+
+
 @dataclass(frozen=True)
 class RunSpectra:
-    """Phasors of one run over the band."""
+    """Phasors of one run over the band: every period's, or those of the whole record's bins."""
 
-    phasors: RunPhasors
-    D: ComplexArray  #: (n_windows, n_bins, 2) complex, m
-    F: ComplexArray  #: (n_windows, n_bins, 2) complex, N
-    A: ComplexArray  #: (n_windows, n_bins, 2) complex, m/s^2
+    phasors: RunPhasors  #: channel by channel
     command: ComplexArray | None  #: (n_windows, n_bins, 2) complex
-    frequencies: FloatArray  #: (n_bins,), Hz
     taken: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
     disturbances: tuple[Disturbance, ...]
     period: float | None
     mean_load: FloatArray  #: (2,), N
     position: FloatArray  #: (2,), m
     temperatures: dict[int, float]
-    start: float = 0.0
+    clocks: frozenset[str] = frozenset()  #: quantities that were recorded on a clock of their own
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Of the bins, (n_bins,) [Hz]."""
+        return self.phasors.lines.frequencies
+
+    @cached_property
+    def D(self) -> ComplexArray:
+        """Displacement, (n_windows, n_bins, 2) [m]."""
+        return self.phasors.displacement.phasors
+
+    @cached_property
+    def F(self) -> ComplexArray:
+        """Oil force by the accelerometers where there are any, (n_windows, n_bins, 2) [N]."""
+        a = None if self.phasors.acceleration is None else self.phasors.acceleration.phasors
+        return oil_force(self.phasors.cell_force.phasors, a, self.phasors.housing_mass)
 
     @property
     def amplitude(self) -> float:
@@ -86,7 +102,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
     if settings.band[1] >= 0.45 * samples.rate:
         text = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
         raise _error(run, "excitation_band", text, "Sample faster, or excite lower frequencies")
-    means = samples.values["force"].mean(axis=1), samples.values["displacement"].mean(axis=1)
+    means = {q: vector_rows(samples, q).mean(axis=1) for q in ("force", "displacement")}
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
     samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
     period = _period(run, samples, settings.band, lines)
@@ -96,28 +112,20 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         cut = resampled(samples, period, settings.band[1])
         length = round(period)
         clean = without_disturbances(cut, lines, length)
-    result = _transformed(run, clean, length, housing_mass, settings)
-    phasors = _without_responses(result, run, slower)
+    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower)
     phasors = replace(phasors, conditions=merged(samples.conditions, conditions, _clock_conditions(clocks)))
-    frequencies = phasors.lines.frequencies
-    phasors = phasors.advanced(settings.delays)
-    a = None if phasors.acceleration is None else phasors.acceleration.phasors
-    F = oil_force(phasors.cell_force.phasors, a, housing_mass)
-    D = phasors.displacement.phasors
     command = None if clean.command is None else _bins(clean.command, length, _places(clean.rate, length, settings))
+    width = LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD
     return RunSpectra(
-        phasors,
-        D,
-        F,
-        np.zeros_like(D) if a is None else a,
+        phasors.advanced(settings.delays),
         command,
-        frequencies,
-        bins_taken(frequencies, lines, length / clean.rate, LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD),
+        bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
         lines,
         None if period is None else length / clean.rate,
-        *means,
+        means["force"],
+        means["displacement"],
         temperatures,
-        START / samples.rate if "force" in clocks else 0.0,
+        frozenset(clocks),
     )
 
 
@@ -148,13 +156,13 @@ def _places(rate: float, length: int, settings: SpectraSettings) -> IntArray:
     """Numbers of the bins of the band."""
     frequency = np.fft.rfftfreq(length, 1 / rate)
     low, high = settings.band
-    edge = 1e-6 * rate / length
+    edge = 0.02 * rate / length  # clocks of runs differ by some ppm
     return np.flatnonzero((frequency >= low - edge) & (frequency <= high + edge) & (frequency > 0))
 
 
 def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
-    """Phasors (n_windows, n_bins, 2) of rows (2, n) in stretches of `length` samples."""
-    folded = rows.reshape(2, -1, length)
+    """Phasors (n_windows, n_bins, m) of rows (m, n) in stretches of `length` samples."""
+    folded = rows.reshape(len(rows), -1, length)
     spectra = np.fft.rfft(folded, axis=2)[:, :, places] * (2.0 / length)
     return np.asarray(spectra.transpose(1, 2, 0))
 
@@ -163,10 +171,10 @@ def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, s
     """Phasors as recorded."""
     places = _places(samples.rate, length, settings)
     frequency = np.fft.rfftfreq(length, 1 / samples.rate)[places]
-    quantities = tuple(q for q in QUANTITIES if q in samples.values)
-    z = np.concatenate([_bins(samples.values[q], length, places) for q in quantities], axis=2)
+    z = _bins(samples.rows, length, places)
     windows = samples.length // length
     lines = LineSet(tuple(Line("excitation", float(f)) for f in frequency), (), (), run.point.shaft_speed_hz)
+    nothing = np.zeros((windows, z.shape[2]))
     return RunPhasors(
         run.id,
         run.point,
@@ -174,30 +182,11 @@ def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, s
         lines,
         np.arange(windows) * length / samples.rate,
         length / samples.rate,
-        vector_channels(quantities),
+        samples.channels,
         z,
-        np.zeros((windows, z.shape[2])),
-        np.full((windows, z.shape[2]), np.nan),
-        np.zeros((windows, z.shape[2])),
+        nothing,
+        nothing,
+        nothing,
         housing_mass,
         np.full(windows, np.nan),
     )
-
-
-def _without_responses(result: RunPhasors, run: Run, slower: dict[str, SlowerChannel]) -> RunPhasors:
-    """Phasors of X and Y as channels without filters and delays would have given them.
-
-    With P the matrix from readings to X, Y, U that from X, Y to readings and g the channels' complex gains at a line,
-    P diag(1/g) U undoes them; exact for two channels.
-    """
-
-    def undone(quantity: str, phasors: ComplexArray) -> ComplexArray:
-        chosen = [c for c in run.channels.values() if c.quantity == quantity and c.axis is not None]
-        gains = channel_gains(run, chosen, slower, result.lines)
-        if gains is None:
-            return phasors
-        axes = tuple(float(c.axis or 0.0) for c in chosen)
-        undo = np.einsum("ac,lc,cb->lab", inverse_directions(axes), 1 / gains, directions(axes))
-        return np.asarray(np.einsum("lab,nlb->nla", undo, phasors))
-
-    return result.changed(undone)

@@ -1,23 +1,28 @@
-"""Samples of one broadband run, whole: its transform needs all of them on an even grid."""
+"""Samples of one broadband run, whole, channel by channel: its transform needs all of them on an even grid."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from rigdata.vector import COLLINEAR_SINE
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 
-_QUANTITIES = ("displacement", "force", "acceleration")
 #: Share of a channel's samples that may be missing and bridged by straight lines,
 _MAX_LOST = 0.01
 #: and from which share on it is said.
 _TOLD_LOST = 1e-4
-#: Time stamps may stray this share of a sample from the even grid.
+#: Time stamps may stray this share of a sample from the even grid, beyond what their last digit rounds.
 _MAX_JITTER = 0.05
+#: Finest step of rounded time stamps that is looked for [s].
+_FINEST = 1e-7
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
 _TAPS, _KAISER = 24, 9.0
 
@@ -27,7 +32,8 @@ class Samples:
     """One run in memory, SI."""
 
     rate: float
-    values: dict[str, FloatArray]  #: (2, n): X and Y by quantity; acceleration only where it is measured
+    channels: tuple[Channel, ...]  #: probes, cells, accelerometers, in this order
+    rows: FloatArray  #: (m, n)
     command: FloatArray | None  #: (2, n): along X and Y, in units of its own
     angle: FloatArray | None  #: (n,), rad: of the shaft, by its tachometer or keyphasor
     conditions: tuple[Condition, ...] = ()
@@ -35,26 +41,82 @@ class Samples:
     @property
     def length(self) -> int:
         """Samples per channel."""
-        return int(self.values["displacement"].shape[1])
+        return int(self.rows.shape[1])
+
+    def places(self, quantity: str) -> list[int]:
+        """Rows of a quantity's channels."""
+        return [j for j, channel in enumerate(self.channels) if channel.quantity == quantity]
+
+    def signals(self) -> tuple[FloatArray, ...]:
+        """Rows about their means by quantity, each of unit power in all: an idle channel weighs nothing beside others.
+
+        The command comes alone where there is one: what was meant to move the shaft tells the period best.
+        """
+        groups = [self.rows[self.places(q)] for q in ("displacement", "force")]
+        if self.command is not None:
+            groups = [self.command]
+        centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
+        sizes = [float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0 for rows in centred]
+        return tuple(rows / size for rows, size in zip(centred, sizes) if size > 0)
+
+    def each(self, rate: float, change: Callable[[FloatArray], FloatArray]) -> Samples:
+        """The record on another grid; `change` takes rows (k, n)."""
+        rows = change(self.rows)
+        command = None if self.command is None else change(self.command)
+        angle = None
+        if self.angle is not None:
+            at = np.arange(rows.shape[1]) * self.rate / rate
+            angle = np.interp(at, np.arange(len(self.angle)), self.angle)
+        return replace(self, rate=rate, rows=rows, command=command, angle=angle)
 
 
 def read_samples(run: Run, seconds: float | None = None) -> Samples:
     """Read a run from its beginning."""
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
-    present = {c.quantity for c in run.channels.values()}
-    quantities = [q for q in _QUANTITIES if q in present or q != "acceleration"]
-    found = run.row_reader(quantities).read(0, n)
-    if found.time is not None:
-        _even(run, found.time, rate)
-    values, lost = {}, 0.0
-    for quantity, rows in found.rows.items():
-        values[quantity], share = _bridged(run, quantity, rows)
+    readers = _alike(run, device_readers(run))
+    parts = [reader.read(0, n) for reader in readers]
+    if parts[0].time is not None:
+        _even(run, parts[0].time, rate)
+    table = {}
+    for reader, part in zip(readers, parts):
+        table |= {channel.name: (channel, row) for channel, row in zip(reader.channels, part.rows)}
+    order = [name for reader in readers for name in (c.name for c in reader.channels)]
+    order.sort(key=lambda name: _ORDER.index(table[name][0].quantity))
+    channels, rows, lost = [], [], 0.0
+    for name in order:
+        channel, values = table[name]
+        missing = float((~np.isfinite(values)).mean())
+        if missing > _MAX_LOST and _spare(channel, [c for c, _ in table.values()]):
+            continue
+        bridged, share = _bridged(run, f"channel {name}", values[None])
+        channels.append(channel)
+        rows.append(bridged[0])
         lost = max(lost, share)
     conditions = (
         (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > _TOLD_LOST else ()
     )
-    return Samples(rate, values, _command(run, n), _angle(run, n, rate), conditions)
+    return Samples(rate, tuple(channels), np.array(rows), _command(run, n), _angle(run, n, rate), conditions)
+
+
+_ORDER = ("displacement", "force", "acceleration")
+
+
+def _alike(run: Run, readers: tuple[DeviceReader, ...]) -> tuple[DeviceReader, ...]:
+    """Devices of one rate and length: over a band, all channels share a transform."""
+    first = readers[0]
+    for reader in readers[1:]:
+        if reader.length != first.length or abs(reader.rate / first.rate - 1) > 1e-3:
+            listed = f"{first.rate:.6g} Hz and {reader.rate:.6g} Hz"
+            text = f"are sampled at {listed}; over a band all channels need one rate"
+            raise _error(run, "channels", text, "Record them at one rate, or excite by sines")
+    return readers
+
+
+def _spare(channel: Channel, channels: list[Channel]) -> bool:
+    """Whether the other channels of its quantity still span the plane."""
+    axes = [float(c.axis or 0.0) for c in channels if c.quantity == channel.quantity and c.name != channel.name]
+    return bool(axes) and bool(np.max(np.abs(np.sin(np.array(axes) - axes[0]))) > COLLINEAR_SINE)
 
 
 def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -68,9 +130,19 @@ def _even(run: Run, time: FloatArray, rate: float) -> None:
     place = np.flatnonzero(finite)
     off = (time[finite] - time[finite][0]) * rate - (place - place[0])
     drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
-    if np.abs(off - drift).max() > _MAX_JITTER:
+    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[finite]):
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise _error(run, "time", text, "Resample the record, or export it without gaps")
+
+
+def _rounding(time: FloatArray) -> float:
+    """Step [s] to which time stamps are rounded, a power of ten; zero where none is seen."""
+    step = 0.1
+    while step > _FINEST:
+        if np.abs(time / step - np.round(time / step)).max() < 1e-4:
+            return step
+        step /= 10
+    return 0.0
 
 
 def _bridged(run: Run, place: str, rows: FloatArray) -> tuple[FloatArray, float]:

@@ -1,4 +1,4 @@
-"""One operating point's broadband runs: which belong together, read and transformed, accelerometers against cells."""
+"""One operating point's broadband runs: which belong together, read and transformed."""
 
 from __future__ import annotations
 
@@ -7,27 +7,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.clock_rate import common_rates
-from tpjb_ident.dynamic.broadband.line_rows import LinePlan, LineRows, line_plan, line_rows
-from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_clocks, run_spectra
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.dynamic.instruments.housing_balance import BalanceRun, balances
+from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan
+from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.errors import BadInputError
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
 _TELL_CLOCKS = ("multisine", "random", "impact")
-_SINE = "sine"
-#: Parts of the band that are judged one by one: a lag shows at the top, a sign everywhere.
-_PARTS = 8
-#: Lines that a part has at least.
-_LEAST = 6
 
 
 @dataclass(frozen=True)
@@ -47,8 +39,6 @@ class BandSettings:
     mains: float = 50.0
     delays: dict[str, float] = field(default_factory=dict)
     correct: bool = True
-    n_calibration: int = 400
-    seed: int = 20190722
     clearance: float | None = None
 
 
@@ -60,7 +50,6 @@ class BandPoint:
     spectra: list[RunSpectra]
     plan: LinePlan
     baseline: Baseline
-    conditions: tuple[Condition, ...] = ()
 
     @property
     def point(self) -> OperatingPoint:
@@ -72,19 +61,12 @@ class BandPoint:
         """Mean cell force of every run, (n_runs, 2) [N]."""
         return np.array([s.mean_load for s in self.spectra])
 
-    def rows(self, k: int, miss: LoadMiss | None = None, slope: ComplexArray | None = None) -> LineRows:
-        """Rows of line `k`, without the rig's own stiffness, and at the set load where the slope over load is known.
-
-        `slope` (2, 2) [N/m].
-        """
-        rows = line_rows(self.spectra, self.plan, k, self.group.kind in OPEN_ENDS)
-        F = rows.F
-        rig = self.baseline.at(rows.omega)
-        if rig is not None:
-            F = F - rows.D @ rig[0].T
-        if miss is not None and slope is not None:
-            F = F - miss.size[rows.run][:, None] * (rows.D @ slope.T)
-        return rows.with_force(F)
+    @property
+    def method(self) -> str:
+        """What tells noise from motion: the periods, the command, or nothing."""
+        if self.spectra[0].period is not None and len(self.spectra) > 1:
+            return "periods"
+        return "iv" if all(s.command is not None for s in self.spectra) else "hv"
 
 
 def read_point(
@@ -102,10 +84,7 @@ def read_point(
             remaining.append(ExcludedRun(run.id, run.point, error))
     if not spectra:
         return None, remaining
-    late, conditions = _band_balance(_alike(spectra))
-    # how late the cells are is not put right, as with sines, but stands in the interval
-    spectra = [replace(s, start=float(np.hypot(s.start, late))) for s in spectra]
-    return BandPoint(group, spectra, line_plan(spectra), baseline, conditions), remaining
+    return BandPoint(group, spectra, line_plan(_alike(spectra)), baseline), remaining
 
 
 def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
@@ -136,11 +115,6 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
     return spectra
 
 
-def is_broadband(run: Run) -> bool:
-    """Whether a run is excited over a band, not by a sine."""
-    return getattr(run, "excitation_kind", _SINE) != _SINE
-
-
 def band_groups(runs: tuple[Run, ...]) -> list[BandGroup]:
     """Group broadband runs by operating point and kind of excitation, sorted."""
     groups: dict[tuple[object, ...], list[Run]] = {}
@@ -157,38 +131,3 @@ def _group(runs: list[Run]) -> BandGroup:
         text = f"runs at {first.point} have no common excitation_band"
         raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
     return BandGroup(replace(first.point, excitation=0.0), first.excitation_kind, (low, high), tuple(runs))
-
-
-def _band_balance(spectra: Sequence[RunSpectra]) -> tuple[float, tuple[Condition, ...]]:
-    """By how much the cells are late [s], zero where that is not clear, and what to say of the accelerometers.
-
-    The housing is a mass on springs at every line, so neighbouring lines tell the same ratio once each is brought to
-    one frequency by its square. A period's line counts by its repeats, a bin of a whole record by what the others
-    scatter.
-    """
-    if spectra[0].phasors.acceleration is None:
-        return 0.0, ()
-    free = np.flatnonzero(~np.any([s.taken for s in spectra], axis=0))
-    parts = np.array_split(free, min(_PARTS, max(len(free) // _LEAST, 1)))
-    verdicts = balances([run for part in parts for s in spectra for run in _lines(s, part.tolist())])
-    conditions = merged(*(verdicts[f].conditions for f in sorted(verdicts, reverse=True)))
-    if "accelerometers-contradict-cells" in conditions:  # where the housing's inertia is larger
-        conditions = tuple(c for c in conditions if c != "accelerometers-doubtful")
-    lags = [verdict.phase / (2 * np.pi * f) for f, verdict in verdicts.items()]
-    return max(lags, default=0.0), conditions
-
-
-def _lines(spectra: RunSpectra, part: Sequence[int]) -> list[BalanceRun]:
-    """Every line of a part of the band, brought to the part's middle: acceleration grows with the square."""
-    if not len(part):
-        return []
-    middle = float(np.median(spectra.frequencies[list(part)]))
-    mass, windows = spectra.phasors.housing_mass, len(spectra.D)
-    blocks = []
-    for k in part:
-        scaled = spectra.A[:, k] * (middle / spectra.frequencies[k]) ** 2
-        A, mean_A, F = scaled.mean(axis=0), spectra.A[:, k].mean(axis=0), spectra.F[:, k].mean(axis=0)
-        variance = float(np.sum(np.abs(scaled - A) ** 2)) / max(4 * (windows - 1), 1)
-        share = float(mass * np.linalg.norm(mean_A) / max(float(np.linalg.norm(F)), 1e-300))
-        blocks.append(BalanceRun(middle, F - mass * mean_A, A, share, mass, variance, windows))
-    return blocks

@@ -3,28 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.band_models import BandModel, BandPart
-from tpjb_ident.dynamic.broadband.band_point import BandPoint
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
-from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.dynamic.results.quality import feeds_motion
-from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.schema import KINDS, STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _KEY_COLUMNS = (*STATIC_KEY, "excitation")
+
+
+#: A model is refused below this probability of its chi-square.
+_REFUSED = 0.01
+
+
+@dataclass(frozen=True)
+class BandModel:
+    """One model over the lines of a band."""
+
+    model: str
+    parameters: FloatArray  #: (p,)
+    covariance: FloatArray = field(repr=False)  #: (p, p): random part
+    dof: FloatArray = field(repr=False)  #: (p,): degrees of freedom of its variances
+    systematic: FloatArray = field(repr=False)  #: (p, p): what all lines share
+    chi_square: float
+    spare: int
+    probability: float
+    misfit: float
+    band: tuple[float, float]
+    n_lines: int
+
+    @property
+    def refused(self) -> bool:
+        """Whether the lines refuse the model."""
+        return self.spare > 0 and self.probability < _REFUSED
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Random standard errors; inflated by the reduced chi-square where the lines refuse the model."""
+        inflation = max(self.chi_square / self.spare, 1.0) if self.refused else 1.0
+        return np.sqrt(inflation * np.diag(self.covariance))
+
+    def half_width(self, level: float = 0.95) -> FloatArray:
+        """Half the interval of every parameter: Student's t of the random part and normal of the shared one."""
+        quantile = 0.5 + 0.5 * level
+        random = stdtrit(self.dof, quantile) * self.standard_error
+        return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic)))
+
+    def h(self, omega: FloatArray) -> ComplexArray:
+        """Dynamic stiffness of the model, (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
+        K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
+        w = np.asarray(omega, dtype=float)[:, None, None]
+        return np.asarray(K - w**2 * M + 1j * w * C)
+
+
+def supported(models: dict[str, BandModel]) -> str:
+    """The simplest model that the lines do not refuse; ``"raw H"`` when they refuse all."""
+    return next((name for name, model in models.items() if not model.refused), "raw H")
 
 
 @dataclass(frozen=True)
@@ -153,71 +197,3 @@ def _model_row(result: BandResult, model: BandModel) -> dict[str, Any]:
         }
     row["quality"] = "; ".join(str(c) for c in result.quality) or "ok"
     return row
-
-
-def band_points(
-    point: BandPoint, result: BandResult, miss: LoadMiss, clearance: float | None
-) -> tuple[tuple[PointResult, ...], FloatArray]:
-    """Points of one band, and what the draws of systematic errors do to them, (n, 8 P) [N/m].
-
-    The lines of a part alone tell its h; K-C-M only says how h changes within the part. So the points of a band are as
-    independent of one another as runs with sines, whether or not a model over the whole band holds.
-    """
-    models = [model for model in result.models.values() if model.parts]
-    if not models:
-        return (), np.empty((0, 0))
-    parts = models[-1].parts
-    points = tuple(_point(part, point, result, miss, clearance) for part in parts)
-    return points, np.concatenate([part.moved for part in parts], axis=1)
-
-
-def _point(
-    part: BandPart, point: BandPoint, result: BandResult, miss: LoadMiss, clearance: float | None
-) -> PointResult:
-    low, high = (omega * (1 + edge) / (2 * np.pi) for omega, edge in zip(part.span, (-1e-9, 1e-9)))
-    inside = [line for line in result.lines if low <= line.frequency <= high]
-    est, budget = _estimate(part, point, result)
-    positions = np.array([s.position for s in point.spectra])
-    amplitude = max(s.amplitude for s in point.spectra)
-    n_rows = sum(line.n_rows for line in inside)
-    bent = change_conditions(FilmChange(), 0.0, est, amplitude, clearance)
-    return PointResult(
-        point=replace(point.point, excitation=2 * np.pi * round(part.omega / (2 * np.pi), 3)),
-        stiffness=est,
-        by_method={est.method: est},
-        static_load_measured=float(np.linalg.norm(point.mean_loads.mean(axis=0))),
-        position=positions.mean(axis=0),
-        position_se=positions.std(axis=0, ddof=1) / np.sqrt(len(positions))
-        if len(positions) > 1
-        else np.full(2, np.nan),
-        temperatures=pad_means([s.temperatures for s in point.spectra]),
-        n_records=len(point.spectra),
-        n_windows=n_rows,
-        outlier_fraction=0.0,
-        coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
-        amplitude=amplitude,
-        quality=merged(result.quality, feeds_motion(est), bent),
-        rejected=(),
-        runs=result.runs,
-        load_miss=miss,
-        inertia_corrected=point.spectra[0].phasors.acceleration is not None,
-        clearance=clearance,
-        budget=budget,
-    )
-
-
-def _estimate(part: BandPart, point: BandPoint, result: BandResult) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
-    """The part's h with all its uncertainties, and these by source."""
-    table = {"random": part.covariance, "shared by all lines": np.cov(part.moved.T, bias=True)}
-    rig = point.baseline.at(part.omega)
-    if rig is not None:
-        table["baseline"] = rig[1]
-    if part.bracket.any():
-        # a rectangle's standard deviation is half its width by the root of three
-        table["no instrument"] = np.diag(part.bracket**2) / 3
-    systematic = np.sum([v for name, v in table.items() if name != "random"], axis=0)
-    condition = float(np.median([line.stiffness.condition for line in result.lines])) if result.lines else np.nan
-    est = DynamicStiffness(
-        part.h, part.omega, part.covariance, part.dof, f"band-{result.method}", np.ones((1, 2)), condition=condition
-    )
-    return replace(est, systematic=systematic), table

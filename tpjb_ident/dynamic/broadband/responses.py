@@ -1,0 +1,106 @@
+"""What one run says at a line: phasors of all channels, alike in what moved them, with the covariance of their noise.
+
+Of a periodic excitation the mean over the periods, whose noise the periods show. Of any other the response to an
+instrument, by the local polynomial method: over a few bins the response and what the record's ends leak into its
+transform are straight lines, the excitation is not (Pintelon, Schoukens, Vandersteen and Barbe 2010,
+doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it is the displacement (all noise is then
+taken to be the force's, H1) or the force (all is the displacement's, H2): truth lies between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtri
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+
+#: A direction of the command with less than this share of its power is at rest.
+_AT_REST = 1e-3
+#: Part of a response that is not told from leakage and slope.
+_NOTHING = 1e-9
+#: Degrees of freedom of a noise from which it is taken by itself; below, neighbouring lines join in.
+_FREEDOM = 65.0
+#: Chance below which noise alone does not make a response.
+_CHANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class LineResponse:
+    """One run at one group of bins."""
+
+    z: ComplexArray  #: (k, m), SI: k responses whose noise has one covariance
+    count: float  #: that covariance is the noise of a row over this
+    residual: ComplexArray  #: (m, m): sum of what is left, times its own conjugate
+    freedom: float  #: complex degrees of freedom of the residual
+
+
+def line_response(spectra: RunSpectra, bins: IntArray, instrument: str, ends: bool) -> LineResponse:
+    """Response over a group of bins; `instrument` is "periods", "command", "displacement" or "force"."""
+    z = spectra.phasors.z[:, bins]
+    if instrument == "periods":
+        rows = z[:, 0]
+        mean = rows.mean(axis=0)
+        remaining = rows - mean
+        return LineResponse(mean[None], float(len(rows)), _outer(remaining), float(len(rows) - 1))
+    source = {"displacement": spectra.D, "force": spectra.F}.get(instrument)
+    u = driven_command(spectra)[:, bins] if source is None else source[:, bins]
+    place = spectra.frequencies[bins] - spectra.frequencies[bins].mean()
+    place = place / max(float(np.abs(place).max()), 1e-300)
+    return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), np.tile(place, len(z)), ends)
+
+
+def driven_command(spectra: RunSpectra) -> ComplexArray:
+    """The command along the directions in which it acts (n_windows, n_bins, k): what rests would be noise alone."""
+    assert spectra.command is not None
+    flat = spectra.command.reshape(-1, 2)
+    power, along = np.linalg.eigh((flat.T @ flat.conj()).real)
+    return np.asarray(spectra.command @ along[:, power > _AT_REST * power[-1]])
+
+
+def _regressed(z: ComplexArray, u: ComplexArray, place: FloatArray, ends: bool) -> LineResponse:
+    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak."""
+    nuisance = [u * place[:, None]]
+    if ends:
+        nuisance += [np.ones((len(z), 1)), place[:, None]]
+    basis = np.linalg.qr(np.concatenate(nuisance, axis=1))[0]
+    flat = u - basis @ (basis.conj().T @ u)
+    q, triangle = np.linalg.qr(flat)
+    told = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
+    q = q[:, told]
+    response = q.conj().T @ z
+    remaining = z - basis @ (basis.conj().T @ z) - q @ response
+    freedom = float(len(z) - basis.shape[1] - q.shape[1])
+    return LineResponse(response, 1.0, _outer(remaining), max(freedom, 0.0))
+
+
+def _outer(rows: ComplexArray) -> ComplexArray:
+    return np.asarray(rows.T @ rows.conj())
+
+
+def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], FloatArray]:
+    """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
+    residual = np.array([r.residual for r in responses])
+    freedom = np.array([r.freedom for r in responses])
+    m = residual.shape[1]
+    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9))) if len(freedom) else 0
+    noises, totals = [], []
+    for k in range(len(freedom)):
+        near = slice(max(k - reach, 0), k + reach + 1)
+        total = max(float(freedom[near].sum()), 1.0)
+        # the inverse of a covariance of few degrees of freedom is too large on average
+        unbiased = total / max(total - m, 1.0)
+        noises.append(np.asarray(residual[near].sum(axis=0) / total * unbiased, complex))
+        totals.append(total)
+    return noises, np.array(totals)
+
+
+def stands_out(z: ComplexArray, noise: ComplexArray, freedom: float, present: BoolArray) -> bool:
+    """Whether responses (k, m) are more than the noise of their rows (m, m)."""
+    z, noise = z[:, present], noise[np.ix_(present, present)]
+    scale = np.sqrt(np.maximum(np.einsum("jj->j", noise).real, 1e-30 * np.max(np.abs(z) ** 2, axis=0) + 1e-300))
+    white = noise / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    share = np.einsum("kj,ji,ki->k", (z / scale).conj(), np.linalg.inv(white), z / scale).real / len(scale)
+    return bool(np.max(share, initial=0.0) > fdtri(2 * len(scale), max(2 * freedom, 1.0), 1 - _CHANCE))

@@ -1,0 +1,172 @@
+"""All bands of a campaign as blocks of the measurement equation: a point a group of bins, a block a run's response."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.calibration import Channel
+from tpjb_ident.dynamic.broadband.responses import line_response, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
+from tpjb_ident.identification.bands.band_point import BandPoint
+from tpjb_ident.identification.campaign_blocks import axes_of, calibration_numbers, no_blocks
+from tpjb_ident.identification.point_means import warm_gain
+
+#: F ratio from which an excitation tells the displacements from their noise.
+STRONG = 10.0
+#: A channel whose phasors are below this share of its quantity's is dead.
+_NOTHING = 1e-6
+#: What windows would tell of clocks: the transform has one, and its channels are on one clock by then.
+_STILL: dict[str, object] = {"windows": 1.0, "time": 0.0, "shaft": np.nan + 0j}
+#: Misses that no scatter of loads explains say nothing of how H changes with the load.
+_MAX_MISS = 0.05
+
+
+@dataclass(frozen=True)
+class BandBlocks:
+    """Blocks of all bands, and what belongs together."""
+
+    blocks: Blocks = field(repr=False)
+    omega: FloatArray  #: (P,), rad/s: of every point
+    line: IntArray  #: (P,): number of its line, counted over all bands
+    band: IntArray  #: (L,): band of every line
+    line_omega: FloatArray  #: (L,), rad/s
+    driven: BoolArray  #: (L,): whether an excitation stands above the noise
+    strength: FloatArray  #: (L,): F ratio of the weaker direction of motion
+
+
+def band_blocks(
+    points: Sequence[BandPoint],
+    sensors: Sequence[Sensor],
+    misses: Sequence[LoadMiss],
+    temperatures: Mapping[str, float],
+    instruments: Sequence[str],
+) -> BandBlocks:
+    """Responses of all runs; `instruments` by band."""
+    columns: dict[str, list[object]] = {name: [] for name in no_blocks(len(sensors))}
+    known: list[list[Hashable]] = [[] for _ in sensors]
+    stands: list[bool] = []
+    lines, bands, runs, line_omega, operating, omega = [], [], [], [], [], []
+    for b, (point, miss, instrument) in enumerate(zip(points, misses, instruments)):
+        first = len(omega)
+        groups = [(k, bins) for k, parts in enumerate(point.plan.groups) for bins in parts]
+        for k, bins in groups:
+            f = float(point.spectra[0].frequencies[bins].mean())
+            omega.append(2 * np.pi * f)
+            operating.append(replace(point.point, excitation=2 * np.pi * round(f, 2)))
+            lines.append(len(line_omega) + k)
+        line_omega += [2 * np.pi * float(f) for f in point.plan.frequencies]
+        bands += [b] * len(point.plan.groups)
+        for r, spectra in enumerate(point.spectra):
+            temperature = temperatures.get(spectra.phasors.run, np.nan)
+            channels = _described(spectra, sensors)
+            numbers = calibration_numbers(channels, known)
+            rows = _run_rows(point, spectra, channels, temperature, instrument)
+            usable = abs(miss.size[r]) < _MAX_MISS and abs(miss.sideways[r]) < _MAX_MISS
+            for place, row in rows:
+                stands.append(bool(row.pop("stands")))
+                row |= {"calibration": numbers, "along": axes_of(channels)}
+                row |= {"point": first + place, "run": len(runs), "temperature": temperature, "miss_error": 0.0}
+                row["omega"] = omega[first + place]
+                row["miss"] = complex(miss.size[r], miss.sideways[r]) if usable else 0j
+                for name in columns:
+                    columns[name].append(row[name])
+            runs.append(spectra.phasors.run)
+    empty = no_blocks(len(sensors))
+    arrays = {name: np.array(values) if values else empty[name] for name, values in columns.items()}
+    blocks = Blocks(points=tuple(operating), runs=tuple(runs), bent=np.zeros(len(operating)), **arrays)
+    place = np.array(lines, dtype=np.intp)
+    driven = np.zeros(len(line_omega), dtype=bool)
+    np.logical_or.at(driven, place[blocks.point], np.array(stands, dtype=bool))
+    return BandBlocks(
+        blocks.part(np.flatnonzero(driven[place[blocks.point]])),
+        np.array(omega),
+        place,
+        np.array(bands, dtype=np.intp),
+        np.array(line_omega),
+        driven,
+        _strengths(sensors, blocks, place[blocks.point], len(line_omega)),
+    )
+
+
+def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
+    """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
+    table = {channel.name: channel for channel in spectra.phasors.channels}
+    size = dict(zip(table, np.abs(spectra.phasors.z).max(axis=(0, 1))))
+    channels: list[Channel | None] = []
+    for sensor in sensors:
+        channel = table.get(sensor.name)
+        like = [size[name] for name, c in table.items() if c.quantity == sensor.quantity]
+        alive = channel is not None and channel.quantity == sensor.quantity and size[sensor.name] > _NOTHING * max(like)
+        channels.append(channel if alive else None)
+    return channels
+
+
+def _run_rows(
+    point: BandPoint,
+    spectra: RunSpectra,
+    channels: Sequence[Channel | None],
+    temperature: float,
+    instrument: str,
+) -> list[tuple[int, dict[str, object]]]:
+    """Place of its group and columns of every response of one run."""
+    m = len(channels)
+    names = [channel.name for channel in spectra.phasors.channels]
+    order = [names.index(channel.name) for channel in channels if channel is not None]
+    present = np.array([channel is not None for channel in channels])
+    warm = None if np.isnan(temperature) else temperature
+    gain = np.array([1.0 if c is None else warm_gain(c, warm) for c in channels])
+    ends = point.group.kind in OPEN_ENDS
+    groups = [bins for parts in point.plan.groups for bins in parts]
+    responses = [line_response(spectra, bins, instrument, ends) for bins in groups]
+    noises, freedoms = pooled_noise(responses)
+    rows: list[tuple[int, dict[str, object]]] = []
+    for place, (bins, response, noise, freedom) in enumerate(zip(groups, responses, noises, freedoms)):
+        covariance = np.zeros((m, m), complex)
+        covariance[np.ix_(present, present)] = noise[np.ix_(order, order)] / response.count
+        covariance /= np.outer(gain, gain)
+        z = np.zeros((len(response.z), m), complex)
+        z[:, present] = response.z[:, order]
+        z = z / gain
+        stands = stands_out(z, covariance, freedom, present)
+        rig = point.baseline.at(2 * np.pi * float(spectra.frequencies[bins].mean()))
+        if rig is not None:
+            z = _without_rig(z, channels, rig[0])
+        for values in z:
+            row: dict[str, object] = {"z": values, "present": present, "noise": covariance, "dof": freedom}
+            rows.append((place, row | {"stands": stands} | _STILL | {"slope": 0 * z[0], "slope_noise": np.eye(m) + 0j}))
+    return rows
+
+
+def _without_rig(z: ComplexArray, channels: Sequence[Channel | None], rig: ComplexArray) -> ComplexArray:
+    """Responses (k, m) without the force of the rig (2, 2) [N/m] beside the film."""
+    along = axes_of(channels)
+    probes = [j for j, c in enumerate(channels) if c is not None and c.quantity == "displacement"]
+    cells = [j for j, c in enumerate(channels) if c is not None and c.quantity == "force"]
+    motion = z[:, probes] @ np.linalg.pinv(along[probes]).T
+    result = z.copy()
+    result[:, cells] -= motion @ rig.T @ along[cells].T
+    return result
+
+
+def _strengths(sensors: Sequence[Sensor], blocks: Blocks, line: IntArray, lines: int) -> FloatArray:
+    """F ratio of every line's weaker direction of motion over its noise, (L,); `line` (n,) of the blocks."""
+    probes = Rig(tuple(sensors), 1.0).of("displacement")
+    motion = np.nan_to_num(vector(Rig(tuple(sensors), 1.0), blocks, "displacement"))
+    strength = np.zeros(lines)
+    white = np.zeros((len(blocks), 2), complex)
+    for b in range(len(blocks)):
+        seen = probes[blocks.present[b, probes]]
+        plane = np.linalg.pinv(blocks.along[b, seen])
+        noise = plane @ blocks.noise[b][np.ix_(seen, seen)] @ plane.T
+        white[b] = motion[b] / np.sqrt(max(float(np.trace(noise).real) / 2, 1e-300))
+    for k in range(lines):
+        rows = white[line == k]
+        if len(rows) > 1:
+            strength[k] = float(np.linalg.svd(rows, compute_uv=False)[-1] ** 2) / 2
+    return strength

@@ -1,0 +1,257 @@
+"""The solve of all bands of a campaign: h of every line, then K-C and K-C-M over each band, and h of its parts.
+
+All are one equation and one set of blocks; only what the points share differs. Scatter and weights are found with the
+lines, whose h is free, and kept: a model that does not hold must not pass for runs that differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import stdtrit
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.blocks import Rig, totals, vector
+from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
+from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
+from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.term import Term
+from tpjb_ident.identification.bands.band_blocks import BandBlocks
+from tpjb_ident.identification.campaign_solution import learnt_rig
+from tpjb_ident.terms.clock import Clock
+from tpjb_ident.terms.load_turn import LoadTurn
+from tpjb_ident.terms.registry import TERMS
+from tpjb_ident.terms.run_gain import RunGain
+
+#: Parts of a band whose h becomes a point.
+_PARTS = 8
+#: Scatter of the runs' gains before the runs tell it; that of a good rig, and the freedom that it counts as.
+_FIRST, _USUAL = 0.01, (5e-4, 4.0)
+#: Rounds in which the runs tell their scatter.
+_ROUNDS = 3
+#: Condition number of a line's motions from which its runs move the shaft along one line.
+_ONE_LINE = 1e6
+
+
+@dataclass(frozen=True)
+class BandPart:
+    """Lines of one band whose h becomes a point."""
+
+    band: int
+    lines: IntArray
+    omega: float
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """One model over all bands, B of them, k numbers each."""
+
+    numbers: FloatArray  #: (B, k), N/m: K, omega C, omega^2 M at the band's middle
+    solution: Solution = field(repr=False)
+    at_parts: ComplexArray = field(repr=False)  #: (Q, 2, 2), N/m
+
+
+@dataclass(frozen=True)
+class BandSolution:
+    """All bands of a campaign; L lines, B bands, Q parts."""
+
+    rig: Rig
+    h: ComplexArray  #: (L, 2, 2), N/m: NaN where the excitation does not tell it
+    lines: Solution = field(repr=False)
+    models: dict[str, ModelFit] = field(repr=False)
+    parts: tuple[BandPart, ...] = field(repr=False)
+    part_h: ComplexArray = field(repr=False)  #: (Q, 2, 2), N/m
+    part: Solution = field(repr=False)
+    middle: FloatArray = field(repr=False)  #: (B,), rad/s: where the models' numbers are
+    condition: FloatArray = field(repr=False)  #: (L,): condition number of the motions
+    used: BoolArray = field(repr=False)  #: (L,): lines that the models take
+    run_scatter: float  #: of the runs' gains
+
+    def of_model(self, name: str, omega: FloatArray, band: IntArray) -> ComplexArray:
+        """H of a model at some frequencies (n,) [rad/s] of some bands (n,), (n, 2, 2)."""
+        shape = over_frequency(name, band, omega, self.middle)
+        return shape.change(self.models[name].numbers)
+
+
+def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> BandSolution:
+    """Solve all bands; `told` (L,): lines whose excitation stands clear of the noise."""
+    crude, condition = _crude(rig, data)
+    regular = data.driven & (condition < _ONE_LINE)
+    usable, used = regular & told, regular
+    middle = _middles(data, used)
+    start, at_lines = _start(data, crude, usable, middle)
+    task = _Task(rig, data, (), correct, None)
+    solution, task, size = _lines(task, start, used)
+    h = np.full((len(data.band), 2, 2), np.nan + 0j)
+    first = _first_points(data)
+    h[usable] = at_lines[usable] + (solution.h - start)[first[usable]]
+    weights = np.where(usable[data.line[data.blocks.point]], solution.scatter.weights, 1.0)
+    task = replace(task, kept=replace(solution.scatter, weights=weights))
+    models: dict[str, ModelFit] = {}
+    parts = _parts(data, used)
+    at = np.array([part.omega for part in parts]), np.array([part.band for part in parts], dtype=np.intp)
+    curve = start
+    for name in MODELS:
+        shape = over_frequency(name, data.band[data.line], data.omega, middle)
+        numbers, fit = _model(task, shape, h[data.line], used[data.line])
+        models[name] = ModelFit(numbers, fit, over_frequency(name, at[1], at[0], middle).change(numbers))
+        curve = fit.h
+    part, off = _part_solution(task, parts, curve)
+    last = models[tuple(MODELS)[-1]].at_parts
+    return BandSolution(task.rig, h, solution, models, parts, last + off, part, middle, condition, used, size)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What all solves of the bands share."""
+
+    rig: Rig
+    data: BandBlocks
+    terms: tuple[Term, ...]
+    correct: bool
+    kept: Scatter | None
+
+    def solved(self, start: ComplexArray, shape: Shape) -> Solution:
+        """One solve from a start (P, 2, 2), NaN where points take no part."""
+        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape, self.kept).run()
+
+    def with_gains(self, deviation: FloatArray) -> _Task:
+        """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
+        rig, blocks = self.rig, self.data.blocks
+        chosen = [t for t in TERMS if t is not Clock and (self.correct or t is not LoadTurn)]
+        terms = [RunGain(rig, blocks, deviation) if term is RunGain else term(rig, blocks) for term in chosen]
+        return replace(self, terms=tuple(terms))
+
+
+def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
+    """H of the lines, with what it shows of rig and runs: the task that the models are fitted with."""
+    data = task.data
+    own, spare = _own_scatter(data, task.correct)
+    shape = Shape(data.line, count=len(data.band))
+    size, freedom = _FIRST, np.inf
+    for _ in range(_ROUNDS if spare.any() else 0):
+        task = task.with_gains(np.hypot(own, size * spare))
+        solution = task.solved(start, shape)
+        term = next(t for t in task.terms if isinstance(t, RunGain))
+        size, freedom = term.scatter(solution.fitted[term.name], own, _USUAL)
+    # a scatter of few runs is uncertain by itself: Student's t over the normal quantile
+    wide = float(stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975)) if np.isfinite(freedom) else 1.0
+    task = task.with_gains(np.hypot(own, size * wide * spare))
+    solution = task.solved(start, shape)
+    rig = learnt_rig(task.rig, solution)
+    if rig is not task.rig:
+        task = replace(task, rig=rig).with_gains(np.hypot(own, size * wide * spare))
+        solution = task.solved(start, shape)
+    return solution, task, size * float(spare.any())
+
+
+def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
+    """Scatter that a run's gain has by its missed load where nothing tells what that does, (number of runs,).
+
+    And one for every run whose point has more than the two runs that h needs, else zero.
+    """
+    blocks = data.blocks
+    runs = len(blocks.runs)
+    own, spare = np.zeros(runs), np.zeros(runs)
+    families: dict[tuple[float, float], set[float]] = {}
+    for point in blocks.points:
+        families.setdefault((point.static_load_direction_deg, point.shaft_speed_hz), set()).add(point.static_load)
+    band = data.band[data.line[blocks.point]]
+    for r in np.unique(blocks.run):
+        b = int(np.flatnonzero(blocks.run == r)[0])
+        point = blocks.points[blocks.point[b]]
+        loads = families[point.static_load_direction_deg, point.shaft_speed_hz]
+        if not correct or len(loads) < 2:
+            own[r] = UNKNOWN_EXPONENT * abs(blocks.miss[b].real)
+        spare[r] = float(len(np.unique(blocks.run[band == band[b]])) > 2)
+    return own, spare
+
+
+def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
+    """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
+    blocks = data.blocks
+    D, F = vector(rig, blocks, "displacement"), vector(rig, blocks, "force")
+    if len(rig.of("acceleration")) > 1:
+        F = F + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
+    lines = len(data.band)
+    h, condition = np.full((lines, 2, 2), np.nan + 0j), np.full(lines, np.inf)
+    line = data.line[blocks.point]
+    for k in np.unique(line):
+        mine = (line == k) & np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
+        if mine.sum() < 2:
+            continue
+        condition[k] = np.linalg.cond(D[mine])
+        if condition[k] < _ONE_LINE:
+            h[k] = np.linalg.lstsq(D[mine], F[mine], rcond=None)[0].T
+    return h, condition
+
+
+def _middles(data: BandBlocks, used: BoolArray) -> FloatArray:
+    """Frequency of every band [rad/s] at which its models' numbers are, (B,)."""
+    middles = np.ones(int(data.band.max(initial=-1)) + 1)
+    for b in range(len(middles)):
+        omega = data.line_omega[used & (data.band == b)]
+        if len(omega):
+            middles[b] = np.sqrt(omega.min() * omega.max())
+    return middles
+
+
+def _start(
+    data: BandBlocks, crude: ComplexArray, usable: BoolArray, middle: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """H to start from at every point (P, 2, 2), curved within its line as the band is, and at the lines (L, 2, 2)."""
+    curve = tuple(MODELS)[-1]
+    of_lines = over_frequency(curve, data.band, data.line_omega, middle)
+    numbers = nearest(of_lines, crude, usable.astype(float))
+    of_points = over_frequency(curve, data.band[data.line], data.omega, middle)
+    start = crude[data.line] + of_points.change(numbers) - of_lines.change(numbers)[data.line]
+    return np.where(usable[data.line][:, None, None], start, np.nan), crude
+
+
+def _first_points(data: BandBlocks) -> IntArray:
+    """The first point of every line, (L,)."""
+    return np.searchsorted(data.line, np.arange(len(data.band)))
+
+
+def _model(task: _Task, shape: Shape, h: ComplexArray, used: BoolArray) -> tuple[FloatArray, Solution]:
+    """Numbers of a model over every band (B, k), and its solve; NaN where lines are too few."""
+    assert shape.columns is not None
+    lines = totals(shape.group, used, shape.groups)
+    enough = lines >= shape.numbers / 2
+    numbers = nearest(shape, h, used.astype(float))
+    start = np.where((used & enough[shape.group])[:, None, None], shape.change(numbers), np.nan)
+    solution = task.solved(start, shape)
+    told = np.isfinite(solution.h).all(axis=(1, 2))
+    numbers = nearest(shape, solution.h, told.astype(float))
+    numbers[~enough] = np.nan
+    return numbers, solution
+
+
+def _parts(data: BandBlocks, used: BoolArray) -> tuple[BandPart, ...]:
+    """Parts of all bands."""
+    parts = []
+    for b in range(int(data.band.max(initial=-1)) + 1):
+        lines = np.flatnonzero(used & (data.band == b))
+        count = min(_PARTS, len(lines) // 2)
+        if len(lines) < 2 * MODELS["K-C-M"] or not count:
+            continue
+        parts += [BandPart(b, own, float(data.line_omega[own].mean())) for own in np.array_split(lines, count)]
+    return tuple(parts)
+
+
+def _part_solution(task: _Task, parts: Sequence[BandPart], curve: ComplexArray) -> tuple[Solution, ComplexArray]:
+    """The solve of the parts, and by how much each part's h is off the curve (P, 2, 2) of the model, (Q, 2, 2)."""
+    data = task.data
+    of_line = np.full(len(data.band), -1, dtype=np.intp)
+    for q, part in enumerate(parts):
+        of_line[part.lines] = q
+    group = of_line[data.line]
+    start = np.where((group >= 0)[:, None, None], curve, np.nan)
+    solution = task.solved(start, Shape(np.maximum(group, 0), count=max(len(parts), 1)))
+    off = np.zeros((len(parts), 2, 2), complex)
+    for q in range(len(parts)):
+        off[q] = (solution.h - start)[np.flatnonzero(group == q)[0]]
+    return solution, off

@@ -1,0 +1,162 @@
+"""A campaign's broadband runs to h over frequency: the whole path, all operating points in one solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rigdata.campaign import Campaign
+from rigdata.problem import RigDataError
+from rigdata.run import Run
+from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.redundant_channels import widened
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
+from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
+from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
+from tpjb_ident.dynamic.runs.baseline import Baseline
+from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
+from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun, named_runs
+from tpjb_ident.estimate.blocks import Rig, Sensor
+from tpjb_ident.identification.bands.band_blocks import STRONG, BandBlocks, band_blocks
+from tpjb_ident.identification.bands.band_conditions import band_conditions, run_conditions
+from tpjb_ident.identification.bands.band_point import BandPoint, BandSettings, band_groups, read_point
+from tpjb_ident.identification.bands.band_result import BandResult
+from tpjb_ident.identification.bands.band_solution import BandSolution, solve_bands
+from tpjb_ident.identification.bands.band_tables import Moved, SolvedBands, band_result, moved
+from tpjb_ident.identification.campaign_blocks import found_mount, sensors_of
+from tpjb_ident.terms.clock import START
+
+Progress = Callable[[str, int, int], None]
+#: What each method takes for the source of motion; without an instrument first one, then the other of these.
+_INSTRUMENTS = {"periods": ("periods", "periods"), "iv": ("command", "command"), "hv": ("displacement", "force")}
+#: Coherence of the force with the displacements that a line needs where nothing else tells signal from noise.
+_LEAST_COHERENCE = 0.5
+
+
+@dataclass(frozen=True)
+class IdentifiedBands:
+    """What a campaign's broadband runs give."""
+
+    results: tuple[BandResult, ...]
+    moved: Moved = field(repr=False)
+    conditions: tuple[Condition, ...] = ()
+
+
+def identify_bands(
+    campaign: Campaign, settings: BandSettings, progress: Progress, baseline: Baseline | None = None
+) -> IdentifiedBands:
+    """Identify every operating point of a campaign that was excited over a band."""
+    runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
+    seen = list(_observed(runs, progress))
+    checked = campaign_verdicts(campaign, seen)
+    remaining = [
+        ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
+    ]
+    points: list[BandPoint] = []
+    for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
+        point, bad = read_point(group, campaign.housing_mass, settings, baseline or Baseline())
+        remaining += bad
+        points += [] if point is None else [point]
+    if not points:
+        raise remaining[0].error
+    zero = campaign_zero(points, cell_zero_uncertainty(campaign))
+    misses, common = load_misses(points, zero.force)
+    stated = replace(campaign, channels=widened(campaign.channels, checked.gains))
+    solved = _solved(stated, points, (misses, common), settings.correct)
+    results = []
+    for b, point in enumerate(points):
+        conditions = load_conditions(misses[b], common) + zero.conditions()
+        conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
+        conditions = merged(conditions, run_conditions(point, solved.first), band_conditions(point, solved, b))
+        results.append(band_result(solved, b, misses[b], conditions, settings.clearance))
+    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + _unstated(stated)
+    return IdentifiedBands(tuple(results), moved(solved), named)
+
+
+def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation]:
+    for done, run in enumerate(runs):
+        progress(run.id, done, len(runs))
+        yield observe(run)
+
+
+def _solved(
+    campaign: Campaign, points: list[BandPoint], loads: tuple[list[LoadMiss], complex], correct: bool
+) -> SolvedBands:
+    """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
+    sensors = _sensors(campaign, points)
+    classic = [_classic(point, k) for point in points for k in range(len(point.plan.groups))]
+    temperatures = _temperatures(campaign, points)
+    passes = 2 if any(point.method == "hv" for point in points) else 1
+    solutions: list[BandSolution] = []
+    data: BandBlocks | None = None
+    for turn in range(passes):
+        instruments = [_INSTRUMENTS[point.method][turn] for point in points]
+        own = band_blocks(points, sensors, loads[0], temperatures, instruments)
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty)
+        mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads[1])
+        solutions.append(solve_bands(replace(rig, mount=mount), own, correct, _told(points, own, classic)))
+        data = data or own
+    assert data is not None
+    return SolvedBands(tuple(points), data, tuple(classic), tuple(solutions))
+
+
+def _told(points: Sequence[BandPoint], data: BandBlocks, classic: Sequence[ClassicLine]) -> np.ndarray:
+    """Lines whose excitation stands clear of the noise, (L,)."""
+    quiet = np.array([points[b].method == "hv" for b in data.band], dtype=bool)
+    coherence = np.array([float(np.min(line.coherence)) for line in classic])
+    return np.where(quiet, np.nan_to_num(coherence) > _LEAST_COHERENCE, data.strength > STRONG)
+
+
+def _classic(point: BandPoint, k: int) -> ClassicLine:
+    return classic_line(point.spectra, point.plan.bins(k), point.group.kind in OPEN_ENDS)
+
+
+def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, ...]:
+    """The campaign's sensors; quantities whose clocks were put right started within a sample of the probes."""
+    spectra = [s for point in points for s in point.spectra]
+    apart = frozenset().union(*(s.clocks for s in spectra))
+    rate = min(run.sample_rate for point in points for run in point.group.runs)
+    sensors = []
+    for sensor in sensors_of(campaign):
+        late = sensor.quantity in apart and not sensor.delay_uncertainty
+        sensors.append(replace(sensor, delay_uncertainty=START / rate) if late else sensor)
+    return tuple(sensors)
+
+
+def _temperatures(campaign: Campaign, points: Sequence[BandPoint]) -> dict[str, float]:
+    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
+    spectra = [s for point in points for s in point.spectra]
+    means = {s.phasors.run: float(np.mean(list(s.temperatures.values()))) for s in spectra if s.temperatures}
+    stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
+    return means | stated
+
+
+def _unstated(campaign: Campaign) -> tuple[Condition, ...]:
+    """Say which probes and cells have no uncertainty in the manifest."""
+    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
+    names = [c.name for c in main if c.uncertainty is None]
+    if not names:
+        return ()
+    text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
+    return (Condition("calibration-uncertainty-unstated", text),)
+
+
+def _without(point: BandPoint, left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
+    """Name the runs of a point that take no part."""
+    members = [excluded.run for excluded in left if replace(excluded.point, excitation=0.0) == point.point]
+    return (Condition("run-left-out", f"without {', '.join(members)}, which cannot be used"),) if members else ()
+
+
+def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
+    """Name the operating points that have no run left."""
+    kept = [point.point for point in points]
+    lost = [excluded for excluded in left if replace(excluded.point, excitation=0.0) not in kept]
+    if not lost:
+        return ()
+    places = dict.fromkeys(f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost)
+    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    return (Condition("point-lost", f"no usable run over a band at {'; '.join(places)}: {runs}"),)

@@ -1,0 +1,57 @@
+"""Gain of the cells in every run and axis: what all lines of a run share, however many there are.
+
+The film is a little warmer in one run than in another. At a single line that is scatter from run to run; over a band
+the lines of a run have it in common, and only its size among the runs tells how far H may be off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter
+
+#: Degrees of freedom below which the runs tell nothing of their scatter.
+_LEAST = 0.5
+
+
+class RunGain(Factor):
+    """Logarithm of the gain of every cell in every run; `deviation` (number of runs,), none where it is zero."""
+
+    name = "run gain"
+    always_estimated = True
+
+    def __init__(self, rig: Rig, blocks: Blocks, deviation: Sequence[float] | FloatArray = ()) -> None:
+        super().__init__(rig, blocks)
+        sizes = list(deviation)
+        self._places = [(r, int(j)) for r, size in enumerate(sizes) if size > 0 for j in rig.of("force")]
+        self.parameters = tuple(
+            Parameter(f"{rig.sensors[j].name} in {blocks.runs[r]}", "1", float(sizes[r])) for r, j in self._places
+        )
+
+    def exponent(self, blocks: Blocks) -> ComplexArray:
+        """One in the cell's own row, in the blocks of that run."""
+        exponent = np.zeros((*blocks.z.shape, len(self._places)), complex)
+        for q, (r, j) in enumerate(self._places):
+            exponent[:, j, q] = blocks.run == r
+        return exponent
+
+    def scatter(self, fitted: Fitted, own: FloatArray, usual: tuple[float, float]) -> tuple[float, float]:
+        """Standard deviation of the runs' gains by what the records tell of them, and its degrees of freedom.
+
+        `own` (number of runs,): deviation that a run has for a reason of its own; `usual`: that of a good rig, and the
+        degrees of freedom that it counts as.
+        """
+        prior = np.array([p.deviation for p in self.parameters])
+        share = np.clip(1 - (fitted.deviation / prior) ** 2, 0.0, 1.0)
+        apart = np.array([own[r] for r, _ in self._places])
+        freedom = float(share.sum()) / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
+        size, counted = usual
+        known = counted / (counted + freedom) * size**2
+        if freedom < _LEAST:
+            return size, np.inf
+        shown = max(float(np.sum(fitted.value**2 - share * apart**2)) / float(share.sum()), 0.0)
+        return float(np.sqrt(shown + known)), freedom * ((shown + known) / max(shown, 1e-300)) ** 2
