@@ -14,7 +14,6 @@ from scipy.stats import t as student_t
 from rigdata.operating_point import OperatingPoint
 from tests.dynamic import phasor_cases
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.systematic_sources import apparent_change, gain_draws
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
 from tpjb_ident.dynamic.runs.baseline import Baseline
@@ -339,89 +338,6 @@ def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():
     assert said == "nonlinear-amplitude"
     assert "-12.3 %" in said.detail
     assert "0.4 %" in said.detail
-
-
-def channel(name, quantity, axis, uncertainty):
-    return SimpleNamespace(name=name, quantity=quantity, axis=axis, uncertainty=uncertainty)
-
-
-AXES = (math.radians(45.0), math.radians(135.0))
-
-
-def channels(displacement=0.0, force=0.0, acceleration=0.0, axes=AXES):
-    sizes = {"displacement": displacement, "force": force, "acceleration": acceleration}
-    named = {f"{q}{k}": channel(f"{q}{k}", q, a, s) for q, s in sizes.items() for k, a in enumerate(axes)}
-    return named | {"T": channel("T", "temperature", None, 0.1), "raw": channel("raw", "force", None, 0.5)}
-
-
-def test_draws_of_gains_have_their_spread_along_the_channels():
-    draws = gain_draws(channels(0.01, 0.03), 4000, 1)
-    u = np.array([math.cos(AXES[0]), math.sin(AXES[0])])
-    v = np.array([-u[1], u[0]])
-    for gains, size in ((draws.displacement, 0.01), (draws.force, 0.03)):
-        assert gains.shape == (4000, 2, 2)
-        np.testing.assert_allclose(gains.mean(axis=0), np.eye(2), atol=1e-12)
-        along, aside = gains @ u - u, gains @ v - v
-        assert np.std(along @ u) == pytest.approx(size, rel=0.05)
-        assert np.std(aside @ v) == pytest.approx(size, rel=0.05)
-        np.testing.assert_allclose(along @ v, 0.0, atol=1e-12)
-        assert abs(np.corrcoef(along @ u, aside @ v)[0, 1]) < 0.06
-    np.testing.assert_allclose(draws.acceleration, np.broadcast_to(np.eye(2), (4000, 2, 2)), atol=1e-12)
-    assert draws.unstated == ()
-    np.testing.assert_array_equal(gain_draws(channels(0.01, 0.03), 4000, 1).force, draws.force)
-
-
-def test_channels_without_a_stated_uncertainty_are_named():
-    draws = gain_draws(channels(None, 0.01, None), 10, 1)
-    assert draws.unstated == ("displacement0", "displacement1")
-    np.testing.assert_allclose(draws.displacement, np.broadcast_to(np.eye(2), (10, 2, 2)), atol=1e-12)
-    single = gain_draws(channels(0.01, 0.01, axes=AXES[:1]), 6, 1)
-    np.testing.assert_array_equal(single.force, np.broadcast_to(np.eye(2), (6, 2, 2)))
-    assert len(gain_draws(channels(0.01), 1, 1).force) == 2
-
-
-def measured(inertia=0.0, with_accelerometers=True):
-    rng = np.random.default_rng(5)
-    D = 1e-5 * (rng.standard_normal((12, 2)) + 1j * rng.standard_normal((12, 2)))
-    run = SimpleNamespace(housing_mass=30.0, acceleration=object() if with_accelerometers else None)
-    return SimpleNamespace(D=D, A=(inertia * D) / 30.0, runs=(run,))
-
-
-def stiff():
-    return replace(phasor_cases.stiff(H, OMEGAS[1]), weights=np.ones((12, 2)))
-
-
-@pytest.mark.parametrize("quantity", ["displacement", "force", "acceleration"])
-def test_a_gain_changes_its_own_part_of_h(quantity):
-    """Probes: h G^-1; cells: G (h - inertia) + inertia; accelerometers: their share only."""
-    inertia = 2e7
-    draws = gain_draws(channels(**{quantity: 0.05}), 6, 3)
-    found = apparent_change(measured(inertia), stiff(), draws)
-    gains = getattr(draws, quantity)
-    part = inertia * np.eye(2)
-    expected = {
-        "displacement": H @ np.linalg.inv(gains) - H,
-        "force": gains @ (H - part) - (H - part),
-        "acceleration": gains @ part - part,
-    }[quantity].reshape(6, 4)
-    np.testing.assert_allclose(found, np.concatenate([expected.real, expected.imag], axis=1), atol=1e-3)
-
-
-def test_without_accelerometers_the_cells_gain_is_that_of_h():
-    draws = gain_draws(channels(force=0.05), 4, 3)
-    found = apparent_change(measured(with_accelerometers=False), stiff(), draws)
-    expected = (draws.force @ H - H).reshape(4, 4)
-    np.testing.assert_allclose(found[:, :4], expected.real, atol=1e-3)
-    lost = replace(stiff(), h=np.full((2, 2), np.nan))
-    nothing = apparent_change(measured(), lost, draws)
-    assert nothing.shape == found.shape == (4, 8)
-    assert np.isnan(nothing).all()
-    # windows without weight say nothing of the inertia
-    data, weights = measured(2e7), np.ones((12, 2))
-    data.A[3] += 1.0
-    weights[3, 1] = 0.0
-    again = apparent_change(data, replace(stiff(), weights=weights), draws)
-    np.testing.assert_allclose(again, apparent_change(measured(2e7), stiff(), draws), atol=1e-3)
 
 
 def test_baseline_runs_without_an_answer_are_named_where_no_other_baseline_reaches():

@@ -7,7 +7,7 @@ over all points; a point whose runs differ clearly more than the others' has one
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtr, fdtrc, fdtri
@@ -56,6 +56,8 @@ class Scatter:
     spare: float  #: degrees of freedom of the pooled variance
     own: BoolArray  #: (P,): points with a scatter of their own
     own_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
+    judges: bool = True  #: whether blocks that stand apart lose their weight
+    follows: bool = True  #: whether it is found in the solve
 
     @staticmethod
     def none(points: int, blocks: int) -> Scatter:
@@ -69,20 +71,25 @@ class Scatter:
         return max(self.spare, 1.0)
 
     @staticmethod
-    def kept(groups: int, before: Scatter) -> Scatter:
-        """Weights and pooled scatter of an earlier solve of the same blocks, for other groups."""
-        none = np.zeros(groups, dtype=bool)
-        variance, spare = np.full(groups, before.pooled), np.ones(groups)
-        return Scatter(variance, before.weights, before.pooled, before.spare, none, spare)
+    def unjudged(groups: int, blocks: int) -> Scatter:
+        """No scatter yet, all blocks count and none is judged: where lines of one run stand for many runs."""
+        return replace(Scatter.none(groups, blocks), judges=False)
+
+    def kept(self, groups: int, weights: FloatArray) -> Scatter:
+        """Pooled scatter for other groups of the same blocks, with weights (n,); both stay."""
+        none, one = np.zeros(groups, dtype=bool), np.ones(groups)
+        return Scatter(self.pooled * one, weights, self.pooled, self.spare, none, one, judges=False, follows=False)
 
     def updated(self, group: IntArray, fit: Residuals, solvable: BoolArray, count: int, numbers: int) -> Scatter:
         """Weights after the first step, scatter from the third on.
 
         `group` (n,): point of every block, `solvable` (P,), `numbers`: unknowns of a point.
         """
-        weights = self._weights(group, fit, solvable) if count != 1 else self.weights
+        if not self.follows:
+            return self
+        weights = self._weights(group, fit, solvable) if count != 1 and self.judges else self.weights
         if count < 3:
-            return Scatter(self.variance, weights, self.pooled, self.spare, self.own, self.own_spare)
+            return replace(self, weights=weights)
         points = len(solvable)
         used = weights > 0.05
         # where too few good runs remain all count in full, and nothing has to be made up for
@@ -101,7 +108,7 @@ class Scatter:
         excess = self.variance + (chi - spare) / gain
         variance[own] = np.maximum(excess[own], pooled)
         runs = totals(group, used, points)
-        return Scatter(variance, weights, pooled, freedom, own, np.maximum(runs - 2.0, 1.0))
+        return Scatter(variance, weights, pooled, freedom, own, np.maximum(runs - 2.0, 1.0), self.judges)
 
     def _pooled(self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray) -> tuple[float, float]:
         """Variance that all points share, by moments, and its degrees of freedom; the usual one counts a little."""

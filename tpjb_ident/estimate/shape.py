@@ -12,6 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
+from tpjb_ident.estimate.scatter import Scatter
 
 #: Matrices of a model over frequency, four numbers each.
 MODELS = {"K-C": 2, "K-C-M": 3}
@@ -24,6 +25,7 @@ class Shape:
     group: IntArray  #: (P,): group of every point
     columns: FloatArray | None = None  #: (P, 8, k); None: x is h itself
     count: int = 0  #: groups at least: the last may have no point
+    scatter: Scatter | None = None  #: to begin with; None: none, and blocks are judged
 
     @property
     def groups(self) -> int:

@@ -68,7 +68,7 @@ class Solution:
 
 
 class Solver:
-    """Gauss-Newton over all blocks, from a start of H; weights and scatter `kept` of an earlier solve, else found."""
+    """Gauss-Newton over all blocks, from a start of H; points share its numbers as the shape says."""
 
     def __init__(
         self,
@@ -78,7 +78,6 @@ class Solver:
         start: ComplexArray,
         to_set_point: bool = True,
         shape: Shape | None = None,
-        kept: Scatter | None = None,
     ) -> None:
         self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
         self.shape = shape or Shape(np.arange(len(blocks.points)))
@@ -97,9 +96,7 @@ class Solver:
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
         self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))
         self.u = np.zeros((len(blocks), UNKNOWNS), complex)
-        groups = self.shape.groups
-        self.scatter = Scatter.none(groups, len(blocks)) if kept is None else Scatter.kept(groups, kept)
-        self.follows = kept is None
+        self.scatter = self.shape.scatter or Scatter.none(self.shape.groups, len(blocks))
         self.moved = False
         self.housing_noise = HOUSING_NOISE[rig.mount]
 
@@ -108,16 +105,14 @@ class Solver:
         last: Step | None = None
         count = 0
         # runs that stand apart are told at the robust start, before one of them pulls the others away
-        first = self._sums(None)[1]
-        if self.follows:
-            self.scatter = self._scatter(first, 0)
+        self.scatter = self._scatter(self._sums(None)[1], 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums(last)
             last = step(sums, self.mean - self.theta, self.precision, self.always)
             change = self._move(last)
             if count == 3:
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
-            if self.follows and count < _SCATTER_STEPS:
+            if self.scatter.follows and count < _SCATTER_STEPS:
                 self.scatter = self._scatter(fit, count)
             elif count > 3 and change < _CONVERGED:
                 break

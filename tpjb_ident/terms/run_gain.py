@@ -54,4 +54,4 @@ class RunGain(Factor):
         if freedom < _LEAST:
             return size, np.inf
         shown = max(float(np.sum(fitted.value**2 - share * apart**2)) / float(share.sum()), 0.0)
-        return float(np.sqrt(shown + known)), freedom * ((shown + known) / max(shown, 1e-300)) ** 2
+        return float(np.sqrt(shown + known)), freedom * ((shown + known) / max(shown, 1e-3 * known)) ** 2

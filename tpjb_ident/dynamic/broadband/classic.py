@@ -18,6 +18,8 @@ from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 
 #: Highest power of frequency, over the bins of a line.
 _ORDER = 2
+#: Condition number of the motions from which they are along one line.
+_ONE_LINE = 1e8
 
 
 @dataclass(frozen=True)
@@ -33,42 +35,52 @@ class ClassicLine:
 
 def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> ClassicLine:
     """H1, H2, Hv and coherence over all rows of a line: periods, or bins."""
-    D, F, nuisance = _rows(spectra, bins, ends)
-    n, spent = len(D), nuisance.shape[1]
-    total = n - (spent - 2 * _ORDER if spent else 0)
-    basis = np.linalg.qr(nuisance)[0]
-    D, F = (rows - basis @ (basis.conj().T @ rows) for rows in (D, F))
-    scale = np.sqrt(np.mean(np.abs(np.concatenate([D, F], axis=1)) ** 2, axis=0))
-    freedom = n - spent - 2
-    if freedom < 1 or not (scale > 0).all() or not np.linalg.cond(D / scale[:2]) < 1e8:
+    D, F, ends_columns, place = _rows(spectra, bins, ends)
+    n = len(D)
+    order = 0 if spectra[0].period is not None else _ORDER
+    basis = np.linalg.qr(np.concatenate([_sloped(D, place, order), ends_columns], axis=1))[0]
+    flat_D, flat_F = (rows - basis @ (basis.conj().T @ rows) for rows in (D, F))
+    scale = np.sqrt(np.mean(np.abs(np.concatenate([flat_D, flat_F], axis=1)) ** 2, axis=0))
+    freedom = n - basis.shape[1] - 2
+    if freedom < 1 or not (scale > 0).all() or not np.linalg.cond(flat_D / scale[:2]) < _ONE_LINE:
         return ClassicLine({}, np.full((8, 8), np.nan), 1.0, np.full(2, np.nan), n)
-    inverse = np.linalg.pinv(D)
-    h1 = (inverse @ F).T
-    remaining = F - D @ h1.T
+    inverse = np.linalg.pinv(flat_D)
+    h1 = (inverse @ flat_F).T
+    remaining = flat_F - flat_D @ h1.T
     noise = remaining.T @ remaining.conj() / freedom
     covariance = real_covariance(np.kron(noise, inverse @ inverse.conj().T))
-    power = np.sum(np.abs(F) ** 2, axis=0) / max(total - 2 * _ORDER, 1)
+    power = np.sum(np.abs(flat_F) ** 2, axis=0) / max(n - basis.shape[1], 1)
     coherence = np.clip(1 - np.diag(noise).real / power, 0.0, 1.0)
-    signal = np.linalg.svd(np.concatenate([D, F], axis=1) / scale, full_matrices=False)[2][:2] * scale
-    h = {"h1": h1, "h2": np.linalg.solve(F.conj().T @ D, F.conj().T @ F).T}
+    signal = np.linalg.svd(np.concatenate([flat_D, flat_F], axis=1) / scale, full_matrices=False)[2][:2] * scale
+    X = np.concatenate([D, _sloped(D, place, order), ends_columns], axis=1)
+    Z = np.concatenate([F, _sloped(F, place, order), ends_columns], axis=1)
+    h = {"h1": h1, "h2": np.linalg.solve(Z.conj().T @ X, Z.conj().T @ F)[:2].T}
     h["hv"] = np.linalg.solve(signal[:, :2], signal[:, 2:]).T
     return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
 
 
-def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Displacement and force of all runs' rows (n, 2), and columns of what is to be taken off them (n, k)."""
+def _sloped(rows: ComplexArray, place: FloatArray, order: int) -> ComplexArray:
+    """Rows (n, 2) times powers of their place (n,), (n, 2 order)."""
+    powers = [rows * place[:, None] ** power for power in range(1, order + 1)]
+    return np.concatenate(powers, axis=1) if powers else np.zeros((len(rows), 0), complex)
+
+
+def _rows(
+    spectra: Sequence[RunSpectra], bins: IntArray, ends: bool
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, FloatArray]:
+    """Displacement and force of all runs' rows (n, 2), columns of the records' ends (n, k), place in the line (n,)."""
     D = np.concatenate([s.D[:, bins].reshape(-1, 2) for s in spectra])
     F = np.concatenate([s.F[:, bins].reshape(-1, 2) for s in spectra])
     if spectra[0].period is not None:
-        return D, F, np.zeros((len(D), 0), complex)
+        return D, F, np.zeros((len(D), 0), complex), np.zeros(len(D))
     place = spectra[0].frequencies[bins] - spectra[0].frequencies[bins].mean()
-    place = place / np.abs(place).max()
-    columns = [D * np.tile(place, len(spectra))[:, None] ** power for power in range(1, _ORDER + 1)]
-    for r in range(len(spectra) if ends else 0):
-        own = np.zeros((len(spectra), len(bins), _ORDER + 1), complex)
-        own[r] = place[:, None] ** np.arange(_ORDER + 1)
-        columns.append(own.reshape(-1, _ORDER + 1))
-    return D, F, np.concatenate(columns, axis=1)
+    place = place / max(float(np.abs(place).max()), 1e-300)
+    runs = len(spectra) if ends else 0
+    columns = np.zeros((runs, len(spectra), len(bins), _ORDER + 1), complex)
+    for r in range(runs):
+        columns[r, r] = place[:, None] ** np.arange(_ORDER + 1)
+    rows = columns.transpose(1, 2, 0, 3).reshape(len(D), -1)
+    return D, F, rows, np.tile(place, len(spectra))
 
 
 def real_covariance(gamma: ComplexArray) -> FloatArray:

@@ -14,8 +14,8 @@ from tpjb_ident.errors import BadInputError
 
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 18
-#: Bins that one response is fitted to: over so few it is a straight line, and of them enough are left for the noise.
-_GROUP = 9
+#: Bins that one response is fitted to, about: over so few it is a straight line, and enough are left for the noise.
+_GROUP = 12
 #: Bins of a line that must be left when those of shaft and mains are gone.
 _LEAST_BINS = 12
 #: Lines that a band must give.
@@ -55,6 +55,6 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
         )
     lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
     lines = [part for part in lines if len(part) >= _LEAST_BINS]
-    groups = tuple(tuple(np.array_split(part, max(len(part) // _GROUP, 1))) for part in lines)
+    groups = tuple(tuple(np.array_split(part, max(round(len(part) / _GROUP), 1))) for part in lines)
     middles = np.array([0.5 * (frequencies[part[0]] + frequencies[part[-1]]) for part in lines])
     return LinePlan(groups, middles, width * float(frequencies[1] - frequencies[0]))

@@ -9,6 +9,7 @@ taken to be the force's, H1) or the force (all is the displacement's, H2): truth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,19 +38,35 @@ class LineResponse:
     freedom: float  #: complex degrees of freedom of the residual
 
 
-def line_response(spectra: RunSpectra, bins: IntArray, instrument: str, ends: bool) -> LineResponse:
-    """Response over a group of bins; `instrument` is "periods", "command", "displacement" or "force"."""
-    z = spectra.phasors.z[:, bins]
+def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
+    """Response over a group of bins; `instrument` is "periods", "command", "displacement" or "force".
+
+    Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
+    shows across that is noise.
+    """
+    z = np.concatenate([run.phasors.z[:, bins] for run in runs])
     if instrument == "periods":
         rows = z[:, 0]
         mean = rows.mean(axis=0)
         remaining = rows - mean
         return LineResponse(mean[None], float(len(rows)), _outer(remaining), float(len(rows) - 1))
-    source = {"displacement": spectra.D, "force": spectra.F}.get(instrument)
-    u = driven_command(spectra)[:, bins] if source is None else source[:, bins]
-    place = spectra.frequencies[bins] - spectra.frequencies[bins].mean()
+    u = np.concatenate([_source(run, instrument)[:, bins] for run in runs])
+    frequencies = runs[0].frequencies[bins]
+    place = frequencies - frequencies.mean()
     place = place / max(float(np.abs(place).max()), 1e-300)
-    return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), np.tile(place, len(z)), ends)
+    nuisance = [u * place[None, :, None]]
+    for r in range(len(runs) if ends else 0):
+        own = np.zeros((len(runs), len(bins), 2), complex)
+        own[r, :, 0], own[r, :, 1] = 1.0, place
+        nuisance.append(own)
+    columns = np.concatenate([part.reshape(len(runs) * len(bins), -1) for part in nuisance], axis=1)
+    return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), columns)
+
+
+def _source(spectra: RunSpectra, instrument: str) -> ComplexArray:
+    if instrument == "command":
+        return driven_command(spectra)
+    return spectra.D if instrument == "displacement" else spectra.F
 
 
 def driven_command(spectra: RunSpectra) -> ComplexArray:
@@ -60,12 +77,9 @@ def driven_command(spectra: RunSpectra) -> ComplexArray:
     return np.asarray(spectra.command @ along[:, power > _AT_REST * power[-1]])
 
 
-def _regressed(z: ComplexArray, u: ComplexArray, place: FloatArray, ends: bool) -> LineResponse:
-    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak."""
-    nuisance = [u * place[:, None]]
-    if ends:
-        nuisance += [np.ones((len(z), 1)), place[:, None]]
-    basis = np.linalg.qr(np.concatenate(nuisance, axis=1))[0]
+def _regressed(z: ComplexArray, u: ComplexArray, nuisance: ComplexArray) -> LineResponse:
+    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak (b, j)."""
+    basis = np.linalg.qr(nuisance)[0]
     flat = u - basis @ (basis.conj().T @ u)
     q, triangle = np.linalg.qr(flat)
     told = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)

@@ -21,6 +21,8 @@ from tpjb_ident.identification.point_means import warm_gain
 STRONG = 10.0
 #: A channel whose phasors are below this share of its quantity's is dead.
 _NOTHING = 1e-6
+#: Noise that responses have at least, of the run's largest: one without an instrument may have none.
+_LEAST = 1e-8
 #: What windows would tell of clocks: the transform has one, and its channels are on one clock by then.
 _STILL: dict[str, object] = {"windows": 1.0, "time": 0.0, "shaft": np.nan + 0j}
 #: Misses that no scatter of loads explains say nothing of how H changes with the load.
@@ -62,21 +64,18 @@ def band_blocks(
             lines.append(len(line_omega) + k)
         line_omega += [2 * np.pi * float(f) for f in point.plan.frequencies]
         bands += [b] * len(point.plan.groups)
-        for r, spectra in enumerate(point.spectra):
-            temperature = temperatures.get(spectra.phasors.run, np.nan)
-            channels = _described(spectra, sensors)
-            numbers = calibration_numbers(channels, known)
-            rows = _run_rows(point, spectra, channels, temperature, instrument)
-            usable = abs(miss.size[r]) < _MAX_MISS and abs(miss.sideways[r]) < _MAX_MISS
-            for place, row in rows:
-                stands.append(bool(row.pop("stands")))
-                row |= {"calibration": numbers, "along": axes_of(channels)}
-                row |= {"point": first + place, "run": len(runs), "temperature": temperature, "miss_error": 0.0}
-                row["omega"] = omega[first + place]
-                row["miss"] = complex(miss.size[r], miss.sideways[r]) if usable else 0j
+        for members in _members(point):
+            spectra = [point.spectra[r] for r in members]
+            warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
+            channels = _described(spectra[0], sensors)
+            row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
+            row |= {"run": len(runs), "temperature": warmth[0], "miss_error": 0.0, "miss": _miss(miss, members)}
+            for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
+                stands.append(bool(response.pop("stands")))
+                response |= row | {"point": first + place, "omega": omega[first + place]}
                 for name in columns:
-                    columns[name].append(row[name])
-            runs.append(spectra.phasors.run)
+                    columns[name].append(response[name])
+            runs.append(", ".join(s.phasors.run for s in spectra))
     empty = no_blocks(len(sensors))
     arrays = {name: np.array(values) if values else empty[name] for name, values in columns.items()}
     blocks = Blocks(points=tuple(operating), runs=tuple(runs), bent=np.zeros(len(operating)), **arrays)
@@ -94,6 +93,18 @@ def band_blocks(
     )
 
 
+def _members(point: BandPoint) -> list[list[int]]:
+    """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
+    runs = range(len(point.spectra))
+    return [list(runs)] if point.method == "hv" else [[r] for r in runs]
+
+
+def _miss(miss: LoadMiss, members: Sequence[int]) -> complex:
+    """Missed load of some runs together, relative size + i turn [rad]."""
+    size, turn = float(np.mean(miss.size[members])), float(np.mean(miss.sideways[members]))
+    return complex(size, turn) if abs(size) < _MAX_MISS and abs(turn) < _MAX_MISS else 0j
+
+
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
     """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
     table = {channel.name: channel for channel in spectra.phasors.channels}
@@ -109,13 +120,14 @@ def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel |
 
 def _run_rows(
     point: BandPoint,
-    spectra: RunSpectra,
+    runs: Sequence[RunSpectra],
     channels: Sequence[Channel | None],
     temperature: float,
     instrument: str,
 ) -> list[tuple[int, dict[str, object]]]:
     """Place of its group and columns of every response of one run."""
     m = len(channels)
+    spectra = runs[0]
     names = [channel.name for channel in spectra.phasors.channels]
     order = [names.index(channel.name) for channel in channels if channel is not None]
     present = np.array([channel is not None for channel in channels])
@@ -123,12 +135,13 @@ def _run_rows(
     gain = np.array([1.0 if c is None else warm_gain(c, warm) for c in channels])
     ends = point.group.kind in OPEN_ENDS
     groups = [bins for parts in point.plan.groups for bins in parts]
-    responses = [line_response(spectra, bins, instrument, ends) for bins in groups]
+    responses = [line_response(runs, bins, instrument, ends) for bins in groups]
     noises, freedoms = pooled_noise(responses)
+    least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     rows: list[tuple[int, dict[str, object]]] = []
     for place, (bins, response, noise, freedom) in enumerate(zip(groups, responses, noises, freedoms)):
         covariance = np.zeros((m, m), complex)
-        covariance[np.ix_(present, present)] = noise[np.ix_(order, order)] / response.count
+        covariance[np.ix_(present, present)] = (noise / response.count + np.diag(least**2))[np.ix_(order, order)]
         covariance /= np.outer(gain, gain)
         z = np.zeros((len(response.z), m), complex)
         z[:, present] = response.z[:, order]

@@ -88,8 +88,7 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
     first = _first_points(data)
     h[usable] = at_lines[usable] + (solution.h - start)[first[usable]]
-    weights = np.where(usable[data.line[data.blocks.point]], solution.scatter.weights, 1.0)
-    task = replace(task, kept=replace(solution.scatter, weights=weights))
+    task = replace(task, kept=solution.scatter)
     models: dict[str, ModelFit] = {}
     parts = _parts(data, used)
     at = np.array([part.omega for part in parts]), np.array([part.band for part in parts], dtype=np.intp)
@@ -116,7 +115,9 @@ class _Task:
 
     def solved(self, start: ComplexArray, shape: Shape) -> Solution:
         """One solve from a start (P, 2, 2), NaN where points take no part."""
-        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape, self.kept).run()
+        if self.kept is not None:
+            shape = replace(shape, scatter=self.kept.kept(shape.groups, self.kept.weights))
+        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
 
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
@@ -130,7 +131,8 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     """H of the lines, with what it shows of rig and runs: the task that the models are fitted with."""
     data = task.data
     own, spare = _own_scatter(data, task.correct)
-    shape = Shape(data.line, count=len(data.band))
+    lines = len(data.band)
+    shape = Shape(data.line, count=lines, scatter=Scatter.unjudged(lines, len(data.blocks)))
     size, freedom = _FIRST, np.inf
     for _ in range(_ROUNDS if spare.any() else 0):
         task = task.with_gains(np.hypot(own, size * spare))
