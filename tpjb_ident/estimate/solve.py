@@ -33,6 +33,8 @@ from tpjb_ident.estimate.term import Fitted, Term
 _STEPS, _CONVERGED = 18, 1e-9
 #: Steps in which weights and scatter follow.
 _SCATTER_STEPS = 12
+#: Change of H in one step, of its size, at most: a line next to noise could run away.
+_LARGEST_STEP = 1.0
 #: Weight of an unknown beside a block's best told one below which nothing is told of it.
 _UNTOLD = 1e-14
 #: Blocks whose arrays are held at a time.
@@ -245,7 +247,12 @@ class Solver:
         return Residuals(np.einsum("nk,nk->n", r, r), rows.counted, leverage, rows.force[:, 0], rows.force[:, 1])
 
     def _move(self, taken: Step) -> float:
-        change = self.shape.change(taken.h * self.unit) * self.solvable[:, None, None]
+        x = taken.h * self.unit
+        whole = np.abs(self.shape.change(x)).max(axis=(1, 2)) / np.abs(self.h).max(axis=(1, 2))
+        largest = np.zeros(self.shape.groups)
+        np.maximum.at(largest, self.shape.group, np.where(self.solvable, whole, 0.0))
+        damped = np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, _LARGEST_STEP))
+        change = self.shape.change(x * damped[:, None]) * self.solvable[:, None, None]
         self.h = self.h + change
         self.theta = self.theta + taken.theta
         self.moved = True

@@ -37,17 +37,19 @@ class ClockRate:
 
 def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str, ClockRate]:
     """Differences that runs share, by quantity; those that are clear, and matter."""
-    table = {}
+    pooled = {}
     for quantity in sorted({q for rates in seen for q in rates}):
         clocks = [rates[quantity] for rates in seen if quantity in rates and np.isfinite(rates[quantity].error)]
-        if not clocks:
-            continue
-        weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])
-        rate = float(np.sum(weight * [clock.rate for clock in clocks]) / weight.sum())
-        pooled = ClockRate(rate, float(weight.sum() ** -0.5))
-        if abs(rate) > _CLEAR * pooled.error and abs(rate) * reach > _NOTABLE:
-            table[quantity] = pooled
-    return table
+        if clocks:
+            weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])
+            rate = float(np.sum(weight * [clock.rate for clock in clocks]) / weight.sum())
+            pooled[quantity] = ClockRate(rate, float(weight.sum() ** -0.5))
+    clear = {q: c for q, c in pooled.items() if abs(c.rate) > _CLEAR * c.error and abs(c.rate) * reach > _NOTABLE}
+    if "force" in clear and "acceleration" in pooled:
+        cells, other = clear["force"], pooled["acceleration"]
+        if abs(cells.rate - other.rate) < _CLEAR * np.hypot(cells.error, other.error):
+            clear["acceleration"] = cells  # too weak to tell: as a rule accelerometers are recorded with the cells
+    return clear
 
 
 def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:

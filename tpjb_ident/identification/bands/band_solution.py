@@ -32,6 +32,8 @@ _PARTS = 8
 _FIRST, _USUAL = 0.01, (5e-4, 4.0)
 #: Rounds in which the runs tell their scatter.
 _ROUNDS = 3
+#: A line whose h goes this far from least squares, of its size, is not told from noise.
+_RUN_AWAY = 3.0
 #: Condition number of a line's motions from which its runs move the shaft along one line.
 _ONE_LINE = 1e6
 
@@ -87,7 +89,9 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     solution, task, size = _lines(task, start, used)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
     first = _first_points(data)
-    h[usable] = at_lines[usable] + (solution.h - start)[first[usable]]
+    away = (solution.h - start)[first]
+    usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(at_lines).max(axis=(1, 2))
+    h[usable] = at_lines[usable] + away[usable]
     task = replace(task, kept=solution.scatter)
     models: dict[str, ModelFit] = {}
     parts = _parts(data, used)
@@ -221,7 +225,7 @@ def _first_points(data: BandBlocks) -> IntArray:
 def _model(task: _Task, shape: Shape, h: ComplexArray, used: BoolArray) -> tuple[FloatArray, Solution]:
     """Numbers of a model over every band (B, k), and its solve; NaN where lines are too few."""
     assert shape.columns is not None
-    lines = totals(shape.group, used, shape.groups)
+    lines = totals(shape.group, used & np.isfinite(h).all(axis=(1, 2)), shape.groups)
     enough = lines >= shape.numbers / 2
     numbers = nearest(shape, h, used.astype(float))
     start = np.where((used & enough[shape.group])[:, None, None], shape.change(numbers), np.nan)

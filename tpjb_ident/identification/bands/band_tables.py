@@ -47,6 +47,10 @@ class SolvedBands:
         finite = np.all([np.isfinite(s.h).all(axis=(1, 2)) for s in self.solutions], axis=0)
         return np.flatnonzero(finite & (self.data.band == b))
 
+    def parts(self, b: int) -> list[int]:
+        """Parts of a band that become points."""
+        return [q for q, part in enumerate(self.first.parts) if part.band == b] if len(self.usable(b)) else []
+
     def between(self, h: list[ComplexArray]) -> tuple[ComplexArray, FloatArray]:
         """The middle of the solves' H (2, 2), and half of what they are apart (8,)."""
         half = 0.5 * (h[-1] - h[0])
@@ -68,8 +72,7 @@ def band_result(
     ids = tuple(s.phasors.run for s in point.spectra)
     period, width = point.spectra[0].period, point.plan.resolution
     result = BandResult(point.point, point.group.kind, lines, models, chosen, told, ids, period, width)
-    parts = [q for q, part in enumerate(solved.first.parts) if part.band == b] if models else []
-    return replace(result, points=tuple(_point(solved, q, result, miss, clearance) for q in parts))
+    return replace(result, points=tuple(_point(solved, q, result, miss, clearance) for q in solved.parts(b)))
 
 
 @dataclass(frozen=True)
@@ -82,12 +85,13 @@ class Moved:
 
 def moved(solved: SolvedBands) -> Moved:
     """The sources of the points of all bands."""
-    solution, number = solved.first.part, len(solved.first.parts)
+    solution = solved.first.part
+    parts = [q for b in range(len(solved.points)) for q in solved.parts(b)]
     names = tuple(f"{term.name}: {parameter.name}" for term in solution.terms for parameter in term.parameters)
     if not names:
-        return Moved(np.zeros((1, 8 * number)), ())
-    factors = solution.factors[:, :number]
-    return Moved(np.asarray(factors.reshape(len(names), -1) * np.sqrt(len(names))), names)
+        return Moved(np.zeros((1, 8 * len(parts))), ())
+    factors = solution.factors[:, parts]
+    return Moved(np.asarray(factors.reshape(len(names), 8 * len(parts)) * np.sqrt(len(names))), names)
 
 
 def _freedom(solved: SolvedBands, solution: Solution, group: IntArray, g: int, noise_dof: float) -> FloatArray:
@@ -122,7 +126,10 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     none, condition = np.empty((0, 2)), float(solved.first.condition[k])
     best = DynamicStiffness(h, omega, solution.records[k], dof, point.method, none, condition=condition, systematic=own)
     table = {point.method: best}
-    for name, value in classic.h.items():
+    others = dict(classic.h)
+    if len(solved.solutions) > 1 and bracket.any():
+        others |= {"h1": solved.solutions[0].h[k], "h2": solved.solutions[1].h[k]}
+    for name, value in others.items():
         free = np.full(8, classic.freedom)
         other = DynamicStiffness(value, omega, classic.covariance, free, name, none, systematic=systematic)
         table.setdefault(name, other)

@@ -123,7 +123,7 @@ def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, .
     sensors = []
     for sensor in sensors_of(campaign):
         late = sensor.quantity in apart and not sensor.delay_uncertainty
-        sensors.append(replace(sensor, delay_uncertainty=START / rate) if late else sensor)
+        sensors.append(replace(sensor, delay_uncertainty=START / rate, device="cells") if late else sensor)
     return tuple(sensors)
 
 
