@@ -18,8 +18,12 @@ from tpjb_ident.terms.registry import TERMS
 
 ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phasors/")
 #: Terms that code outside their files asks for: clocks are put right before windows are averaged, with gains and the
-#: housing in the way; a load's direction is not learnt where nothing is to be corrected; a lag is the housing's.
-CLASSES = {"tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"}}
+#: housing in the way; a load's direction is not learnt where nothing is to be corrected; a lag is the housing's. Over a
+#: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them.
+CLASSES = {
+    "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
+    "tpjb_ident/identification/band_solution.py": {"Clock", "LoadTurn", "RunGain"},
+}
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {"tpjb_ident/identification/point.py": {"load direction", "load miss", "amplitude"}}
 #: Columns of the blocks that have the name of a term.

@@ -24,7 +24,7 @@ from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
 from tests.rigs.closed_form_bearing import NOMINAL
 from tests.studies.results import table, write_section
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.identification.bands.band_result import BandResult
+from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.identification.identify import identify
 
 #: Noise of probes, cells and accelerometers, in units of `rig.NOISE`: usual, and with 5 to 20 % on the displacements.

@@ -23,10 +23,10 @@ from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.identification.bands.band_point import BandSettings
-from tpjb_ident.identification.bands.band_tables import Moved
-from tpjb_ident.identification.bands.identify_bands import IdentifiedBands, identify_bands
+from tpjb_ident.identification.band_point import BandSettings
+from tpjb_ident.identification.band_tables import Moved
 from tpjb_ident.identification.campaign_solution import CampaignSolution, solve_campaign
+from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import RUN_TERMS, PointTask, finished_point, point_share
 from tpjb_ident.phasors.mains_frequency import mains_frequency

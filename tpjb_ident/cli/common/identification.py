@@ -79,7 +79,7 @@ def _clearance(c: Command, campaign: Campaign) -> float | None:
 
 def write_identification(c: Command, result: Identification) -> None:
     """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited."""
-    from tpjb_ident.identification.bands.band_result import frf_frame, models_frame
+    from tpjb_ident.dynamic.results.band_result import frf_frame, models_frame
 
     if result.bands:
         c.table("frf", frf_frame(result.bands))

@@ -54,7 +54,7 @@ def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> C
     signal = np.linalg.svd(np.concatenate([flat_D, flat_F], axis=1) / scale, full_matrices=False)[2][:2] * scale
     X = np.concatenate([D, _sloped(D, place, order), ends_columns], axis=1)
     Z = np.concatenate([F, _sloped(F, place, order), ends_columns], axis=1)
-    h = {"h1": h1, "h2": np.linalg.solve(Z.conj().T @ X, Z.conj().T @ F)[:2].T}
+    h: dict[str, ComplexArray] = {"h1": h1, "h2": np.asarray(np.linalg.solve(Z.conj().T @ X, Z.conj().T @ F)[:2].T)}
     h["hv"] = np.linalg.solve(signal[:, :2], signal[:, 2:]).T
     return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
 

@@ -78,7 +78,7 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     parts = [reader.read(0, n) for reader in readers]
     if parts[0].time is not None:
         _even(run, parts[0].time, rate)
-    table = {}
+    table: dict[str, tuple[Channel, FloatArray]] = {}
     for reader, part in zip(readers, parts):
         table |= {channel.name: (channel, row) for channel, row in zip(reader.channels, part.rows)}
     order = [name for reader in readers for name in (c.name for c in reader.channels)]

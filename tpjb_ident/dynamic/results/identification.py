@@ -20,7 +20,7 @@ from tpjb_ident.schema import DAMPING, KINDS, POINT_KEY, STATIC_KEY, STIFFNESS
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.identification.bands.band_result import BandResult
+    from tpjb_ident.dynamic.results.band_result import BandResult
 
 _FIT_FIGURES = (
     "model",

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from tpjb_ident.dynamic.results.band_result import BandResult
     from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.identification.bands.band_result import BandResult
 
 _FRF_STYLE = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
 
@@ -104,7 +104,7 @@ def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.Da
         if "hxx_real_N_per_m" in source:
             return source.sort_values("excitation_Hz", kind="stable"), None
         return _rows_of_sines(longest_series(source, "frequency")), None
-    from tpjb_ident.identification.bands.band_result import frf_frame
+    from tpjb_ident.dynamic.results.band_result import frf_frame
 
     model = source.models.get(source.supported)
     return frf_frame([source]), None if model is None else _FittedModel(model.model, model.band, model.h)

@@ -19,7 +19,7 @@ from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
-from tpjb_ident.identification.bands.band_blocks import BandBlocks
+from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.campaign_solution import learnt_rig
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.load_turn import LoadTurn
@@ -162,14 +162,14 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
     blocks = data.blocks
     runs = len(blocks.runs)
     own, spare = np.zeros(runs), np.zeros(runs)
-    families: dict[tuple[float, float], set[float]] = {}
+    families: dict[tuple[object, ...], set[float]] = {}
     for point in blocks.points:
-        families.setdefault((point.static_load_direction_deg, point.shaft_speed_hz), set()).add(point.static_load)
+        families.setdefault(point.static_key[1:], set()).add(point.static_load)
     band = data.band[data.line[blocks.point]]
     for r in np.unique(blocks.run):
         b = int(np.flatnonzero(blocks.run == r)[0])
         point = blocks.points[blocks.point[b]]
-        loads = families[point.static_load_direction_deg, point.shaft_speed_hz]
+        loads = families[point.static_key[1:]]
         if not correct or len(loads) < 2:
             own[r] = UNKNOWN_EXPONENT * abs(blocks.miss[b].real)
         spare[r] = float(len(np.unique(blocks.run[band == band[b]])) > 2)

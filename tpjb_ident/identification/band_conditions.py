@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.identification.bands.band_blocks import STRONG
-from tpjb_ident.identification.bands.band_point import BandPoint
-from tpjb_ident.identification.bands.band_solution import BandSolution
-from tpjb_ident.identification.bands.band_tables import SolvedBands
+from tpjb_ident.identification.band_blocks import STRONG
+from tpjb_ident.identification.band_point import BandPoint
+from tpjb_ident.identification.band_solution import BandSolution
+from tpjb_ident.identification.band_tables import SolvedBands
 
 #: Share of the driven lines that must be told from noise.
 _LEAST_LINES = 0.5

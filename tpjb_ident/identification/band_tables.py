@@ -14,15 +14,15 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
+from tpjb_ident.dynamic.results.band_result import BandLine, BandModel, BandResult, supported
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.quality import feeds_motion
 from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.estimate.shape import MODELS, real_numbers
 from tpjb_ident.estimate.solve import Solution
-from tpjb_ident.identification.bands.band_blocks import BandBlocks
-from tpjb_ident.identification.bands.band_point import BandPoint
-from tpjb_ident.identification.bands.band_result import BandLine, BandModel, BandResult, supported
-from tpjb_ident.identification.bands.band_solution import BandSolution
+from tpjb_ident.identification.band_blocks import BandBlocks
+from tpjb_ident.identification.band_point import BandPoint
+from tpjb_ident.identification.band_solution import BandSolution
 
 #: Degrees of freedom of the noise of a model: it averages over many lines.
 _MANY = 1e4

@@ -17,16 +17,16 @@ from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
+from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun, named_runs
 from tpjb_ident.estimate.blocks import Rig, Sensor
-from tpjb_ident.identification.bands.band_blocks import STRONG, BandBlocks, band_blocks
-from tpjb_ident.identification.bands.band_conditions import band_conditions, run_conditions
-from tpjb_ident.identification.bands.band_point import BandPoint, BandSettings, band_groups, read_point
-from tpjb_ident.identification.bands.band_result import BandResult
-from tpjb_ident.identification.bands.band_solution import BandSolution, solve_bands
-from tpjb_ident.identification.bands.band_tables import Moved, SolvedBands, band_result, moved
+from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
+from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
+from tpjb_ident.identification.band_point import BandPoint, BandSettings, band_groups, read_point
+from tpjb_ident.identification.band_solution import BandSolution, solve_bands
+from tpjb_ident.identification.band_tables import Moved, SolvedBands, band_result, moved
 from tpjb_ident.identification.campaign_blocks import found_mount, sensors_of
 from tpjb_ident.terms.clock import START
 

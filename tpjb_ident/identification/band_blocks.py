@@ -9,11 +9,12 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.broadband.responses import line_response, pooled_noise, stands_out
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
-from tpjb_ident.identification.bands.band_point import BandPoint
+from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import axes_of, calibration_numbers, no_blocks
 from tpjb_ident.identification.point_means import warm_gain
 
@@ -53,7 +54,12 @@ def band_blocks(
     columns: dict[str, list[object]] = {name: [] for name in no_blocks(len(sensors))}
     known: list[list[Hashable]] = [[] for _ in sensors]
     stands: list[bool] = []
-    lines, bands, runs, line_omega, operating, omega = [], [], [], [], [], []
+    lines: list[int] = []
+    bands: list[int] = []
+    runs: list[str] = []
+    omega: list[float] = []
+    line_omega: list[float] = []
+    operating: list[OperatingPoint] = []
     for b, (point, miss, instrument) in enumerate(zip(points, misses, instruments)):
         first = len(omega)
         groups = [(k, bins) for k, parts in enumerate(point.plan.groups) for bins in parts]
@@ -79,17 +85,17 @@ def band_blocks(
     empty = no_blocks(len(sensors))
     arrays = {name: np.array(values) if values else empty[name] for name, values in columns.items()}
     blocks = Blocks(points=tuple(operating), runs=tuple(runs), bent=np.zeros(len(operating)), **arrays)
-    place = np.array(lines, dtype=np.intp)
+    of_point = np.array(lines, dtype=np.intp)
     driven = np.zeros(len(line_omega), dtype=bool)
-    np.logical_or.at(driven, place[blocks.point], np.array(stands, dtype=bool))
+    np.logical_or.at(driven, of_point[blocks.point], np.array(stands, dtype=bool))
     return BandBlocks(
-        blocks.part(np.flatnonzero(driven[place[blocks.point]])),
+        blocks.part(np.flatnonzero(driven[of_point[blocks.point]])),
         np.array(omega),
-        place,
+        of_point,
         np.array(bands, dtype=np.intp),
         np.array(line_omega),
         driven,
-        _strengths(sensors, blocks, place[blocks.point], len(line_omega)),
+        _strengths(sensors, blocks, of_point[blocks.point], len(line_omega)),
     )
 
 
