@@ -106,7 +106,7 @@ def test_axes_have_units(name):
     for axes in picture(name)[0].axes:
         for text in (axes.get_xlabel(), axes.get_ylabel()):
             assert text in UNITLESS or "sigma" in text or text.rsplit(", ", 1)[-1].split()[0] in {
-                "kN", "N", "µm", "MN/m", "Hz", "deg", "°C", "standard",
+                "kN", "N", "µm", "MN/m", "Hz", "deg", "°C", "standard", "%",
             }, text  # fmt: skip
 
 

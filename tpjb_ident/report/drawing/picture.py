@@ -75,6 +75,7 @@ def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Empty axes at a box in inches, in the house look."""
     axes = figure.add_axes(_fractions(figure, box))
     axes.patch.set_alpha(0.0)
+    axes.ticklabel_format(style="plain", useOffset=False)
     axes.tick_params(colors=INK, labelsize=FONT_SIZE, color=RULE, labelcolor=INK)
     axes.grid(True, color=RULE, linewidth=0.6, linestyle="-", alpha=1.0)
     axes.set_axisbelow(True)

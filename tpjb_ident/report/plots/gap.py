@@ -65,7 +65,7 @@ def gap(
     if logarithmic or (logarithmic is None and wide):
         axes.set_xscale("log")
         axes.set_xlim(left=max(0.7 * float(sizes[sizes > 0].min(initial=1.0)), 1e-2))
-    add_legend(axes, 3, [*handles[1:], handles[0]], across=True)
+    add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
     return figure
 
 

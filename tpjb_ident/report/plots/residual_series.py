@@ -61,7 +61,7 @@ def residual_series(
     series = frame[frame[fixed_column] == counts.idxmax()]
     models = list(dict.fromkeys(frame["model"]))
     chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
-    figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title)
+    figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
         for number, model in enumerate(models):

@@ -47,7 +47,7 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     """
     drive = run.point.excitation_hz if run.point.excitation else None
     top = up_to or (4.0 * drive if drive else 0.5 * run.sample_rate)
-    figure, grid = new_pictures(2, 1, title=title, height=1.9)
+    figure, grid = new_pictures(2, 1, title=title, height=2.3)
     for (axes,), (quantity, unit) in zip(grid, _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
         largest = 0.0
