@@ -503,6 +503,20 @@ def test_what_a_call_of_ross_cannot_hold_of_pads_that_differ_stands_in_its_head(
     assert "takes arc" not in text
 
 
+def test_a_bearing_that_turns_clockwise_is_mirrored_for_ross(tmp_path, rocker_file, monkeypatch):
+    from dataclasses import replace
+
+    from model.bearing_file import load_bearing
+
+    bearing = replace(load_bearing(rocker_file), rotation="clockwise")
+    bearing = bearing.with_pads(tuple(replace(p, pivot_offset=0.5 + 0.01 * k) for k, p in enumerate(bearing.pads)))
+    call, text = ross_call(tmp_path, bearing, 3, monkeypatch)
+    assert "mirror image, x to -x, last pad first" in text
+    assert call["offset"] == [pad.pivot_offset for pad in reversed(bearing.pads)]
+    assert call["pivot_angle"] == [math.pi - pad.pivot_angle for pad in reversed(bearing.pads)]
+    assert np.all(np.diff(call["pivot_angle"]) > 0)
+
+
 def test_a_bearing_leaves_for_ross_alone(tmp_path, rocker_file):
     from tests.command_line import tpjb
 

@@ -24,6 +24,8 @@ _NAMES = {
 
 def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -> None:
     """Write ross_bearing.py: a function of node, speed and load that gives a ``ross.TiltingPad``."""
+    if bearing.rotation == _CLOCKWISE:  # oil goes round the ring in the order of the pads
+        bearing = bearing.with_pads(bearing.pads[::-1])
     number, reason = ross_version(version)
     names = _NAMES[number]
     head = [
@@ -86,7 +88,7 @@ def _not_held(bearing: Any, version: int) -> list[str]:
         "mass of pads, their bending, heat into them, thermal expansion of the oil",
     ]
     if bearing.rotation == _CLOCKWISE:
-        remarks.append("the sense of the drawing, clockwise: this is its mirror image, x to -x")
+        remarks.append("the sense of the drawing, clockwise: this is its mirror image, x to -x, last pad first")
     if len({pad.assembled_clearance for pad in pads}) > 1:
         clearances = ", ".join(f"{1e6 * pad.assembled_clearance:.4g}" for pad in pads)
         remarks.append(f"assembled clearance by pad ({clearances} um): the mean stands for all")
