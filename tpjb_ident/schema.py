@@ -136,7 +136,7 @@ _RUN = Column("run", "text", "", "id of the run")
 PAD = Column("pad", "count", "", "number of the pad, from 1")
 _STATUS = Column("status", "text", "", "named conditions of the solution or the curve")
 _CONVERGED = Column("converged", "truth value", "", "whether the model's solution converged")
-_PIVOTS = Column("pivots", "text", "", "pivot model (rigid, kirk, kirk-secant, measured), or the table of another program")
+_PIVOTS = Column("pivots", "text", "", "pivot model: rigid, kirk, kirk-secant, measured; or another table")
 
 
 def _position(endings: tuple[str, ...]) -> tuple[Column, ...]:
