@@ -88,6 +88,12 @@ def test_folds_cover_every_element_once(observations):
     assert sorted(members) == list(range(len(observations)))
 
 
+def test_where_nothing_can_be_held_out_the_gap_is_over_everything(setup):
+    single = planned_observations(setup, Layout(dynamic([5000.0], [SPEED], SPEED, -math.pi / 2, 0)))
+    assert held_out(single).all()
+    assert gap(single, single.value, held_out(single)) == pytest.approx(0.0)
+
+
 def test_a_moved_centre_is_no_gap(observations):
     moved = observations.value.copy()
     for i, e in enumerate(observations.elements):

@@ -38,8 +38,11 @@ def verdict_sentences(
         with_effects = f"; with it {after}" if verdict.effects else ""
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
+        tested = "was tested on points left out of the fit"
+        if not _tested(verdict):
+            tested = "could not be tested, since no point can be left out; over all of them"
         sentences.append(
-            "The sizes were fitted to these data; that they close the gap was tested on points left out of the fit: "
+            f"The sizes were fitted to these data; that they close the gap {tested}: "
             f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after "
             f"with all else as stated{_within(verdict)}."
         )
@@ -64,6 +67,11 @@ def verdict_sentences(
     return sentences
 
 
+def _tested(verdict: Verdict) -> bool:
+    """Whether there were points that the sizes had not seen."""
+    return verdict.gap.get("heldout_numbers", 1) > 0
+
+
 def _within(verdict: Verdict) -> str:
     """The same gap once clearances, oil and sensors may be anywhere within their tolerances."""
     gap = verdict.gap.get("within_tolerances")
@@ -78,7 +86,8 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
     if verdict.verdict == "named":
         gap = verdict.gap
         shrunk = f"from {gap['heldout_before']:.1f} to {gap['heldout_after']:.1f} standard deviations"
-        return f"{name}: {found}. That explains the disagreement: on points left out of the fit it shrinks {shrunk}."
+        where = "on points left out of the fit" if _tested(verdict) else "over all points (none could be left out)"
+        return f"{name}: {found}. That explains the disagreement: {where} it shrinks {shrunk}."
     if verdict.verdict == "ambiguous":
         rivals = dict.fromkeys(label_in_words(n) for group in verdict.indistinguishable for n in group[1:])
         return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."

@@ -53,7 +53,7 @@ def held_out(observations: Observations) -> BoolArray:
     for fold in folds(observations):
         if fold.beyond:
             out[fold.members] = True
-    return out
+    return out if out.any() else ~out
 
 
 def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[str]]:

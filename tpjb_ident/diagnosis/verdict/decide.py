@@ -68,6 +68,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         gap={
             "before": gap(observations, problem.base),
             "after": gap(observations, after),
+            "heldout_numbers": 0 if held.all() else int(held.sum()),
             "heldout_before": before,
             "heldout_after": heldout_after,
             "within_tolerances": remaining,
