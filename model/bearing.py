@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -263,6 +264,17 @@ class Bearing:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: what it is, and a row per pad."""
+        rows = []
+        for number, pad in enumerate(self.pads, 1):
+            angles = f"<td>{math.degrees(pad.pivot_angle):.4g}</td><td>{math.degrees(pad.arc):.4g}</td>"
+            sizes = f"<td>{1e6 * pad.assembled_clearance:.4g}</td><td>{pad.preload:.3g}</td>"
+            rows.append(f"<tr><td>#{number}</td>{angles}{sizes}</tr>")
+        titles = ("pad", "pivot, deg", "arc, deg", "Cb, µm", "preload")
+        head = "".join(f"<th>{title}</th>" for title in titles)
+        return f"<p>{html.escape(str(self))}</p><table><tr>{head}</tr>{''.join(rows)}</table>"
 
     def stated_for(self, rotation: str) -> Bearing:
         """Return a copy whose leading edges are those of a sense of turning, unless its file states one.

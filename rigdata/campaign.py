@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import html
 import itertools
 import os
 import stat
@@ -89,6 +90,21 @@ class Campaign:
 
     def __repr__(self) -> str:
         return f"<Campaign {str(self).partition(' ')[2]}, {self.path.name}>"
+
+    def _repr_html_(self) -> str:
+        """In a notebook: what it is, and a row per kind of run."""
+        rows = []
+        for kind in dict.fromkeys(run.kind for run in self.runs):
+            points = [run.point for run in self.of_kind(kind)]
+            cells = [kind, str(len(points))]
+            for values in ([p.static_load / 1e3 for p in points], [p.shaft_speed_hz for p in points],
+                           [p.excitation_hz for p in points]):  # fmt: skip
+                low, high = min(values), max(values)
+                cells.append(f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}")
+            rows.append("".join(f"<td>{cell}</td>" for cell in cells))
+        head = "".join(f"<th>{title}</th>" for title in ("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz"))
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return f"<p>{html.escape(str(self))}</p><table><tr>{head}</tr>{body}</table>"
 
     def run(self, run_id: str) -> Run:
         """Find the run `run_id`.

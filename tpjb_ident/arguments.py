@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 import os
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,6 +66,31 @@ def _comparison(value: Any, name: str) -> Any:
     return value
 
 
+def least_clearance(campaign: Campaign) -> float | None:
+    """Smallest assembled clearance [m] of the bearing that a campaign carries; None where it carries none."""
+    from model.bearing_file import parse_bearing
+
+    if not campaign.bearing_text:
+        return None
+    bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+    return min(pad.assembled_clearance for pad in bearing.pads)
+
+
+def _with_clearance(settings: Any, campaign: Campaign) -> Any:
+    """Settings whose amplitude check knows the campaign's bearing, as those of the command line do."""
+    from model.bearing import BearingError
+    from tpjb_ident.dynamic.settings import IdentifySettings
+
+    settings = settings or IdentifySettings()
+    if settings.clearance is not None:
+        return settings
+    try:
+        return dataclasses.replace(settings, clearance=least_clearance(campaign))
+    except BearingError as error:  # coefficients need no bearing
+        warnings.warn(f"identify: {error} Until then the amplitude is not held against the clearance.", stacklevel=3)
+        return settings
+
+
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path, "folder": _folder,
@@ -77,10 +104,16 @@ def checked(function: Callable[..., Any], called: str, names: str) -> Callable[.
 
     @functools.wraps(function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
-        bound = signature.bind(*args, **kwargs)
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise TypeError(f"{called}: {error}; it takes {', '.join(signature.parameters)}") from None
         for name in names.split():
             if name in bound.arguments:
                 bound.arguments[name] = _CHECKS[name](bound.arguments[name], f"{called}: {name}")
+        if called == "identify":
+            settings = bound.arguments.get("settings")
+            bound.arguments["settings"] = _with_clearance(settings, bound.arguments["campaign"])
         return function(*bound.args, **bound.kwargs)
 
     return wrapper

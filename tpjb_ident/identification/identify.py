@@ -39,6 +39,7 @@ def identify(
     progress: Progress | None = None,
     workers: Workers | None = None,
     store: RunStore | None = None,
+    method: str | None = None,
 ) -> Identification:
     """Identify every operating point of a campaign.
 
@@ -46,12 +47,15 @@ def identify(
     ----------
     campaign : Campaign
     settings : IdentifySettings, optional
+        Where they state no clearance, ``ti.identify`` takes that of the campaign's bearing for the amplitude check.
     progress : callable, optional
         Called as progress(text, done, total).
     workers : tpjb_ident.runtime.executors.Workers, optional
         Processes or machines over which the reading of runs and the points are spread; the numbers are the same.
     store : RunStore, optional
         Keeps finished runs, so that another call after a kill goes on where this one stopped.
+    method : str, optional
+        In place of that of the settings: ``"mm-eiv"``, ``"mm"``, ``"rlm:huber"``, ``"ols"``, ``"iv"``.
 
     Returns
     -------
@@ -73,6 +77,7 @@ def identify(
     2.5 kN, 25 Hz: kxx 53.09 ± 0.54 MN/m, cxx 581.3 ± 5.2 kN s/m, kyy 90.73 ± 0.89 MN/m, cyy 689.1 ± 6.6 kN s/m
     """
     settings = settings or IdentifySettings()
+    settings = settings if method is None else replace(settings, method=method)
     runs = campaign.of_kind("dynamic")
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")

@@ -72,10 +72,11 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.dynamic.settings import IdentifySettings
+        from tpjb_ident.cli.common.identification import identify_settings
         from tpjb_ident.identification.identify import identify
 
-        session.identify = lambda: identify(campaign, IdentifySettings())
+        settings = identify_settings(c, campaign, "mm-eiv", None)
+        session.identify = lambda: identify(campaign, settings)
         if bearing is not None or campaign.bearing_text:
             drawing = c.bearing_of(campaign, bearing)
             session.bearing = drawing

@@ -65,16 +65,13 @@ def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | N
 def _clearance(c: Command, campaign: Campaign) -> float | None:
     """Smallest assembled clearance [m], None if the campaign carries no bearing that can be read."""
     from model.bearing import BearingError
-    from model.bearing_file import parse_bearing
+    from tpjb_ident.arguments import least_clearance
 
-    if not campaign.bearing_text:
-        return None
     try:
-        bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+        return least_clearance(campaign)
     except BearingError as error:  # coefficients need no bearing
         c.warn(f"{error} Until then the amplitude is not held against the clearance.")
         return None
-    return min(pad.assembled_clearance for pad in bearing.pads)
 
 
 def write_identification(c: Command, result: Identification) -> None:
