@@ -7,10 +7,13 @@ import importlib
 import numpy as np
 import pytest
 
+from rigdata import load_campaign
 from rigdata.survey.exports import read_exports
 from rigdata.survey.survey import survey
 from tests.rigs.laboratories import through
-from tests.rigs.strange_exports import LABORATORIES, LBF, PADS, planned_runs, write_exports
+from tests.rigs.strange_exports import CLEARANCES, LABORATORIES, LBF, PADS, deflection, planned_runs, write_exports
+from tpjb_ident.clearance.measure import measure_clearance
+from tpjb_ident.pivot import fit_pivots
 
 #: Typed lines at most: where cells and probes are in volts, and where the files state their units.
 VOLTS, UNITS = 10, 3
@@ -76,6 +79,20 @@ def test_from_records_to_coefficients_with_few_lines_by_hand(laboratory, tmp_pat
     needs_library(laboratory)
     way = through(laboratory, tmp_path)
     assert way["lines"] <= (VOLTS if "volts" in laboratory.name else UNITS)
-    assert way["messages"] <= (5 if "two devices" in laboratory.name else 1)
+    assert way["messages"] <= (4 if "two devices" in laboratory.name else 1)
     assert way["K"] < 0.1
     assert way["C"] < 0.2
+
+
+@pytest.mark.slow
+def test_static_tests_of_two_devices_meet_by_their_times(tmp_path):
+    pytest.importorskip("nptdms")
+    laboratory = next(lab for lab in LABORATORIES if "two devices" in lab.name)
+    through(laboratory, tmp_path, last="check")
+    campaign = load_campaign(tmp_path / "records")
+    step = 10.0
+    truth = step / (deflection(4000.0 + step / 2) - deflection(4000.0 - step / 2))
+    for curve in fit_pivots(campaign, PADS):
+        assert curve.stiffness(4000.0) == pytest.approx(truth, rel=0.02)
+    clearance = measure_clearance(campaign, PADS)
+    np.testing.assert_allclose(clearance.clearance, CLEARANCES, atol=1.5e-6)

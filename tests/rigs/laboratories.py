@@ -77,7 +77,7 @@ def through(laboratory: Laboratory, folder: Path, last: str = "identify") -> dic
             lines = edited_lines(before, manifest.read_text("utf-8"))
             guesses = sum("(guess)" in line for line in before.splitlines()[3:])
     spent = [after - before for before, after in zip(began[:4], os.times()[:4], strict=True)]
-    worst = worst_errors(out / "coefficients.csv")
+    worst = worst_errors(out / "coefficients.csv") if (out / "coefficients.csv").exists() else {}
     return {"lines": lines, "guesses": guesses, "messages": messages, "minutes": sum(spent) / 60.0, **worst}
 
 
