@@ -27,11 +27,11 @@ LIMITS = {
     "pivot": (19.1, 2_620),
     "clearance": (8.8, 1_160),
     "compare": (13.4, 1_880),
-    "watch": (6.5, 0_840),
+    "watch": (6.5, 840),
     "top level": (6.9, 1_260),
     "runtime": (8.2, 1_320),
-    "exports": (6.1, 0_950),
-    "view": (5.0, 0_580),
+    "exports": (6.1, 950),
+    "view": (5.0, 580),
 }
 MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "identification")
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
