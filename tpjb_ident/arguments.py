@@ -79,7 +79,7 @@ def least_clearance(campaign: Campaign) -> float | None:
 def _with_clearance(settings: Any, campaign: Campaign) -> Any:
     """Settings whose amplitude check knows the campaign's bearing, as those of the command line do."""
     from model.bearing import BearingError
-    from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident import IdentifySettings
 
     settings = settings or IdentifySettings()
     if settings.clearance is not None:
