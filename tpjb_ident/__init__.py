@@ -86,7 +86,8 @@ def __getattr__(name: str) -> Any:
     if name in _CHECKED:
         from tpjb_ident.arguments import checked
 
-        value = checked(value, name, _CHECKED[name])
+        settings = __getattr__("IdentifySettings") if name == "identify" else None
+        value = checked(value, name, _CHECKED[name], settings)
     globals()[name] = value
     return value
 

@@ -79,9 +79,7 @@ def least_clearance(campaign: Campaign) -> float | None:
 def _with_clearance(settings: Any, campaign: Campaign) -> Any:
     """Settings whose amplitude check knows the campaign's bearing, as those of the command line do."""
     from model.bearing import BearingError
-    from tpjb_ident import IdentifySettings
 
-    settings = settings or IdentifySettings()
     if settings.clearance is not None:
         return settings
     try:
@@ -98,8 +96,13 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
 }  # fmt: skip
 
 
-def checked(function: Callable[..., Any], called: str, names: str) -> Callable[..., Any]:
-    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take."""
+def checked(
+    function: Callable[..., Any], called: str, names: str, settings: Callable[[], Any] | None = None
+) -> Callable[..., Any]:
+    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take.
+
+    Where `settings` are given, its default ones, it is called with the clearance of the campaign's bearing in them.
+    """
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -111,9 +114,9 @@ def checked(function: Callable[..., Any], called: str, names: str) -> Callable[.
         for name in names.split():
             if name in bound.arguments:
                 bound.arguments[name] = _CHECKS[name](bound.arguments[name], f"{called}: {name}")
-        if called == "identify":
-            settings = bound.arguments.get("settings")
-            bound.arguments["settings"] = _with_clearance(settings, bound.arguments["campaign"])
+        if settings is not None:
+            chosen = bound.arguments.get("settings") or settings()
+            bound.arguments["settings"] = _with_clearance(chosen, bound.arguments["campaign"])
         return function(*bound.args, **bound.kwargs)
 
     return wrapper

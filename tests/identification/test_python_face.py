@@ -19,7 +19,7 @@ def settings_that_reach(call):
     def identify(campaign, settings=None, method=None):
         reached.append(settings)
 
-    call(checked(identify, "identify", "campaign"))
+    call(checked(identify, "identify", "campaign", ti.IdentifySettings))
     return reached[0]
 
 

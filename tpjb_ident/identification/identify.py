@@ -47,7 +47,6 @@ def identify(
     ----------
     campaign : Campaign
     settings : IdentifySettings, optional
-        Where they state no clearance, ``ti.identify`` takes that of the campaign's bearing for the amplitude check.
     progress : callable, optional
         Called as progress(text, done, total).
     workers : tpjb_ident.runtime.executors.Workers, optional
@@ -55,7 +54,7 @@ def identify(
     store : RunStore, optional
         Keeps finished runs, so that another call after a kill goes on where this one stopped.
     method : str, optional
-        In place of that of the settings: ``"mm-eiv"``, ``"mm"``, ``"rlm:huber"``, ``"ols"``, ``"iv"``.
+        In place of that of the settings: "mm-eiv", "mm", "rlm:huber", "ols", "iv".
 
     Returns
     -------
@@ -76,13 +75,12 @@ def identify(
     >>> print(result.points[0])
     2.5 kN, 25 Hz: kxx 53.09 ± 0.54 MN/m, cxx 581.3 ± 5.2 kN s/m, kyy 90.73 ± 0.89 MN/m, cyy 689.1 ± 6.6 kN s/m
     """
-    settings = settings or IdentifySettings()
-    settings = settings if method is None else replace(settings, method=method)
+    chosen = settings or IdentifySettings()
     runs = campaign.of_kind("dynamic")
     if not runs:
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
-    settings = _with_mains(settings, campaign)
+    settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
     if any(is_broadband(run) for run in runs):
