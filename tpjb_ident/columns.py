@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 
 #: Pounds and inches in SI.
@@ -112,13 +113,14 @@ def amount(value: float, quantity: str, form: str = ".6g") -> str:
     return f"{value / size(quantity):{form}} {symbol(quantity)}"
 
 
-def spinning(speed: float) -> str:
-    """A shaft speed [Hz] with both its units.
+def spinning(speed: float, rotation: str = ROTATIONS[0]) -> str:
+    """A shaft speed [Hz] with both its units, and its sense where that is not the usual one.
 
     >>> spinning(22.0)
     '22 Hz (1320 rpm)'
     """
-    return f"{speed:.6g} Hz ({60 * speed:.6g} rpm)"
+    sense = "" if rotation == ROTATIONS[0] else f" {rotation}"
+    return f"{speed:.6g} Hz ({60 * speed:.6g} rpm){sense}"
 
 
 def degrees(celsius: float) -> str:

@@ -56,7 +56,9 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         loads = _span({p.point.static_load * per("load") for p in points}, symbol("load"))
         directions = ", ".join(f"{a:g}°" for a in sorted({p.point.static_load_direction_deg for p in points}))
         facts["Static load"] = f"{loads} at {directions}"
-        facts["Shaft"] = ", ".join(spinning(f) for f in sorted({p.point.shaft_speed_hz for p in points}))
+        facts["Shaft"] = ", ".join(
+            spinning(*s) for s in sorted({(p.point.shaft_speed_hz, p.point.rotation) for p in points})
+        )
         amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
         moved = f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)" if amplitude else ""
         facts["Excitation"] = _span({p.point.excitation_hz for p in points}, "Hz") + moved
@@ -91,7 +93,9 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
             cells.append(with_interval(value, value - half[j], value + half[j], kind.display_scale * omega))
         rows.append([entry, *cells])
     columns = ["", *(f"{kind.symbol.upper()}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING))]
-    caption = f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz)}; 95 % intervals"
+    caption = (
+        f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz, p.point.rotation)}; 95 % intervals"
+    )
     return Table(caption, columns, rows)
 
 
@@ -245,7 +249,7 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
-                 f"shaft at {spinning(key['shaft_speed_Hz'])}, {key['excitation']}")  # fmt: skip
+                 f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
         panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), _EVIDENCE))
     return panels
 

@@ -70,9 +70,8 @@ def _group(status: RunStatus) -> str:
     run, p = status.run, status.run.point
     if run.kind != "dynamic":
         return _KINDS[run.kind]
-    set_point = (
-        f"{amount(p.static_load, 'load')}, {p.static_load_direction_deg:g} deg, shaft {spinning(p.shaft_speed_hz)}"
-    )
+    shaft = spinning(p.shaft_speed_hz, p.rotation)
+    set_point = f"{amount(p.static_load, 'load')}, {p.static_load_direction_deg:g} deg, shaft {shaft}"
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 

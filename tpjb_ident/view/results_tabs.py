@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
 from tpjb_ident.report.plots.residual_map import residual_map
 from tpjb_ident.report.plots.window_weights import window_weights
 from tpjb_ident.rounding import counted, percent
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +103,7 @@ def _label(p: PointResult) -> str:
     """Name of a point that no other point has."""
     point = p.point
     return (
-        f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.shaft_speed_hz:g} Hz, "
+        f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.speed_words}, "
         f"excitation {point.excitation_hz:g} Hz"
     )
 
@@ -151,8 +152,7 @@ def _curves_html(session: Session, kilonewtons: float) -> str:
     measured = measured.assign(static_load_N=1e3 * kilonewtons)
     frequencies = sorted({*_LINES, *measured["excitation_Hz"]})
     points = [
-        OperatingPoint(1e3 * kilonewtons, first.static_load_direction, first.shaft_speed, 2 * np.pi * frequency)
-        for frequency in frequencies
+        replace(first, static_load=1e3 * kilonewtons, excitation=2 * np.pi * frequency) for frequency in frequencies
     ]
     table = _compared(session, points, measured)
     panels = []
@@ -175,12 +175,12 @@ def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.D
     """Predictions with every pivot model, and what was measured at the same points; columns as in comparison.csv."""
     import pandas as pd
 
-    keys = ["static_load_N", "static_load_direction_deg", "shaft_speed_Hz", "excitation_Hz"]
+    keys = list(POINT_KEY)
     frames = []
     for name, pivots in session.pivots.items():
         predictions = predict_points(session.bearing, points, ModelSettings(pivots))
         table = prediction_frame(predictions, mesh_error=False)[[*keys, *COEFFICIENT_COLUMNS]]
         frames.append(table.rename(columns={c: f"{c}_predicted" for c in COEFFICIENT_COLUMNS}).assign(pivots=name))
     columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
-    predicted, measured = (table.round(dict.fromkeys(keys, 6)) for table in (pd.concat(frames), measured))
+    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.concat(frames), measured))
     return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)

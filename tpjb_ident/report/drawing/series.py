@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
 from tpjb_ident.schema import STATIC_KEY
 
@@ -55,7 +56,7 @@ def constant_along(series: pd.DataFrame, axis: str) -> str:
     """What is constant along a series, in words."""
     first = series.iloc[0]
     fixed = f"{first.excitation_Hz:g} Hz excitation" if axis == "load" else amount(first.static_load_N, "load")
-    return f"{fixed}, shaft at {spinning(first.shaft_speed_Hz)}"
+    return f"{fixed}, shaft at {spinning(first.shaft_speed_Hz, first.get('rotation', ROTATIONS[0]))}"
 
 
 def point_label(p: PointResult) -> str:
