@@ -165,23 +165,6 @@ def test_predict_every_combination(rocker_file, tmp_path):
     assert frame["converged"].all()
 
 
-@pytest.mark.slow
-def test_predict_the_other_sense_of_turning(rocker_file, tmp_path):
-    effects = tmp_path / "hot.toml"
-    effects.write_text('[[effects]]\nname = "hot_oil_carryover"\nfraction = 0.8\n', encoding="utf-8")
-    # the hot oil of the loaded pad 1 enters pad 2 one way, pad 5 the other
-    for rotation, fed, other in (("counter-clockwise", 2, 5), ("clockwise", 5, 2)):
-        out = tmp_path / rotation
-        result = tpjb("predict", rocker_file, "--effects", effects, "--rotation", rotation, "--out", out)
-        assert result.exit_code == 0, result.output
-        row = pd.read_csv(out / "prediction.csv").iloc[0]
-        assert row["rotation"] == rotation
-        assert row[f"pad{fed}_inlet_temperature_degC"] > row[f"pad{other}_inlet_temperature_degC"] + 1.0
-    wrong = tpjb("predict", rocker_file, "--rotation", "left", "--out", tmp_path / "wrong")
-    assert wrong.exit_code == 2
-    assert "--rotation: 'left' is not known. Use one of counter-clockwise, clockwise." in wrong.output
-
-
 @pytest.mark.parametrize("command", ["predict", "simulate", "compare", "diagnose"])
 def test_an_effect_that_the_bearing_cannot_have_is_refused_with_its_file(
     command, rocker_file, small_campaign, tmp_path
