@@ -17,6 +17,7 @@ _LISTED: dict[Severity, dict[str, str]] = {
         "heat runs away": "journal and films find rest with up to {number:.0f} % of the heat they make, not with more",
         "singular": "a Newton step has no solution",
         "no pads against the load": "no set of pivots can balance the load, wherever the journal goes",
+        "no set of pads finds rest": "no two pads or more carry the load and keep it: it falls on one pad, or jumps",
         "pads {pads} can neither carry nor idle": "idle they take up load at once, carrying they push the journal off",
         "pads {pads} neither stick nor slide at rest": "friction holds them where their film loses its load, and "
         "without load there is no friction",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -23,6 +24,8 @@ _FIRST_SHARE, _LEAST_STEP = 0.25, 0.02
 _NEAR, _NEAR_SOFT = 0.02, 0.1
 #: Share of the clearance from a fold within which the mesh decides whether a pad carries.
 _EDGE = 3e-4
+#: Pads whose sets are tried one by one where nothing else finds an equilibrium: 57 sets of six.
+_MOST_PADS = 6
 
 
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
@@ -52,7 +55,32 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
             result = _raise(setup, load, speed, what)[0] or result
     if not result.converged and setup.friction:
         result = _let_held_idle(setup, load, speed, result)
+    if not result.converged and _may_try_sets(setup, result):
+        result = _try_sets(setup, load, speed, result)
     return result
+
+
+def _may_try_sets(setup: Setup, result: Equilibrium) -> bool:
+    """Whether which pads carry is all that is in doubt, in films that are soon solved and lost none."""
+    few = len(result.films) <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
+    found_out = (c.severity == "error" and c != "not converged" and not c.pads for c in result.status)
+    return few and not (setup.friction or setup.rotational_stiffness) and not any(found_out)
+
+
+def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
+    """Try every set of two pads or more, those with the most first; where none finds rest, that is named."""
+    count = len(failed.films)
+    for size in range(count, 1, -1):
+        for pads in itertools.combinations(range(count), size):
+            search = Search(setup, load, speed)
+            search.stand()
+            loaded = np.isin(np.arange(count), pads)
+            search.load_pads(loaded & (search.pads.rows >= 2))
+            search.let_idle(np.flatnonzero(~loaded).tolist())
+            result = _settled(search, search.run())
+            if result.converged:
+                return result
+    return replace(failed, status=(*failed.status, named("no set of pads finds rest")))
 
 
 def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozenset()) -> Equilibrium:

@@ -192,3 +192,19 @@ def test_a_hot_ring_without_preload_carries_on_all_pads():
     elsewhere = predict(ring, 8000.0, 0.5, 700.0, pivots=9.1884e8)
     warm = predict(ring, 4094.6, -1.8745, 912.77, pivots=9.1884e8, start=elsewhere)
     np.testing.assert_allclose(warm.k, p.k, atol=1e-4 * p.kyy)
+
+
+@pytest.mark.slow
+def test_where_no_set_of_pads_finds_rest_that_is_named():
+    # three pads without preload, the load almost on one of them: one carries all, and nothing holds it on the way
+    pads = tuple(
+        Pad(2.0 * math.pi / 3.0 * k, 1.745329, 0.5, 85.13593e-6, 85.13593e-6, 0.0415, 0.0, 0.0415, 0.5, 3e-4)
+        for k in range(3)
+    )
+    oil = Oil(0.0324235, 0.034, 860.0, 7e-4, 2000.0, 0.13, 38.791)
+    ring = Bearing("ring", 0.207696, 0.215088, pads, Pivot(), oil)
+    p = predict(ring, 13473.0, 1.79937, 577.7065, pivots=1.948773e8, mesh=(40, 4))
+    assert not p.converged
+    assert "no set of pads finds rest" in p.status
+    between = predict(ring, 13473.0, math.pi / 3.0, 577.7065, pivots=1.948773e8, mesh=(40, 4))
+    assert between.converged

@@ -89,7 +89,9 @@ def summary(rows: Iterable[dict[str, Any]]) -> str:
     off = [r for r in answered if r["mesh"] > BY_MESH]
     parted = [r for r in answered if max(r["starts"]) > BY_START]
     unsaid = [r for r in parted if "another equilibrium exists" not in r["status"]]
-    said = Counter("; ".join(r["status"][:2]) for r in listed if not r["converged"])
+    said = Counter(
+        "; ".join(s for s in r["status"] if s.startswith("no set of pads")) for r in listed if not r["converged"]
+    )
     counts = [
         ("answered", f"{len(answered)} of {len(listed)}"),
         ("same pads idle on the fine mesh", f"{len(alike)} of {len(answered)}"),
