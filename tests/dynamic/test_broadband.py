@@ -18,12 +18,13 @@ from tests.studies.band_coverage import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.classic import classic_line
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
-from tpjb_ident.dynamic.broadband.responses import line_response, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors, vector_channels
+from tpjb_ident.terms.distortion import band_change
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])
 SILENT = BandRig(noise=(0.0, 0.0, 0.0), runout=0.0, shaft=0.0, seconds=6.0)
@@ -374,3 +375,22 @@ def test_a_band_that_the_record_cannot_resolve_is_refused(tmp_path):
     result = tpjb("identify", path, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert "record" in result.output
+
+
+def test_one_phase_set_is_told_from_several():
+    rng = np.random.default_rng(9)
+    first = _complex(rng, (1, 60, 2))
+    late = np.exp(1j * 0.2 * np.arange(60))[:, None]
+    same = [spectra(first * turn, first) for turn in (1.0, late, -1.0)]
+    assert one_phase_set(same)
+    other = [spectra(_complex(rng, (1, 60, 2)), first) for _ in range(3)]
+    assert not one_phase_set(other)
+
+
+@pytest.mark.parametrize(
+    ("kind", "rms", "peak", "one_sided", "share"),
+    [("random", 0.08, 0.3, 0.0, 0.128), ("multisine", 0.01, 0.03, 0.0, 0.002), ("impact", 0.01, 0.06, 1.0, 0.108),
+     ("impact", 0.01, 0.02, 0.0, 0.002), ("random", 0.002, 0.01, 0.0, 0.0)],
+)  # fmt: skip
+def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_sided, share):
+    assert band_change(kind, rms, peak, one_sided) == pytest.approx(share)

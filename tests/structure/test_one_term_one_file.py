@@ -22,7 +22,7 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 #: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them.
 CLASSES = {
     "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
-    "tpjb_ident/identification/band_solution.py": {"Clock", "LoadTurn", "RunGain"},
+    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {"tpjb_ident/identification/point.py": {"load direction", "load miss", "amplitude"}}

@@ -10,13 +10,14 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.broadband.responses import line_response, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import axes_of, calibration_numbers, no_blocks
 from tpjb_ident.identification.point_means import warm_gain
+from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise.
 STRONG = 10.0
@@ -41,6 +42,21 @@ class BandBlocks:
     line_omega: FloatArray  #: (L,), rad/s
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     strength: FloatArray  #: (L,): F ratio of the weaker direction of motion
+    bent: FloatArray = field(default_factory=lambda: np.zeros(0))  #: (B,): share by which the motion may change H
+
+    def with_film(self, sensors: Sequence[Sensor], points: Sequence[BandPoint], clearance: float) -> BandBlocks:
+        """With what a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
+        bent, scatter = np.zeros(len(points)), np.zeros(len(points))
+        for b, point in enumerate(points):
+            rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
+            one_sided = max(s.one_sided for s in point.spectra)
+            bent[b] = band_change(point.group.kind, rms, peak, one_sided)
+            scatter[b] = line_scatter(rms) if point.method == "periods" and one_phase_set(point.spectra) else 0.0
+        cells = Rig(tuple(sensors), 1.0).of("force")
+        force = np.linalg.norm(self.blocks.z[:, cells], axis=1) / np.sqrt(2)
+        noise = self.blocks.noise.copy()
+        noise[:, cells, cells] += ((scatter[self.band[self.line[self.blocks.point]]] * force) ** 2)[:, None]
+        return replace(self, blocks=replace(self.blocks, noise=noise), bent=bent)
 
 
 def band_blocks(

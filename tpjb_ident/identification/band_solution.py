@@ -22,6 +22,7 @@ from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.campaign_solution import learnt_rig
 from tpjb_ident.terms.clock import Clock
+from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.registry import TERMS
 from tpjb_ident.terms.run_gain import RunGain
@@ -127,8 +128,9 @@ class _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
         chosen = [t for t in TERMS if t is not Clock and (self.correct or t is not LoadTurn)]
-        terms = [RunGain(rig, blocks, deviation) if term is RunGain else term(rig, blocks) for term in chosen]
-        return replace(self, terms=tuple(terms))
+        band = self.data.band[self.data.line]
+        given = {RunGain: RunGain(rig, blocks, deviation), Distortion: Distortion(rig, blocks, self.data.bent, band)}
+        return replace(self, terms=tuple(given.get(term) or term(rig, blocks) for term in chosen))
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:

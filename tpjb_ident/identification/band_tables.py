@@ -201,7 +201,8 @@ def _point(solved: SolvedBands, q: int, result: BandResult, miss: LoadMiss, clea
     inside = [line for line in result.lines if low - 1e-9 <= line.frequency <= high + 1e-9]
     positions = np.array([s.position for s in point.spectra])
     amplitude = max(s.amplitude for s in point.spectra)
-    bent = change_conditions(FilmChange(), 0.0, est, amplitude, clearance)
+    share = float(solved.data.bent[part.band]) if len(solved.data.bent) else 0.0
+    bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
     number = len(positions)
     return PointResult(
         point=replace(point.point, excitation=2 * np.pi * round(part.omega / (2 * np.pi), 3)),

@@ -66,7 +66,7 @@ def identify_bands(
     zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
     stated = replace(campaign, channels=widened(campaign.channels, checked.gains))
-    solved = _solved(stated, points, (misses, common), settings.correct)
+    solved = _solved(stated, points, (misses, common), settings)
     results = []
     for b, point in enumerate(points):
         conditions = load_conditions(misses[b], common) + zero.conditions()
@@ -84,7 +84,7 @@ def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation
 
 
 def _solved(
-    campaign: Campaign, points: list[BandPoint], loads: tuple[list[LoadMiss], complex], correct: bool
+    campaign: Campaign, points: list[BandPoint], loads: tuple[list[LoadMiss], complex], settings: BandSettings
 ) -> SolvedBands:
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
     sensors = _sensors(campaign, points)
@@ -96,9 +96,10 @@ def _solved(
     for turn in range(passes):
         instruments = [_INSTRUMENTS[point.method][turn] for point in points]
         own = band_blocks(points, sensors, loads[0], temperatures, instruments)
+        own = own.with_film(sensors, points, settings.clearance) if settings.clearance else own
         rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty)
         mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads[1])
-        solutions.append(solve_bands(replace(rig, mount=mount), own, correct, _told(points, own, classic)))
+        solutions.append(solve_bands(replace(rig, mount=mount), own, settings.correct, _told(points, own, classic)))
         data = data or own
     assert data is not None
     return SolvedBands(tuple(points), data, tuple(classic), tuple(solutions))

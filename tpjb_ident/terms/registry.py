@@ -7,6 +7,7 @@ from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.axis import Axis
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.delay import Delay
+from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import Housing
 from tpjb_ident.terms.load import Load
@@ -29,4 +30,5 @@ TERMS: tuple[type[Term], ...] = (
     LoadTurn,
     Load,
     Amplitude,
+    Distortion,
 )

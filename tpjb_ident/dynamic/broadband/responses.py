@@ -24,6 +24,8 @@ _AT_REST = 1e-3
 _NOTHING = 1e-9
 #: Degrees of freedom of a noise from which it is taken by itself; below, neighbouring lines join in.
 _FREEDOM = 65.0
+#: Phase sets that show the distortion of a multi-sine, and likeness from which two are one.
+_SETS, _ALIKE = 3, 0.6
 #: Chance below which noise alone does not make a response.
 _CHANCE = 1e-4
 
@@ -75,6 +77,23 @@ def driven_command(spectra: RunSpectra) -> ComplexArray:
     flat = spectra.command.reshape(-1, 2)
     power, along = np.linalg.eigh((flat.T @ flat.conj()).real)
     return np.asarray(spectra.command @ along[:, power > _AT_REST * power[-1]])
+
+
+def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
+    """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
+    means = [run.D.mean(axis=0) for run in runs]
+    waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
+    different: list[ComplexArray] = []
+    for wave in waves:
+        if all(_likeness(wave, other) < _ALIKE for other in different):
+            different.append(wave)
+    return len(different) < _SETS
+
+
+def _likeness(wave: ComplexArray, other: ComplexArray) -> float:
+    """Share in which phases (n,) differ by no more than a time, 0 to 1."""
+    product = wave * other.conj()
+    return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
 
 
 def _regressed(z: ComplexArray, u: ComplexArray, nuisance: ComplexArray) -> LineResponse:

@@ -51,6 +51,9 @@ class RunSpectra:
     position: FloatArray  #: (2,), m
     temperatures: dict[int, float]
     clocks: frozenset[str] = frozenset()  #: quantities that were recorded on a clock of their own
+    rms: float = 0.0  #: m: of the motion over the band
+    peak: float = 0.0  #: m: largest motion
+    one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
 
     @property
     def frequencies(self) -> FloatArray:
@@ -126,7 +129,18 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         means["displacement"],
         temperatures,
         frozenset(clocks),
+        *_motion(clean),
     )
+
+
+def _motion(samples: Samples) -> tuple[float, float, float]:
+    """Rms and peak of the motion [m], and how far the drive goes to one side."""
+    motion = vector_rows(samples, "displacement")
+    size = np.linalg.norm(motion, axis=0)
+    drive = motion if samples.command is None else samples.command
+    along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive
+    one_sided = abs(float(np.mean(along**3))) / max(float(np.mean(np.abs(along) ** 3)), 1e-300)
+    return float(np.sqrt(np.mean(size**2))), float(size.max()), one_sided
 
 
 def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:

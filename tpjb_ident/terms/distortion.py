@@ -1,0 +1,76 @@
+"""What the size of a band's motion does to the film where no line of its own tells: the same in every repeat.
+
+Over a band there are no harmonics apart from the excitation, so a width is stated. Of a film that is not linear all
+lines together change H by about 20 (rms / c)^2, c the clearance; hammer blows in one sense by 1.5 peak / c, in both
+senses by their square. A multi-sine of one phase set puts besides a distortion on every line that repeats with it,
+about 3 rms / c of it; runs of several phase sets differ by it, and are judged. Held against loaded films integrated in
+time at 1 to 6 % of the clearance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.term import Additive, Parameter
+
+#: Change of H over the squared motion of a band, and over a blow's peak in one sense, and in both its square.
+_BAND, _BLOW, _BLOWS = 20.0, 1.5, 5.0
+#: Scatter of a line over the motion of a multi-sine of one phase set.
+_LINE = 3.0
+#: A change is no larger than what is stated; as a standard deviation it is this part of it.
+_AS_DEVIATION = 1 / 1.6
+#: Changes below this share are not worth telling [share of H].
+_NOTHING = 2e-4
+#: Numbers of a band.
+_NUMBERS = 8
+
+
+def band_change(kind: str, rms: float, peak: float, one_sided: float) -> float:
+    """Share by which a band's motion may change H; `rms`, `peak` over the clearance, `one_sided` 0 to 1."""
+    share = _BAND * rms**2
+    if kind == "impact":
+        share = _BLOW * peak * one_sided + _BLOWS * peak**2
+    return share if share > _NOTHING else 0.0
+
+
+def line_scatter(rms: float) -> float:
+    """Relative scatter of a line's film force in a multi-sine of one phase set; `rms` over the clearance."""
+    return _LINE * rms if _BAND * rms**2 > _NOTHING else 0.0
+
+
+class Distortion(Additive):
+    """Real and imaginary parts of H of every band, each changed by its own share; no run tells them."""
+
+    name = "distortion"
+
+    def __init__(
+        self, rig: Rig, blocks: Blocks, share: Sequence[float] | FloatArray = (), band: IntArray | None = None
+    ) -> None:
+        super().__init__(rig, blocks)
+        self._band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
+        self._bent = [b for b, size in enumerate(share) if size > 0]
+        parameters = []
+        for b in self._bent:
+            deviation = _AS_DEVIATION * float(share[b])
+            parameters += [Parameter(f"band {b + 1}, {i}", "1", deviation) for i in range(_NUMBERS)]
+        self.parameters = tuple(parameters)
+
+    def columns(self, blocks: Blocks, state: State) -> ComplexArray:
+        """G d in the cells, G a share of every entry of H."""
+        columns = self.no_columns(blocks)
+        h, d = state.h[blocks.point], state.u[:, :2]
+        force = np.zeros((len(blocks), 2, _NUMBERS), complex)
+        for k in range(_NUMBERS):
+            i, j = k % 4 // 2, k % 2
+            entry = np.abs(h.real[:, i, j]) if k < 4 else 1j * np.abs(h.imag[:, i, j])
+            force[:, i, k] = entry * d[:, j]
+        rows = film_force_rows(self.rig, blocks, state, force)
+        for n, b in enumerate(self._bent):
+            mine = self._band[blocks.point] == b
+            columns[mine, :, _NUMBERS * n : _NUMBERS * (n + 1)] = rows[mine]
+        return columns
