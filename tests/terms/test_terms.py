@@ -289,3 +289,19 @@ def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, sh
     solution = solved(rig, replace(blocks, z=z), truth)
     (term,) = [t for t in solution.terms if t.name == "housing"]
     assert term.conditions(of(solution, "housing")) == named
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_shaft_that_tilts_between_two_planes_of_probes_does_no_harm(seed):
+    planes = {"D1": 0.03, "D2": 0.03, "D3": -0.03}
+    case = Case(probes=3, **stated(**{name: {"plane": plane} for name, plane in planes.items()}))
+    rig, blocks, truth = made(case, seed)
+    rng, z = np.random.default_rng(seed), blocks.z.copy()
+    size = np.linalg.norm(z[:, :2], axis=1)[:, None]
+    tilt = 2.0 * size * (rng.standard_normal((len(z), 2)) + 1j * rng.standard_normal((len(z), 2)))
+    for j, plane in enumerate(planes.values()):
+        z[:, j] += plane * np.sum(blocks.along[:, j] * tilt, axis=1)
+    tilted = replace(blocks, z=z)
+    assert held(solved(rig, tilted, truth), truth)
+    ignored = replace(rig, sensors=tuple(replace(sensor, plane=0.0) for sensor in rig.sensors))
+    assert np.abs(solved(ignored, tilted, truth).h / truth - 1).max() > 0.02

@@ -78,7 +78,12 @@ def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) ->
     along = directions([float(c.axis or 0.0) for c in channels])
     if len(phasors) < _MIN_RUNS or np.linalg.matrix_rank(along) < 2:
         return None
-    outside = np.linalg.svd(along)[0][:, 2:]  # (m, m - 2): what no vector of the plane does
+    plane = np.array([c.plane for c in channels])
+    tilted = np.hstack([along, plane[:, None] * along])
+    # (m, m - 2) or less: what neither a vector of the plane nor a tilt between the stated planes does
+    outside = np.linalg.svd(tilted)[0][:, np.linalg.matrix_rank(tilted) :]
+    if not outside.size:
+        return None
     vectors = phasors @ np.linalg.pinv(along).T
     projected = vectors @ along.T
     # every run is one vote of its own size: beyond^T (gain * seen) = beyond^T phasor

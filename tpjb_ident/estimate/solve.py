@@ -84,6 +84,7 @@ class Solver:
         self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
         self.shape = shape or Shape(np.arange(len(blocks.points)))
         self.group = self.shape.group[blocks.point]
+        self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
         self.parameters = [p for term in self.terms for p in term.parameters]
         ends = np.cumsum([0] + [len(term.parameters) for term in self.terms])
@@ -195,7 +196,12 @@ class Solver:
     def _rows(self, blocks: Blocks, state: State, scatter: FloatArray) -> _Rows:
         """Equations of blocks without their motion, real and of unit variance; the state's motion is renewed."""
         rig = self.rig
-        L = np.linalg.cholesky(covariance(rig, blocks, state, scatter, self.housing_noise))
+        N = covariance(rig, blocks, state, scatter, self.housing_noise)
+        for term in self.random:
+            effects = term.random_effects(blocks, state)
+            if effects is not None:
+                N = N + effects @ effects.conj().transpose(0, 2, 1)
+        L = np.linalg.cholesky(N)
         TB = with_factor(state.factor, motion_matrix(rig, blocks, state))
         Q, R = np.linalg.qr(np.linalg.solve(L, TB), mode="complete")
         Q1, Q2 = (part.conj().transpose(0, 2, 1) for part in (Q[:, :, :UNKNOWNS], Q[:, :, UNKNOWNS:]))

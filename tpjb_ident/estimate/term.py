@@ -81,6 +81,10 @@ class Term:
         """By how much H of a run differs from its point's, (n, 2, 2) [N/m]; None of a term that is not the film's."""
         return None
 
+    def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
+        """Patterns of the readings whose size is another one in every block, of one deviation, (n, m + 2, k)."""
+        return None
+
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """Change of the readings' slope over time [1/s] per unit of every parameter, (n, m, q); `reading` (n, m)."""
         return np.zeros((*reading.shape, len(self.parameters)), complex)

@@ -16,6 +16,7 @@ from tpjb_ident.terms.mass import Mass
 from tpjb_ident.terms.run_gain import RunGain
 from tpjb_ident.terms.shaft import Shaft
 from tpjb_ident.terms.temperature import Temperature
+from tpjb_ident.terms.tilt import Tilt
 
 TERMS: tuple[type[Term], ...] = (
     Gain,
@@ -27,6 +28,7 @@ TERMS: tuple[type[Term], ...] = (
     Mass,
     Housing,
     Shaft,
+    Tilt,
     LoadTurn,
     Load,
     Amplitude,

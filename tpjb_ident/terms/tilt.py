@@ -1,0 +1,37 @@
+"""The shaft's tilt: probes beside the bearing's middle plane read its rotation times their distance from there.
+
+Every block has a tilt of its own, about X and about Y: a random effect, wide beside what two planes of probes tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.equation import State
+from tpjb_ident.estimate.term import Term
+
+#: Rotation over displacement [1/m], one standard deviation: a shaft that turns about a point 0.3 m from the bearing.
+_USUAL = 3.0
+
+
+class Tilt(Term):
+    """Two complex numbers a block, where the manifest states `plane` of probes."""
+
+    name = "tilt"
+
+    def __init__(self, rig: Rig, blocks: Blocks) -> None:
+        super().__init__(rig, blocks)
+        planes = [sensor.plane if sensor.quantity == "displacement" else 0.0 for sensor in rig.sensors]
+        self._plane = np.array(planes)
+
+    def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
+        """Plane times axis, in the probes."""
+        if not self._plane.any():
+            return None
+        m = blocks.z.shape[1]
+        size = _USUAL * np.linalg.norm(state.u[:, :2], axis=1)
+        effects = np.zeros((*state.shift.shape, 2), complex)
+        effects[:, :m] = size[:, None, None] * self._plane[:, None] * blocks.along * blocks.present[:, :, None]
+        return effects
