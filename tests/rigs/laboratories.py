@@ -3,7 +3,7 @@
     python -m tests.rigs.laboratories [--docs]
 
 Every folder holds the records of `strange_exports` and the bearing's file, nothing else. What a person types is here:
-commands, and lines of the drafted manifest. Printed: lines edited by hand, messages, processor minutes to the report,
+commands, and lines of the drafted manifest. Printed: lines edited by hand, messages,
 largest difference of a direct coefficient from the numbers that the rig was made of; ``--docs`` puts the table into
 the tutorial.
 """
@@ -11,7 +11,6 @@ the tutorial.
 from __future__ import annotations
 
 import difflib
-import os
 import re
 import shutil
 import sys
@@ -29,10 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BEARING = ROOT / "model" / "bearings" / "rocker.toml"
 PAGE = ROOT / "docs" / "guide" / "tutorial.md"
 BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
-HEAD = (
-    "| export | lines typed | marked (guess) | messages | processor minutes | worst K | worst C |\n"
-    "|---|---|---|---|---|---|---|\n"
-)
+HEAD = "| export | lines typed | marked (guess) | messages | worst K | worst C |\n|---|---|---|---|---|---|\n"
 #: What a person fills in: (channel or table, key) -> value; the mark of comment before the key goes.
 Edits = Mapping[tuple[str, str], str]
 
@@ -63,7 +59,7 @@ def through(laboratory: Laboratory, folder: Path, last: str = "identify") -> dic
     records, out = folder / "records", folder / "out"
     write_exports(records, laboratory)
     shutil.copy(BEARING, records)
-    began, messages, lines, guesses = os.times(), 0, 0, 0
+    messages, lines, guesses = 0, 0, 0
     for command in (("init",), ("init", "--update"), ("check",), (last,)):
         name, *options = command
         done = tpjb(name, records, *options, *(() if name == "init" else ("--out", out)))
@@ -76,9 +72,8 @@ def through(laboratory: Laboratory, folder: Path, last: str = "identify") -> dic
             manifest.write_text(fill_in(before, laboratory.edits), "utf-8")
             lines = edited_lines(before, manifest.read_text("utf-8"))
             guesses = sum("(guess)" in line for line in before.splitlines()[3:])
-    spent = [after - before for before, after in zip(began[:4], os.times()[:4], strict=True)]
     worst = worst_errors(out / "coefficients.csv") if (out / "coefficients.csv").exists() else {}
-    return {"lines": lines, "guesses": guesses, "messages": messages, "minutes": sum(spent) / 60.0, **worst}
+    return {"lines": lines, "guesses": guesses, "messages": messages, **worst}
 
 
 def worst_errors(table: Path) -> dict[str, float]:
@@ -96,8 +91,8 @@ def main(folder: Path, docs: bool) -> None:
     """Print the table of all laboratories, and put it into the tutorial with `docs`."""
     rows = []
     for number, laboratory in enumerate(LABORATORIES):
-        way = through(laboratory, folder / str(number), "compare")
-        row = "| {name} | {lines} | {guesses} | {messages} | {minutes:.1f} | {K:.2f} % | {C:.2f} % |"
+        way = through(laboratory, folder / str(number))
+        row = "| {name} | {lines} | {guesses} | {messages} | {K:.2f} % | {C:.2f} % |"
         rows.append(row.format(name=laboratory.name, **way))
         print(rows[-1], flush=True)
     if docs:
