@@ -133,6 +133,7 @@ def three_pads(rocker: Bearing, arc: float) -> Bearing:
     return rocker.with_pads(tuple(replace(pad, pivot_angle=k * 2 * math.pi / 3) for k in range(3)))
 
 
+@pytest.mark.slow
 def test_no_steady_state_is_a_named_status(rocker):
     p = predict(three_pads(rocker, 1.7), 1500.0, 1.0, SPEED, pivots=3e8)
     assert not p.converged
