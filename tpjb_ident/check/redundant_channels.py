@@ -16,6 +16,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
+from rigdata.problem import Severity
 from rigdata.vector import directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import excited
@@ -27,6 +28,10 @@ _CLEAR = 3.0
 #: A difference that stands this many standard errors above the scatter of the runs is no noise.
 _SEEN = 4.0
 _MIN_RUNS = 3
+#: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
+_NO_GAIN = 0.3
+#: A channel below this share of the largest is dead, which is told elsewhere.
+_DEAD = 1e-3
 #: From a rectangle's half-width, shared by the two channels of a pair, to the standard deviation of each.
 _RECTANGLE = math.sqrt(2.0 / 3.0)
 
@@ -76,7 +81,8 @@ def inconsistent_channels(runs: Sequence[Observation]) -> tuple[InconsistentChan
 def _apart(quantity: str, channels: Sequence[Channel], phasors: ComplexArray) -> InconsistentChannels | None:
     """Judge the phasors (n, m) of one set of channels: one of every sine, several of an excitation over a band."""
     along = directions([float(c.axis or 0.0) for c in channels])
-    if len(phasors) < _MIN_RUNS or np.linalg.matrix_rank(along) < 2:
+    size = np.median(np.abs(phasors), axis=0) if len(phasors) else np.zeros(len(channels))
+    if len(phasors) < _MIN_RUNS or np.linalg.matrix_rank(along) < 2 or size.min() < _DEAD * size.max():
         return None
     plane = np.array([c.plane for c in channels])
     tilted = np.hstack([along, plane[:, None] * along])
@@ -111,7 +117,8 @@ def report_inconsistent_channels(runs: Sequence[Observation]) -> None:
         }.values():
             report.gains.update(group.uncertainty())
             place = f"channels {', '.join(group.names)}"
-            report.say(f"apart {group.quantity}", "warning", place, group.sentence(), cure)
+            severity: Severity = "error" if np.ptp(group.gains) > _NO_GAIN else "warning"
+            report.say(f"apart {group.quantity}", severity, place, group.sentence(), cure)
 
 
 def widened(channels: Mapping[str, Channel], more: Mapping[str, float]) -> dict[str, Channel]:
