@@ -51,7 +51,9 @@ class BandBlocks:
             rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
             one_sided = max(s.one_sided for s in point.spectra)
             bent[b] = band_change(point.group.kind, rms, peak, one_sided)
-            scatter[b] = line_scatter(rms) if point.method == "periods" and one_phase_set(point.spectra) else 0.0
+            if point.method == "periods" and one_phase_set(point.spectra):
+                # alike in all runs: more than the two that h needs do not average it away
+                scatter[b] = line_scatter(rms) * np.sqrt(max(len(point.spectra), 2) / 2)
         cells = Rig(tuple(sensors), 1.0).of("force")
         force = np.linalg.norm(self.blocks.z[:, cells], axis=1) / np.sqrt(2)
         noise = self.blocks.noise.copy()
