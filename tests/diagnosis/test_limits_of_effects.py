@@ -13,10 +13,9 @@ from tpjb_ident.diagnosis.verdict.decide import parameters_of
 
 def fit(values, amplitudes, errors, names, basis=()):
     free = [SimpleNamespace(name=name, unit="m") for name in names]
-    candidate = SimpleNamespace(name="x", free=free, basis=basis, fixed={}, values=values)
-    return SimpleNamespace(
-        candidates=[candidate], amplitudes=[np.array(amplitudes)], errors=np.array(errors), slices=[slice(None)]
-    )
+    candidate = SimpleNamespace(free=free, basis=basis, fixed={})
+    fault = SimpleNamespace(name="x", candidate=candidate, values=values)
+    return SimpleNamespace(faults=[fault], amplitudes=[np.array(amplitudes)], errors=[np.array(errors)])
 
 
 def test_a_size_has_a_limit_on_either_side():

@@ -70,7 +70,7 @@ MUTANTS = (
     Mutant(_DIFFERENCE, '_difference_lo": difference - half', '_difference_lo": difference + half'),
     Mutant(_DIFFERENCE, '_difference_hi": difference + half', '_difference_hi": difference - half'),
     Mutant(_COMPARISON, "= values[name], low, high", "= values[name], high, low"),
-    Mutant(_EFFECTS, "value[p.name] - 1.96 * s", "value[p.name] + 1.96 * s"),
+    Mutant(_EFFECTS, "value[p.name] - s", "value[p.name] + s"),
     Mutant(_EFFECTS, "min(ends), max(ends)", "max(ends), max(ends)"),
     Mutant(_EXPORTS, "low[name], high[name] = high[name], low[name]", "pass"),
 )  # fmt: skip
