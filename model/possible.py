@@ -28,6 +28,7 @@ BOUNDS: dict[type, dict[str, tuple[float, float, str]]] = {
         "mass": (0.0, 1e9, "kg"),
         "moment_of_inertia": (0.0, 1e12, "kg m^2"),
         "back_convection": (0.0, 1e9, "W/m^2/K"),
+        "leading_edge_pressure": (0.0, 1e9, "Pa"),
     },
     Material: {
         "youngs_modulus": _STIFF,
@@ -61,6 +62,8 @@ def check_possible(bearing: Bearing) -> None:
     """Refuse a bearing with a number that no bearing has."""
     _check(bearing, bearing.name)
     _check(bearing.oil, "oil")
+    if not bearing.oil.supply_flow > 0.0:  # infinite where none is stated
+        raise BearingError(f"oil: supply_flow is {bearing.oil.supply_flow!r}; it is above zero. Check the number.")
     checked: Any = None
     for k, pad in enumerate(bearing.pads):
         _check(pad, f"pad {k + 1}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from typing import Any
 
 import typer.testing
@@ -18,5 +17,4 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
 
 def tpjb(*words: Any, app: typer.Typer = app) -> Any:
     """Run `tpjb words`, or another program of commands; its output, in long lines, exit code and exception."""
-    wide = {} if "COLUMNS" in os.environ else {"COLUMNS": "400"}
-    return typer.testing.CliRunner(env=wide).invoke(app, [str(word) for word in words])
+    return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])

@@ -28,7 +28,7 @@ def run(name, direction=0.5, n=4, lost=None, acceleration="yes", mass=30.0):
     mean = np.tile([3.0, -4.0], (n, 1))
     return SimpleNamespace(
         run=name, direction=direction, start=10.0 + 0.5 * np.arange(n), acceleration=acceleration, conditions=(),
-        housing_mass=mass,
+        housing_mass=mass, length=0.5, span=None,
         displacement=SimpleNamespace(lost=lost_d, mean=mean), cell_force=SimpleNamespace(lost=lost_f, mean=2 * mean),
     )  # fmt: skip
 

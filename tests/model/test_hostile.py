@@ -146,6 +146,6 @@ def test_a_shaft_that_hardly_turns_loses_its_films_and_no_power(rocker):
 
 def test_what_cannot_carry_says_that_all_pads_idle(rocker):
     p = predict(rocker, 5000.0, DOWN, SPEED, mesh=COARSE, effects=[Effect("starvation", arc_fraction=0.6)])
-    assert p.status[-1] == "idle pads 1, 2, 3, 4, 5"
+    assert "no set of pads finds rest" in p.status
     assert p.max_temperature == 40.0
     assert math.isinf(p.min_film)

@@ -39,7 +39,14 @@ def test_the_bundled_bearings_are_possible(checkout):
 def test_every_number_of_every_part_has_bounds():
     for part, bounds in BOUNDS.items():
         floats = {f.name for f in dataclasses.fields(part) if f.type == "float"}
-        assert floats == set(bounds)
+        assert floats - {"supply_flow"} == set(bounds)
+
+
+@pytest.mark.parametrize("flow", [0.0, -1e-3, math.nan])
+def test_oil_flows_or_its_flow_is_not_stated(rocker, flow):
+    with pytest.raises(BearingError, match="supply_flow"):
+        check_possible(with_number(rocker, Oil, "supply_flow", flow))
+    check_possible(with_number(rocker, Oil, "supply_flow", math.inf))
 
 
 @pytest.mark.parametrize("part", BOUNDS)

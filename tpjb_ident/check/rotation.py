@@ -36,12 +36,14 @@ def shaft_force(phasors: RunPhasors | None) -> float:
         return math.nan
     force = phasors.cell_force.phasors[:, place[0]]
     force = force[np.isfinite(force).all(axis=1)]
+    if len(force) < 2:
+        return math.nan
     parts, errors = [], []
     for sign in (1j, -1j):
         part = np.abs(force[:, 0] + sign * force[:, 1])
-        parts.append(float(part.mean()) if len(part) else 0.0)
-        errors.append(float(part.std()) / math.sqrt(max(len(part), 1)))
-    if len(force) < 2 or not max(parts) > _CLEAR * max(errors):
+        parts.append(float(part.mean()))
+        errors.append(float(part.std()) / math.sqrt(len(part)))
+    if not max(parts) > _CLEAR * max(errors):
         return math.nan
     return math.log(parts[0] / max(parts[1], 1e-3 * parts[0]))
 

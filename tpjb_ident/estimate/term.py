@@ -58,7 +58,7 @@ class Term:
     --------
     >>> from tpjb_ident.terms.registry import TERMS
     >>> [term.name for term in TERMS][:3]
-    ['calibration', 'temperature', 'axis']
+    ['calibration', 'run gain', 'temperature']
     """
 
     name = ""

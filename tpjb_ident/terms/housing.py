@@ -92,7 +92,7 @@ class Housing(Term):
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
-        if fitted.unexplained > _UNEXPLAINED and self._inertia > HARMLESS:
+        if fitted.unexplained > _UNEXPLAINED and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
             text = f"{min(100 * fitted.unexplained, 100):.0f} % of the housing's motion is not what {moves}; {share}"
             return (Condition("accelerometers-contradict-cells", text),)

@@ -175,12 +175,13 @@ class Command(Terminal):
                 self.next("check", self._sources[-1])
             return _NOT_TRUSTED
         except KeyboardInterrupt as error:
-            kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)
-            self.error(kind, "nothing was written.")
-            return exit_code
+            return self._interrupted(error)
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
         except Exception as error:
+            ended = _interrupt_behind(error)
+            if ended is not None:  # it fell into an import, which makes an error of its own of it
+                return self._interrupted(ended)
             message = _bad_input_message(error)
             if message is None:
                 self.error("bug", _bug_report(error))
@@ -190,6 +191,11 @@ class Command(Terminal):
         finally:
             use_units("si")
         return 0
+
+    def _interrupted(self, error: KeyboardInterrupt) -> int:
+        kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)
+        self.error(kind, "nothing was written.")
+        return exit_code
 
     def _show_warning(
         self, message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
@@ -285,6 +291,13 @@ def _rows(path: Path) -> Any:
         table = pq.ParquetFile(stream)
         count = table.metadata.num_rows
         return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
+
+
+def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
+    """The interrupt that an error was made of, if any."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 def _bad_input_message(error: Exception) -> str | None:
