@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import inverse_directions
@@ -24,8 +23,6 @@ _PIECES = 8
 _BESIDE = 3.0
 #: standard errors beyond which a difference is one,
 _CLEAR = 6.0
-#: probability below which one rate does not explain the runs',
-_ONE_RATE = 1e-3
 #: and phase [rad] over the record at the top of the band that it must come to.
 _NOTABLE = 5e-3
 
@@ -47,9 +44,9 @@ def common_rates(seen: Sequence[dict[str, ClockRate]], reach: float) -> dict[str
             weight = np.array([max(clock.error, 1e-12) ** -2.0 for clock in clocks])
             rates = np.array([clock.rate for clock in clocks])
             rate = float(np.sum(weight * rates) / weight.sum())
-            # a film that is not linear turns phases too, but not alike in all runs
-            if chdtrc(len(rates) - 1, float(np.sum(weight * (rates - rate) ** 2))) > _ONE_RATE:
-                pooled[quantity] = ClockRate(rate, float(weight.sum() ** -0.5))
+            # a film that is not linear turns phases too, but not alike in all runs: their scatter widens the error
+            scatter = float(np.sum(weight * (rates - rate) ** 2)) / max(len(rates) - 1, 1)
+            pooled[quantity] = ClockRate(rate, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
     clear = {q: c for q, c in pooled.items() if abs(c.rate) > _CLEAR * c.error and abs(c.rate) * reach > _NOTABLE}
     if "force" in clear and "acceleration" in pooled:
         cells, other = clear["force"], pooled["acceleration"]
