@@ -167,12 +167,6 @@ _TABLES = {
 }  # fmt: skip
 
 
-def draft_line(fields: tuple[Field, ...], key: str, value: str) -> str:
-    """A line of a draft: the key, its value as TOML, and what it means."""
-    field = next(field for field in fields if field.key == key)
-    return f"{key} = {value}   # {field.meaning}"
-
-
 def markdown() -> str:
     """The tables of all keys, as docs/campaigns.md shows them."""
     lines = []

@@ -82,11 +82,6 @@ class Blocks:
         arrays = {name: getattr(self, name)[places] for name in _STACKED}
         return replace(self, **arrays)
 
-    @property
-    def set_omega(self) -> FloatArray:
-        """Excitation of the points' set points, (number of points,) [rad/s]."""
-        return np.array([point.excitation for point in self.points])
-
 
 _STACKED = (
     "point", "run", "omega", "z", "present", "along", "calibration", "noise", "dof", "slope", "slope_noise",

@@ -73,11 +73,6 @@ class BandSolution:
     used: BoolArray = field(repr=False)  #: (L,): lines that the models take
     run_scatter: float  #: of the runs' gains
 
-    def of_model(self, name: str, omega: FloatArray, band: IntArray) -> ComplexArray:
-        """H of a model at some frequencies (n,) [rad/s] of some bands (n,), (n, 2, 2)."""
-        shape = over_frequency(name, band, omega, self.middle)
-        return shape.change(self.models[name].numbers)
-
 
 def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> BandSolution:
     """Solve all bands; `told` (L,): lines whose excitation stands clear of the noise."""

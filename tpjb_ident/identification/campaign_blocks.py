@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
@@ -50,6 +51,23 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
                 )
             )
     return tuple(sensors)
+
+
+def unstated(campaign: Campaign) -> tuple[Condition, ...]:
+    """Say which probes and cells have no uncertainty in the manifest."""
+    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
+    names = [c.name for c in main if c.uncertainty is None]
+    if not names:
+        return ()
+    text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
+    return (Condition("calibration-uncertainty-unstated", text),)
+
+
+def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[int, float]]]) -> dict[str, float]:
+    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
+    means = {run: float(np.mean(list(temperatures.values()))) for run, temperatures in measured if temperatures}
+    stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
+    return means | stated
 
 
 def with_start(sensors: Sequence[Sensor], start: float) -> tuple[Sensor, ...]:

@@ -17,7 +17,13 @@ from tpjb_ident.dynamic.runs.finished_runs import RunDigest
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import Blocks, Rig, vector
 from tpjb_ident.estimate.solve import Solution, Solver
-from tpjb_ident.identification.campaign_blocks import campaign_blocks, found_mount, sensors_of, with_start
+from tpjb_ident.identification.campaign_blocks import (
+    campaign_blocks,
+    found_mount,
+    run_temperatures,
+    sensors_of,
+    with_start,
+)
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
 from tpjb_ident.identification.unstated_clocks import with_found_devices
 from tpjb_ident.runtime.executors import Workers, map_ordered
@@ -84,7 +90,7 @@ def solve_campaign(
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
-    temperatures = run_temperatures(campaign, digests)
+    temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
     task = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
     zero = campaign_zero(sources, cell_zero_uncertainty(campaign))
     misses, common = load_misses(sources, zero.force)
@@ -156,13 +162,6 @@ def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
         wide = spread.get(sensor.quantity, 0.0)
         sensors.append(replace(sensor, uncertainty=wide) if wide > (sensor.uncertainty or 0.0) else sensor)
     return replace(rig, sensors=tuple(sensors))
-
-
-def run_temperatures(campaign: Campaign, digests: Sequence[RunDigest]) -> dict[str, float]:
-    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
-    stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
-    temperatures = {d.run: float(np.mean(list(d.temperatures.values()))) for d in digests if d.temperatures}
-    return temperatures | stated
 
 
 def _film(source: PointSource, point: PointMeans) -> FilmChange:

@@ -9,7 +9,6 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
-from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
@@ -25,6 +24,7 @@ from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.band_point import BandSettings
 from tpjb_ident.identification.band_tables import Moved
+from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import CampaignSolution, solve_campaign
 from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.identification.methods import own_method
@@ -196,13 +196,3 @@ def systematic_changes(solved: CampaignSolution) -> tuple[FloatArray, tuple[str,
         return np.zeros((1, 8 * points)), ()
     factors = np.concatenate(rows)
     return np.asarray(factors.reshape(len(factors), -1) * np.sqrt(len(factors))), tuple(names)
-
-
-def unstated(campaign: Campaign) -> tuple[Condition, ...]:
-    """Say which probes and cells have no uncertainty in the manifest."""
-    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
-    names = [c.name for c in main if c.uncertainty is None]
-    if not names:
-        return ()
-    text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
-    return (Condition("calibration-uncertainty-unstated", text),)

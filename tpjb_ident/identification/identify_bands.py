@@ -20,14 +20,14 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, 
 from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun, named_runs
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, without_points, without_runs
 from tpjb_ident.estimate.blocks import Rig, Sensor
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
 from tpjb_ident.identification.band_point import BandPoint, BandSettings, band_groups, read_point
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
 from tpjb_ident.identification.band_tables import Moved, SolvedBands, band_result, moved
-from tpjb_ident.identification.campaign_blocks import found_mount, sensors_of
+from tpjb_ident.identification.campaign_blocks import found_mount, run_temperatures, sensors_of, unstated
 from tpjb_ident.terms.clock import START
 
 Progress = Callable[[str, int, int], None]
@@ -73,7 +73,7 @@ def identify_bands(
         conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
         conditions = merged(conditions, run_conditions(point, solved.first), band_conditions(point, solved, b))
         results.append(band_result(solved, b, misses[b], conditions, settings.clearance))
-    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + _unstated(stated)
+    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + unstated(stated)
     return IdentifiedBands(tuple(results), moved(solved), named)
 
 
@@ -89,7 +89,8 @@ def _solved(
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
     sensors = _sensors(campaign, points)
     classic = [_classic(point, k) for point in points for k in range(len(point.plan.groups))]
-    temperatures = _temperatures(campaign, points)
+    measured = [(s.phasors.run, s.temperatures) for point in points for s in point.spectra]
+    temperatures = run_temperatures(campaign, measured)
     passes = 2 if any(point.method == "hv" for point in points) else 1
     solutions: list[BandSolution] = []
     data: BandBlocks | None = None
@@ -128,36 +129,14 @@ def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, .
     return tuple(sensors)
 
 
-def _temperatures(campaign: Campaign, points: Sequence[BandPoint]) -> dict[str, float]:
-    """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
-    spectra = [s for point in points for s in point.spectra]
-    means = {s.phasors.run: float(np.mean(list(s.temperatures.values()))) for s in spectra if s.temperatures}
-    stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
-    return means | stated
-
-
-def _unstated(campaign: Campaign) -> tuple[Condition, ...]:
-    """Say which probes and cells have no uncertainty in the manifest."""
-    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
-    names = [c.name for c in main if c.uncertainty is None]
-    if not names:
-        return ()
-    text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
-    return (Condition("calibration-uncertainty-unstated", text),)
-
-
 def _without(point: BandPoint, left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the runs of a point that take no part."""
     members = [excluded.run for excluded in left if replace(excluded.point, excitation=0.0) == point.point]
-    return (Condition("run-left-out", f"without {', '.join(members)}, which cannot be used"),) if members else ()
+    return without_runs(members)
 
 
 def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
     kept = [point.point for point in points]
     lost = [excluded for excluded in left if replace(excluded.point, excitation=0.0) not in kept]
-    if not lost:
-        return ()
-    places = dict.fromkeys(f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost)
-    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
-    return (Condition("point-lost", f"no usable run over a band at {'; '.join(places)}: {runs}"),)
+    return without_points(lost, [f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost], "run over a band")

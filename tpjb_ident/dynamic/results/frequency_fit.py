@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 from rigdata.arrays import FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.point_result import PointResult, by_static_point
 from tpjb_ident.errors import ArgumentError
 
 #: A model is refused below this probability of its chi-square.
@@ -152,12 +152,8 @@ def fits_per_load(points: tuple[PointResult, ...]) -> list[LoadFits]:
 
     Points with mains on the excitation line take part: their intervals say what they are worth.
     """
-    groups: dict[tuple[object, ...], list[PointResult]] = {}
-    for p in points:
-        if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(p)
     result = []
-    for members in groups.values():
+    for members in by_static_point(points):
         estimates = [p.stiffness for p in members]
         if len({round(e.omega, 6) for e in estimates}) < 2:
             continue

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
-from tpjb_ident.dynamic.runs.excluded_runs import LISTED, ExcludedRun
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, without_points, without_runs
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,15 @@ class PointResult:
         return f"<PointResult: {self}>"
 
 
+def by_static_point(points: Sequence[PointResult]) -> list[list[PointResult]]:
+    """The points that have a stiffness, those of one load and speed together."""
+    groups: dict[tuple[object, ...], list[PointResult]] = {}
+    for p in points:
+        if np.isfinite(p.stiffness.h).all():
+            groups.setdefault(p.point.static_key, []).append(p)
+    return list(groups.values())
+
+
 def named_at_points(
     points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
 ) -> tuple[PointResult, ...]:
@@ -109,20 +120,12 @@ def lost_points(
 ) -> tuple[Condition, ...]:
     """Name the operating points that have no run left."""
     lost = [excluded for excluded in left if not any(_same(excluded, point, any_excitation) for point in points)]
-    places = dict.fromkeys(
-        f"{excluded.point.static_load / 1e3:g} kN, {excluded.point.excitation_hz:g} Hz" for excluded in lost
-    )
-    if not places:
-        return ()
-    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
-    return (Condition("point-lost", f"no usable run at {'; '.join(places)}: {runs}"),)
+    points_lost = [excluded.point for excluded in lost]
+    return without_points(lost, [f"{p.static_load / 1e3:g} kN, {p.excitation_hz:g} Hz" for p in points_lost])
 
 
 def _named(point: PointResult, runs: list[str]) -> PointResult:
-    if not runs:
-        return point
-    condition = Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used")
-    return replace(point, quality=merged(point.quality, (condition,)))
+    return replace(point, quality=merged(point.quality, without_runs(runs))) if runs else point
 
 
 def _same(one: ExcludedRun, result: PointResult, any_excitation: bool) -> bool:

@@ -11,7 +11,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict
+from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict, by_static_point
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.terms.housing import HARMLESS
@@ -258,12 +258,8 @@ def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float,
 
     With a single frequency Re h itself stands in.
     """
-    groups: dict[tuple[object, ...], list[PointResult]] = {}
-    for p in points:
-        if np.isfinite(p.stiffness.h).all():
-            groups.setdefault(p.point.static_key, []).append(p)
     result = []
-    for members in groups.values():
+    for members in by_static_point(points):
         load, direction = members[0].point.static_load, members[0].point.static_load_direction
         square = np.array([p.stiffness.omega**2 for p in members])
         k = np.array([p.stiffness.k.ravel() for p in members])

@@ -39,3 +39,16 @@ def named_runs(left: Sequence[ExcludedRun], of: int) -> tuple[Condition, ...]:
     listed = "; ".join(f"{excluded.run} ({excluded.reason})" for excluded in left[:LISTED])
     more = f"; and {len(left) - LISTED} more" if len(left) > LISTED else ""
     return (Condition("runs-left-out", f"{len(left)} of {of} dynamic runs take no part: {listed}{more}"),)
+
+
+def without_runs(runs: Sequence[str]) -> tuple[Condition, ...]:
+    """What a point has to say of its runs that take no part."""
+    return (Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used"),) if runs else ()
+
+
+def without_points(lost: Sequence[ExcludedRun], places: Sequence[str], kind: str = "run") -> tuple[Condition, ...]:
+    """Name the operating points that have no run left: the `places` of the `lost` runs."""
+    if not lost:
+        return ()
+    runs = ", ".join(excluded.run for excluded in lost[:LISTED]) + (", ..." if len(lost) > LISTED else "")
+    return (Condition("point-lost", f"no usable {kind} at {'; '.join(dict.fromkeys(places))}: {runs}"),)
