@@ -20,7 +20,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, 
 from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, without_points, without_runs
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, points_without_runs, without_runs
 from tpjb_ident.estimate.blocks import Rig, Sensor
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
@@ -139,4 +139,5 @@ def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Con
     """Name the operating points that have no run left."""
     kept = [point.point for point in points]
     lost = [excluded for excluded in left if replace(excluded.point, excitation=0.0) not in kept]
-    return without_points(lost, [f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost], "run over a band")
+    places = [f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost]
+    return points_without_runs(lost, places, "run over a band")

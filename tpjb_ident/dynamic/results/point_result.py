@@ -13,7 +13,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, without_points, without_runs
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, points_without_runs, without_runs
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def lost_points(
     """Name the operating points that have no run left."""
     lost = [excluded for excluded in left if not any(_same(excluded, point, any_excitation) for point in points)]
     points_lost = [excluded.point for excluded in lost]
-    return without_points(lost, [f"{p.static_load / 1e3:g} kN, {p.excitation_hz:g} Hz" for p in points_lost])
+    return points_without_runs(lost, [f"{p.static_load / 1e3:g} kN, {p.excitation_hz:g} Hz" for p in points_lost])
 
 
 def _named(point: PointResult, runs: list[str]) -> PointResult:

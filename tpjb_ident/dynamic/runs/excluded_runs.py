@@ -46,7 +46,7 @@ def without_runs(runs: Sequence[str]) -> tuple[Condition, ...]:
     return (Condition("run-left-out", f"without {', '.join(runs)}, which cannot be used"),) if runs else ()
 
 
-def without_points(lost: Sequence[ExcludedRun], places: Sequence[str], kind: str = "run") -> tuple[Condition, ...]:
+def points_without_runs(lost: Sequence[ExcludedRun], places: Sequence[str], kind: str = "run") -> tuple[Condition, ...]:
     """Name the operating points that have no run left: the `places` of the `lost` runs."""
     if not lost:
         return ()
