@@ -276,19 +276,6 @@ class Bearing:
         head = "".join(f"<th>{title}</th>" for title in titles)
         return f"<p>{html.escape(str(self))}</p><table><tr>{head}</tr>{''.join(rows)}</table>"
 
-    def stated_for(self, rotation: str) -> Bearing:
-        """Return a copy whose leading edges are those of a sense of turning, unless its file states one.
-
-        Parameters
-        ----------
-        rotation : {"counter-clockwise", "clockwise"}
-
-        Returns
-        -------
-        Bearing
-        """
-        return self if self.rotation else replace(self, rotation=rotation)
-
     def with_pads(self, pads: tuple[Pad, ...]) -> Bearing:
         """Return a copy with other pads.
 

@@ -33,6 +33,7 @@ KERNELS = (
     "film/energy.py",
     "film/following_heat.py",
     "film/matrix.py",
+    "film/models.py",
     "film/oil_state.py",
     "film/resting.py",
     "film/reynolds.py",

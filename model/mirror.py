@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.bearing import ROTATIONS, Bearing
+from model.bearing import ROTATIONS, Bearing, BearingError
 from model.setup import Setup
 
 #: x becomes -x.
@@ -30,6 +30,20 @@ def runs_backward(bearing: Bearing, speed: float) -> bool:
     return bearing.rotation not in ("", rotation_of(speed))
 
 
+def as_it_turns(bearing: Bearing, rotations: set[str], usual: str = "") -> Bearing:
+    """State the sense that a bearing's leading edges belong to: its file's, else the one in which its shaft turns.
+
+    Where that turns both ways, `usual` serves pads that are the same from either edge; others are refused.
+    """
+    senses = {bearing.rotation} if bearing.rotation else rotations
+    if len(senses) > 1 and any(pad.pivot_offset != 0.5 for pad in bearing.pads):
+        raise BearingError(
+            f"{bearing.name}, [bearing] rotation: the shaft turns both ways, and pivot_offset counts from the edge "
+            f"that leads in one of them. Write rotation = {' or '.join(map(repr, ROTATIONS))}."
+        )
+    return replace(bearing, rotation=min(senses) if len(senses) == 1 else usual)
+
+
 def seen_by_shaft(setup: Setup, speed: float) -> Setup:
     """The set-up in the frame where a shaft of this speed about +z turns counter-clockwise."""
     if runs_backward(setup.bearing, speed):
@@ -41,13 +55,12 @@ def seen_by_shaft(setup: Setup, speed: float) -> Setup:
 def mirrored(setup: Setup) -> Setup:
     """The bearing and the structure around it as the mirror shows them; instruments stay as they are."""
     turned = setup.change_pads(lambda k, pad: replace(pad, pivot_angle=math.pi - pad.pivot_angle))
-    bearing = turned.bearing
-    if bearing.rotation:
-        bearing = replace(bearing, rotation=ROTATIONS[bearing.rotation == ROTATIONS[0]])
+    sense = turned.bearing.rotation
+    opposite = sense and ROTATIONS[sense == ROTATIONS[0]]
     angle, towards = setup.misalignment
     xx, xy, yy = setup.series_compliance
     return turned.change(
-        bearing=bearing,
+        bearing=replace(turned.bearing, rotation=opposite),
         mirrored=not setup.mirrored,
         misalignment=(angle, math.pi - towards),
         series_compliance=(xx, -xy, yy),

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from model.errors import OptionError, check_known
-from model.film.models import FILM_MODELS
 from model.growth import Growth
 
-#: Names of the models of a rupturing film.
-CAVITATION = tuple(FILM_MODELS)
+#: Those of `model.film.models` that are chosen by name; a turbulent film is a matter of the other option.
+CAVITATION = ("swift-stieber", "jfo")
 _TURBULENCE = ("none", "ng-pan")
 
 
@@ -27,7 +26,7 @@ class Options:
     axial_tilt: bool = False
 
     def __post_init__(self) -> None:
-        check_known("cavitation", self.cavitation, FILM_MODELS)
+        check_known("cavitation", self.cavitation, CAVITATION)
         check_known("turbulence", self.turbulence, _TURBULENCE)
         if self.turbulence != "none" and self.cavitation != "swift-stieber":
             raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")

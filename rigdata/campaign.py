@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, parse_manifest
-from rigdata.manifest.runs import RunEntry
+from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, RunEntry, parse_manifest
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, RunReader
@@ -236,9 +235,7 @@ def _read_text(path: Path, file: str, limit: int) -> str:
 
 
 def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
-    from rigdata.readers.cached_reader import ReadingCache
-    from rigdata.readers.formats.foreign import ForeignReader, is_foreign
-    from rigdata.readers.text.csv import CsvReader
+    from rigdata.readers.file_reader import FileReader, ReadingCache
 
     text = _read_text(manifest_path, manifest_path.name, MAX_MANIFEST)
     files: dict[str, Path] = {manifest_path.name: manifest_path}
@@ -251,24 +248,20 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
         place = f"[[runs]] no. {entry.index + 1} file"
         target = inside(folder, entry.file, manifest_path.name, place, entry.id)
         files[entry.file] = target
-        if is_foreign(target):
-            return ForeignReader(target, entry.file, entry.id, channels, rate, cache)
-        return CsvReader(target, entry.file, entry.id, channels, rate, cache, manifest.csv)
+        return FileReader(target, entry.file, entry.id, channels, rate, manifest.csv, cache)
 
     return _assembled(manifest, reader_of, problems, path=folder, bearing_text=bearing, files=files)
 
 
 def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     """The same test in another file: a repeat, or a record that landed under another name."""
-    from rigdata.readers.formats.foreign import ForeignReader, is_foreign
-    from rigdata.readers.text.csv import CsvReader
+    from rigdata.readers.file_reader import FileReader
 
     old: Any = run.reader
-    kind = ForeignReader if is_foreign(path) else CsvReader
-    if isinstance(old, kind):
+    if isinstance(old, FileReader):
         reader = replace(old, path=path, file=file, run=run_id)
     else:
-        reader = kind(path, file, run_id, getattr(old, "channels", run.channels), old.stated_rate)
+        reader = FileReader(path, file, run_id, old.channels, old.stated_rate)
     return replace(run, id=run_id, reader=reader)
 
 
@@ -291,8 +284,7 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
 
 
 def _load_hdf5(path: Path) -> Campaign:
-    from rigdata.readers.hdf5.reader import Hdf5Reader
-    from rigdata.readers.hdf5.texts import read_texts, refuse_claims
+    from rigdata.readers.hdf5.reader import Hdf5Reader, read_texts, refuse_claims
 
     text, bearing = read_texts(path, path.name)
     files = {path.name: path}
@@ -305,7 +297,7 @@ def _load_hdf5(path: Path) -> Campaign:
         bearing = ""
 
     def reader_of(entry: RunEntry, rate: float | None, channels: Mapping[str, Channel]) -> RunReader:
-        return Hdf5Reader(path, entry.id, path.name, rate, channels)
+        return Hdf5Reader(path, f"{path.name}:/runs/{entry.id}", entry.id, channels, rate)
 
     return _assembled(manifest, reader_of, problems, path=path, bearing_text=bearing, files=files)
 

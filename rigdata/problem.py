@@ -106,3 +106,17 @@ class RigDataError(RigError):
 def refuse(file: str, place: str, what: str, cure: str, run: str | None = None) -> RigDataError:
     """The error to raise for one thing that stops the reading: file, place, what is wrong, what to do."""
     return RigDataError(Problem("error", file, place, what, cure, run))
+
+
+def shown(value: object) -> str:
+    """`value` in a message: quoted, short, on one line, controls escaped."""
+    if isinstance(value, str):
+        # right-to-left marks and control characters could make a message read otherwise than it is
+        text = repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value[:200]))
+    elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
+        text = "a table" if isinstance(value, dict) else "an array"
+    elif isinstance(value, int) and abs(value) > 10**60:  # may have more digits than Python prints
+        text = "a whole number of hundreds of digits"
+    else:
+        text = ascii(value)
+    return text if len(text) <= 60 else text[:57] + "..."

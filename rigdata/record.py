@@ -1,9 +1,11 @@
-"""Samples of a run, calibrated: one channel, two as X and Y, or rows of several quantities read stretch by stretch."""
+"""Samples of a run, calibrated: one channel, or two as X and Y."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from rigdata.arrays import FloatArray
 
@@ -82,11 +84,8 @@ class VectorRecord:
     def __len__(self) -> int:
         return len(self.values)
 
-
-@dataclass(frozen=True)
-class Rows:
-    """Consecutive samples of a run."""
-
-    rows: dict[str, FloatArray]  #: quantity -> (2, n), SI
-    time: FloatArray | None  #: (n,), s; None where times are counted from the rate
-    speed: FloatArray | None  #: (n,), rad/s
+    def at(self, time: FloatArray) -> FloatArray:
+        """Values (n, 2) at times (n,) [s]: between its own samples where another device took those, NaN beyond them."""
+        if self.time is time or np.array_equal(self.time, time):
+            return self.values
+        return np.stack([np.interp(time, self.time, column, np.nan, np.nan) for column in self.values.T], axis=1)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +14,7 @@ from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
-from rigdata.record import Record, Rows, VectorRecord
+from rigdata.record import Record, VectorRecord
 from rigdata.vector import COLLINEAR_SINE, vector_rows
 
 
@@ -143,7 +141,7 @@ class Run:
                 raise self._refuse(f"channel {name}", f"is none of device {device.name!r}", listed)
         first, last = _limits(start, stop, device.length)
         is_apart = self._apart(names)
-        reader: Any = self.reader
+        reader = self.reader
         readings = (reader.read_device if is_apart else reader.read)(names, first, last) if names else []
         values = np.empty((len(names), last - first))
         for row, name, reading in zip(values, names, readings, strict=True):
@@ -236,7 +234,7 @@ class Run:
             readings = self.reader.read(names, first, last)
             rate = self.sample_rate  # rejected before times are counted from it
             return readings, self.reader.time(first, last), rate
-        reader: Any = self.reader
+        reader = self.reader
         device = next(device for device in self.devices if names[0] in device.channels)
         first, last = _limits(start, stop, device.length)
         return reader.read_device(names, first, last), reader.device_time(names[0], first, last), device.rate
@@ -293,16 +291,6 @@ class Run:
             raise self._refuse(f"channels {names}", "all measure along one line", remedy)
         return chosen
 
-    def row_reader(self, quantities: Sequence[str]) -> RowReader:
-        """Reader of several quantities, all their channels in one request per stretch.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-            As of `vector`.
-        """
-        return RowReader(self, quantities)
-
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
         opener = getattr(self.reader, "opened", None)
@@ -348,40 +336,6 @@ def _limits(start: int | None, stop: int | None, length: int) -> tuple[int, int]
     """First sample of a Python slice, and the one after its last."""
     first, last, _ = slice(start, stop).indices(length)
     return first, max(first, last)
-
-
-class RowReader:
-    """Rows of a run's file, all channels in one request."""
-
-    def __init__(self, run: Run, quantities: Sequence[str]) -> None:
-        self._run, self._quantities = run, quantities
-        self._tachometers = [c for c in run.channels.values() if c.quantity == "speed"][:1]
-        counted = getattr(run.reader, "counted", None)
-        self._counted = counted is not None and counted()
-
-    def read(self, start: int, stop: int) -> Rows:
-        """Samples start..stop-1."""
-        reader = self._run.reader
-        channels = {q: self._run._vector_channels(q) for q in self._quantities}
-        names = [c.name for c in itertools.chain(*channels.values())]
-        if self._run._apart(names):
-            return self._rows_apart(channels, names, start, stop)
-        names += [c.name for c in self._tachometers]
-        readings = dict(zip(names, reader.read(names, start, stop), strict=True)) if names else {}
-        rows = {}
-        for quantity, sensors in channels.items():
-            rows[quantity] = vector_rows(sensors, [readings[sensor.name] for sensor in sensors])
-        speed = None
-        for tachometer in self._tachometers:
-            speed = tachometer.to_si(readings[tachometer.name])
-        return Rows(rows, None if self._counted else reader.time(start, stop), speed)
-
-    def _rows_apart(self, channels: dict[str, list[Channel]], names: list[str], start: int, stop: int) -> Rows:
-        """Rows of another device than the run's own, which does not know the speed."""
-        values, time, _ = self._run._stretch(names, start, stop)
-        readings = dict(zip(names, values, strict=True))
-        rows = {q: vector_rows(sensors, [readings[c.name] for c in sensors]) for q, sensors in channels.items()}
-        return Rows(rows, time, None)
 
 
 def pulse_times(readings: FloatArray, time: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from rigdata.problem import RigError
+from rigdata.problem import RigError, shown
 
 #: Characters of a quantity; more are a slip or a bomb.
 LONGEST = 200
@@ -238,10 +238,10 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     """Split ``"7.78 mV/um"`` into 7.78 and ``"mV/um"``."""
     example = _example(dimension)
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {_short(value)}')
+        raise UnitError(f'expected a number with a unit in quotes, like "1 {example}", got {shown(value)}')
     if not isinstance(value, str):
         if dimension != "ratio":
-            raise UnitError(f'{_short(value)} has no unit; write it with one, like "{_short(value)} {example}"')
+            raise UnitError(f'{shown(value)} has no unit; write it with one, like "{shown(value)} {example}"')
         return _to_float(value), ""
     if len(value) > LONGEST:
         raise UnitError(f"a text of {len(value)} characters is not a quantity")
@@ -249,10 +249,10 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     match = _NUMBER.match(text)
     if match is None or (match.end() < len(text) and text[match.end()] in "0123456789.,"):
         hint = "; write a decimal point, not a comma" if re.match(r"[+-]?[0-9]*,[0-9]", text) else ""
-        raise UnitError(f"{_short(value)} is not a number with a unit{hint}")
+        raise UnitError(f"{shown(value)} is not a number with a unit{hint}")
     unit = text[match.end() :].strip()
     if not unit and dimension != "ratio":
-        raise UnitError(f'{_short(value)} has no unit; write it with one, like "{match[0]} {example}"')
+        raise UnitError(f'{shown(value)} has no unit; write it with one, like "{match[0]} {example}"')
     return _to_float(match[0]), unit
 
 
@@ -260,15 +260,7 @@ def _to_float(value: str | float) -> float:
     try:
         return _finite(float(value))
     except OverflowError as error:  # a whole number of hundreds of digits
-        raise UnitError(f"{_short(value)} is not a finite number") from error
-
-
-def _short(value: object) -> str:
-    # A table or array can be nested too deeply to be printed, a whole number have more digits than Python prints.
-    if isinstance(value, int) and abs(value) > 10**60:
-        return "a whole number of hundreds of digits"
-    text = repr(value) if isinstance(value, (str, int, float)) or value is None else f"a {type(value).__name__}"
-    return text if len(text) <= 60 else text[:57] + "..."
+        raise UnitError(f"{shown(value)} is not a finite number") from error
 
 
 def _finite(number: float) -> float:
@@ -338,10 +330,10 @@ def sensitivity_gain(value: object, signal_unit: str, dimension: str) -> float:
     parsed, signal = parse_unit(unit, dimension), parse_unit(signal_unit)
     quotient = signal * parse_unit(SI_UNITS[dimension]) ** -1
     if number <= 0 or number * parsed.factor == 0:  # the second: too small for a float
-        raise UnitError(f"{_short(value)} must be above zero; a falling reading is polarity = -1")
+        raise UnitError(f"{shown(value)} must be above zero; a falling reading is polarity = -1")
     if parsed.powers == quotient.powers:
         return _finite(signal.factor / (number * parsed.factor))
     if parsed.powers == (quotient**-1).powers:
         return _finite(number * parsed.factor * signal.factor)
     example = f"{signal_unit}/{_example(dimension)}"
-    raise UnitError(f"{_short(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}")
+    raise UnitError(f"{shown(value)} does not lead from {signal_unit} to {dimension}; expected like {example!r}")

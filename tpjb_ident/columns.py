@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.rounding import significant
 
 #: Pounds and inches in SI.
 _LBF, _INCH = 4.4482216152605, 0.0254
@@ -53,6 +54,11 @@ def use_units(system: str) -> None:
     UNITS.update(SYSTEMS[system])
 
 
+def in_us_units() -> bool:
+    """Whether people read pounds, inches and rpm."""
+    return SYSTEMS["us"] == UNITS
+
+
 def symbol(quantity: str) -> str:
     """Symbol of the unit in which a quantity is shown."""
     return UNITS[quantity][0]
@@ -61,6 +67,16 @@ def symbol(quantity: str) -> str:
 def size(quantity: str) -> float:
     """Size of that unit in SI (of angles in degrees, of frequencies and speeds in Hz)."""
     return UNITS[quantity][1]
+
+
+#: Calibrated quantities whose unit changes with the system, and those that people read in one unit everywhere.
+_SHOWN = {"displacement": "length", "force": "force", "pressure": "pressure"}
+_EVERYWHERE = {"acceleration": "m/s²", "temperature": "K", "speed": "rad/s"}
+
+
+def channel_unit(quantity: str) -> tuple[str, float]:
+    """Symbol and size of the unit in which people read a calibrated channel; no symbol where it has none."""
+    return UNITS[_SHOWN[quantity]] if quantity in _SHOWN else (_EVERYWHERE.get(quantity, ""), 1.0)
 
 
 class Column(NamedTuple):
@@ -110,7 +126,7 @@ def amount(value: float, quantity: str, form: str = ".6g") -> str:
     >>> amount(2500.0, "load")
     '2.5 kN'
     """
-    return f"{value / size(quantity):{form}} {symbol(quantity)}"
+    return f"{significant(value / size(quantity), form)} {symbol(quantity)}"
 
 
 def spinning(speed: float, rotation: str = ROTATIONS[0]) -> str:
@@ -129,7 +145,7 @@ def degrees(celsius: float) -> str:
     >>> degrees(40.0)
     '40 °C'
     """
-    return f"{celsius:.4g} °C" if symbol("length") != "mil" else f"{1.8 * celsius + 32:.4g} °F"
+    return f"{1.8 * celsius + 32:.4g} °F" if in_us_units() else f"{celsius:.4g} °C"
 
 
 def place_of(load: float, excitation: float) -> str:

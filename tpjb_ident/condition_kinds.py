@@ -117,8 +117,8 @@ WARNINGS = {
     "nonlinear-amplitude": "The coefficients change with the amplitude of vibration: they hold for this one only.",
     "pads-not-reached": "The sweep never touched some pads; their clearance is unknown.",
     "pivots-disagree": "In the sweep the pivots give another amount than the dry tests say.",
-    "probe-gains-differ": "The sides of the clearance polygon stand at other angles to each other than the pads "
-    "do, as where one probe reads more than the other. Check both sensitivities.",
+    "probe-gains-differ": "Channels beyond two contradict one another, or the sides of the clearance polygon stand at "
+    "other angles than the pads do, as where one probe reads more than the other. Check their sensitivities.",
     "record-damaged": "A record had to be repaired when read, and part of it is lost. Copy it again from the rig.",
     "records-doubtful": "A check of the records found something to look at; `tpjb check` lists it all.",
     "run-gain-off": "In one run a probe or cell reads some per cent more or less than in the others of this "

@@ -19,13 +19,23 @@ def counted(number: int, thing: str) -> str:
 
 
 def plain(value: float, digits: int) -> str:
-    """A number with `digits` decimals; never a negative zero.
+    """A number with `digits` decimals, below zero so many digits before the point rounded; never a negative zero.
 
-    >>> plain(-0.004, 1)
-    '0.0'
+    >>> plain(-0.004, 1), plain(1041813.2, -2)
+    ('0.0', '1041800')
     """
-    text = f"{value:.{digits}f}"
+    text = f"{round(value, digits):.{max(0, digits)}f}"
     return text.replace("-", MINUS) if float(text) else text.lstrip("-")
+
+
+def significant(value: float, form: str = ".4g") -> str:
+    """A number of so many digits, large ones without an exponent.
+
+    >>> significant(1041813.2)
+    '1042000'
+    """
+    text = format(value, form)
+    return f"{float(text):.0f}" if "e+" in text else text
 
 
 def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> str:
@@ -41,7 +51,8 @@ def with_interval(value: float, low: float, high: float, scale: float = 1.0) -> 
     half = 0.5 * (high - low) / scale
     if not math.isfinite(half) or half <= 0:
         return f"{value / scale:.4g}".replace("-", MINUS)
-    digits = max(0, 1 - math.floor(math.log10(half)))
+    digits = 1 - math.floor(math.log10(half))
+    digits += digits < 0  # three digits of what is in the hundreds and above
     below, above = value - low, high - value
     if max(below, above) > _ASKEW * min(below, above):  # as where a bound cuts it off
         return f"{plain(value / scale, digits)} ({plain(low / scale, digits)} to {plain(high / scale, digits)})"

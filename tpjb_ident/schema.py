@@ -139,6 +139,23 @@ _CONVERGED = Column("converged", "truth value", "", "whether the model's solutio
 _PIVOTS = Column("pivots", "text", "", "pivot model: rigid, kirk, kirk-secant, measured; or another table")
 
 
+_MODEL_NAMES = (
+    Column("model", "text", "", "K-C or K-C-M"),
+    Column("supported", "text", "", "the simplest model that the data do not refuse"),
+)
+#: A model over frequency, of sines and of bands.
+_MODEL = (
+    Column("n_frequencies", "count", "", "excitation frequencies, or lines of a band"),
+    Column("excitation_lowest_Hz", "frequency", "Hz", "lowest of them"),
+    Column("excitation_highest_Hz", "frequency", "Hz", "highest of them"),
+    Column("chi_square", "number", "", "of the model against h, in eight parts of a band"),
+    Column("dof", "count", "", "degrees of freedom of it"),
+    Column("probability", "share", "", "of a chi-square as large by chance"),
+    Column("largest_misfit", "share", "", "of h, noise of bands taken off: what using the model costs"),
+    *_coefficients(("_lo", "_hi", "_se", "_dof"), STIFFNESS, DAMPING, MASS),
+)
+
+
 def _position(endings: tuple[str, ...]) -> tuple[Column, ...]:
     return tuple(Column(f"{a}_m", "length", "m", f"{a} of the shaft centre", endings) for a in "xy")
 
@@ -218,32 +235,16 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "frequency_fits": (
         *_STATIC,
-        Column("model", "text", "", "K-C or K-C-M"),
-        Column("supported", "text", "", "the simplest model that the load's data do not refuse"),
-        Column("n_frequencies", "count", "", "excitation frequencies"),
-        Column("excitation_lowest_Hz", "frequency", "Hz", "lowest of them"),
-        Column("excitation_highest_Hz", "frequency", "Hz", "highest of them"),
-        Column("chi_square", "number", "", "of the model"),
-        Column("dof", "count", "", "degrees of freedom"),
-        Column("probability", "share", "", "of a chi-square as large by chance"),
-        Column("largest_misfit", "share", "", "of h: what using the model costs"),
-        *_coefficients(("_se",), STIFFNESS, DAMPING, MASS),
+        *_MODEL_NAMES,
+        *_MODEL,
     ),
     "frf": _FRF,
     "frf_estimators": _FRF,
     "frf_models": (
         *_BAND,
-        Column("model", "text", "", "K-C or K-C-M"),
-        Column("supported", "text", "", "the simplest model that the lines do not refuse"),
+        *_MODEL_NAMES,
         Column("method", "text", "", "as in `frf`"),
-        Column("n_frequencies", "count", "", "lines"),
-        Column("excitation_lowest_Hz", "frequency", "Hz", "lowest of them"),
-        Column("excitation_highest_Hz", "frequency", "Hz", "highest of them"),
-        Column("chi_square", "number", "", "of the model against h in eight parts of the band"),
-        Column("dof", "count", "", "degrees of freedom of it"),
-        Column("probability", "share", "", "of a chi-square as large by chance"),
-        Column("largest_misfit", "share", "", "of h, noise taken off: what using the model costs"),
-        *_coefficients(("_lo", "_hi", "_se", "_dof"), STIFFNESS, DAMPING, MASS),
+        *_MODEL,
         _QUALITY,
     ),
     "budget": (

@@ -1,6 +1,6 @@
 """The library of effects that a baseline model lacks (names and meanings: `docs/theory.md`).
 
-One effect, one file. To add one of your own, call `register` with an `EffectKind`: a name, its parameters and one
+To add one of your own, call `register` with an `EffectKind`: a name, its parameters and one
 function that takes a `Setup` and returns a changed one.
 """
 

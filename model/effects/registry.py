@@ -1,4 +1,4 @@
-"""Which effects there are: one file each beside this one, and those that a user registers."""
+"""Which effects there are: those of the files beside this one, and those that a user registers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import importlib.util
 import pkgutil
 from pathlib import Path
 from string import Formatter
+from types import ModuleType
 
 from model.effects.kind import EffectError, EffectKind
 from rigdata.near_names import hint
@@ -19,10 +20,13 @@ _registered: dict[str, EffectKind] = {}
 def _bundled() -> dict[str, EffectKind]:
     kinds: dict[str, EffectKind] = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        kind = getattr(importlib.import_module(f"model.effects.{module.name}"), "KIND", None)
-        if isinstance(kind, EffectKind):
+        for kind in _defined(importlib.import_module(f"model.effects.{module.name}")):
             kinds[kind.name] = kind
-    return kinds
+    return dict(sorted(kinds.items()))
+
+
+def _defined(module: ModuleType) -> tuple[EffectKind, ...]:
+    return tuple(dict.fromkeys(v for v in vars(module).values() if isinstance(v, EffectKind)))
 
 
 def known_effects() -> dict[str, EffectKind]:
@@ -80,8 +84,7 @@ def load_library(path: str | Path) -> tuple[EffectKind, ...]:
         spec.loader.exec_module(module)
     except Exception as error:
         raise EffectError(f"{path}: fails with {type(error).__name__}: {error}. Mend it.") from error
-    kinds = tuple(dict.fromkeys(v for v in vars(module).values() if isinstance(v, EffectKind)))
-    kinds = tuple(k for k in kinds if known_effects().get(k.name) is not k)
+    kinds = tuple(k for k in _defined(module) if known_effects().get(k.name) is not k)
     if not kinds:
         raise EffectError(f"{path}: defines no effect. Make an EffectKind with a name of its own.")
     return tuple(register(kind) for kind in kinds)

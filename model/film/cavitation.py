@@ -191,14 +191,6 @@ def solve_film_jfo(
 
 
 @compiled
-def solve_flooded_film(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
-) -> FilmForces:
-    """`solve_film_jfo` for a film that the supply fills where it enters; parameters as those of `solve_film`."""
-    return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, np.inf))
-
-
-@compiled
 def _conserve(
     grid: FilmGrid,
     work: FilmWork,

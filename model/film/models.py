@@ -1,14 +1,34 @@
-"""Which models of a rupturing film there are, by name. To add one: a file beside this one, and a line here."""
+"""Models of a film that ruptures, by name. To add one: a file beside this one, and here its name and its call."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from model.film.cavitation import solve_flooded_film
+from model.compilation import inner
+from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
+from model.film.turbulence import solve_turbulent_film
 
-#: Grid, work, (Cp, a, b), surface speed, sharp: pressure and derivatives of one film, see `solve_film`.
-FilmSolver = Callable[[FilmGrid, FilmWork, tuple[float, float, float], float, bool], FilmForces]
+_JFO, _TURBULENT = range(2)
+#: Names, and by what compiled loops know them.
+FILM_MODELS = {"swift-stieber": None, "jfo": _JFO, "turbulent": _TURBULENT}
 
-FILM_MODELS: dict[str, FilmSolver] = {"swift-stieber": solve_film, "jfo": solve_flooded_film}
+
+@inner
+def solve_by(
+    model: int | None,
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    sharp: bool,
+    supplied: float,
+) -> FilmForces:
+    """Pressure of one film; where it is None when a search is compiled, the search has no code of the other models.
+
+    `supplied`: oil there is at the leading edge [kg/s/m].
+    """
+    if model is None:
+        return solve_film(grid, work, wedge, speed, sharp)
+    if model == _JFO:
+        return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
+    return solve_turbulent_film(grid, work, wedge, speed, sharp)

@@ -64,7 +64,7 @@ def load_arrays(key: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Fl
             arrays = {name: np.asarray(stored[name], dtype=float) for name in shapes}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
         _LOG.info("%s is unreadable (%s); solving again.", path, error)
         return None
     if any(arrays[name].shape != shape or not np.isfinite(arrays[name]).all() for name, shape in shapes.items()):

@@ -11,6 +11,7 @@ import numpy as np
 from model.conditions import has_answer, named
 from model.film.attitudes import attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
+from model.film.models import FILM_MODELS
 from model.film.oil_state import Running, set_viscosity
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces, solve_film
@@ -20,7 +21,7 @@ from model.setup import Setup
 from model.statics import conditions
 from model.statics.axial_tilt import aligned_tilt, axial_shape
 from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, MASS_CONSERVING, TURBULENT, Case
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
 from model.statics.compiled.constants import HEATING_STEP
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
@@ -52,8 +53,6 @@ from model.tilt_hold import hold_numbers
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
-#: What turns films into what `Case.rupture` says.
-_RUPTURES = {"swift-stieber": None, "jfo": MASS_CONSERVING, "turbulent": TURBULENT}
 _FAILURES = {FILM_LOST: "film lost", BOUNDLESS_HEAT: "heat without bounds", SINGULAR: "singular"}
 #: A pad that tilts by this share of the largest tilt in the last step swings, too.
 _SWINGING = 0.3
@@ -104,7 +103,7 @@ class Search:
             hold=hold_numbers(setup),
             accuracy=float(setup.accuracy),
             thermal=thermal,
-            rupture=_RUPTURES[self.films[0].rupture],
+            rupture=FILM_MODELS[self.films[0].rupture],
             supply=float(setup.inlet_temperature),
             kept=float(kept),
             mixing=float(setup.mixing),
@@ -233,6 +232,13 @@ class Search:
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
         self.load_pads(loaded)
+
+    def idle_by_curves(self) -> int:
+        """How many pads carry nothing where the curves carry the load."""
+        if self.case.hold.flexure > 0.0 or not self.state.idle.any():
+            return 0
+        self.know_attitudes()
+        return int(np.sum(~first_position(self.case.load, self.pads)[1]))
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""

@@ -31,14 +31,14 @@ _MOST_PADS = 6
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
     """Find where the journal stands: `load` (2,) [N]."""
     load = np.asarray(load, float)
-    if start is not None:
+    search, warm = Search(setup, load, speed), None
+    if start is not None and search.start_from(start):
+        warm = _settled(search, search.run())
+        # where pads are left idle that could carry, another start may leave others
+        loose = pads_of("pads {pads} cannot keep their load", warm.status)
+        if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves():
+            return warm
         search = Search(setup, load, speed)
-        if search.start_from(start):
-            result = _settled(search, search.run())
-            # where pads are left idle that could carry, another start may leave others
-            if result.converged and not pads_of("pads {pads} cannot keep their load", result.status):
-                return result
-    search = Search(setup, load, speed)
     search.stand()
     near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
     result = _settled(search, search.run())
@@ -48,6 +48,8 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
         search.let_idle(near)
         other = _settled(search, search.run())
         result = other if other.converged or len(other.status) > len(result.status) else result
+    if not result.converged and warm is not None and warm.converged:
+        return warm
     if not result.converged and couples_heat(setup):
         result = _raise_heat(setup, load, speed, result)
     for what in ("load", "speed", "want"):

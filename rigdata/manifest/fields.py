@@ -12,7 +12,7 @@ from typing import Any
 from rigdata.calibration import DIMENSIONS, UNCALIBRATED
 from rigdata.near_names import hint
 from rigdata.operating_point import ROTATIONS
-from rigdata.problem import Problem, Severity
+from rigdata.problem import Problem, Severity, shown
 from rigdata.units import UnitError, parse_quantity
 
 _MAX_FINDINGS = 1000
@@ -161,22 +161,6 @@ RUN = (
     Field("rotation", "choice", "of this run; default the shaft's", '"clockwise"', choices=ROTATIONS),
     Field("temperature", "temperature", "at the probes; else the mean of the thermometers", '"46 degC"', low=0.0),
 )
-_TABLES = {
-    "": TOP, "[shaft]": SHAFT, "[housing]": HOUSING, "[acquisition]": ACQUISITION, "[csv]": CSV,
-    "[channels.NAME]": CHANNEL, "[[runs]]": RUN,
-}  # fmt: skip
-
-
-def markdown() -> str:
-    """The tables of all keys, as docs/campaigns.md shows them."""
-    lines = []
-    for title, fields in _TABLES.items():
-        lines += [f"**`{title or 'top of the file'}`**", "", "| key | holds | example | meaning |", "|---|---|---|---|"]
-        for field in fields:
-            if field.meaning:
-                lines.append(f"| `{field.key}` | {_holds(field)} | `{field.example}` | {field.meaning} |")
-        lines.append("")
-    return "\n".join(lines)
 
 
 def open_paths(data: object, path: Path = ()) -> list[Path]:
@@ -201,41 +185,6 @@ def open_summary(paths: Collection[Path]) -> str:
     counts = Counter(str(path[-1]).replace("_", " ") for path in paths)
     kinds = ", ".join(f"{count} {kind}" for kind, count in counts.most_common())
     return f"{len(paths)} place{'s' if len(paths) > 1 else ''} open ({MARK}): {kinds}" if paths else ""
-
-
-_HOLDS = {
-    "whole": "whole number",
-    "list": "list of texts",
-    "tables": "tables",
-    "sign": "1 or -1",
-    "calibration": "with its unit",
-    "ratio": "number or %",
-}
-
-
-def _holds(field: Field) -> str:
-    text = ", ".join(field.choices) or _HOLDS.get(field.kind, field.kind)
-    if field.kind == "whole":
-        text += f" from {field.low:g}"
-    if field.required:
-        return f"{text}; needed"
-    if field.kind == "choice" and field.default:
-        return f"{text}; default {field.default}"
-    return text
-
-
-def shown(value: object, length: int = 60) -> str:
-    """`value` in a message: quoted, short, on one line, controls escaped."""
-    if isinstance(value, str):
-        # right-to-left marks and control characters could make a message read otherwise than it is
-        text = repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value[:200]))
-    elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
-        text = "a table" if isinstance(value, dict) else "an array"
-    elif isinstance(value, int) and abs(value) > 10**60:  # may have more digits than Python prints
-        text = "a whole number of many digits"
-    else:
-        text = ascii(value)
-    return text if len(text) <= length else text[: length - 3] + "..."
 
 
 def nearest(name: str, choices: Collection[str]) -> str:

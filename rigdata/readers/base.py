@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import DIMENSIONS, Channel
 from rigdata.device import Device, Grid, by_clock
+from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem, refuse
+from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.units import UnitError, is_signal, parse_unit, temperature_offset, unit_factor
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
 MAX_SAMPLES = 2**31
@@ -46,66 +49,52 @@ _EXPORTABLE = {
     ".dxd": ".mat or .csv", ".d7d": ".mat or .csv", ".ltd": ".uff", ".lms": ".uff", ".pro": ".uff",
     ".wav": ".csv", ".npy": ".csv", ".npz": ".csv", ".rec": ".csv", ".sie": ".csv", ".tst": ".csv",
 }  # fmt: skip
+#: Factors that differ by less are rounded ones of one unit.
+_SAME = 1e-3
+#: Longer texts are remarks.
+_LONGEST = 20
 
 
-class RunReader(Protocol):
-    """Lazy access to one run's record; nothing is opened before it is asked for."""
+@dataclass(frozen=True)
+class RecordFile:
+    """A record and what the manifest says of it; without a manifest there are no channels, and all columns count."""
 
-    @property
-    def file(self) -> str:
-        """Display name of the file (and the group in it)."""
+    path: Path
+    file: str
+    run: str | None = None
+    channels: Mapping[str, Channel] = field(default_factory=dict, repr=False)
+    stated_rate: float | None = None
+    spec: CsvSpec = field(default_factory=CsvSpec)
 
-    def names(self) -> tuple[str, ...]:
-        """List the names of all columns or datasets."""
-
-    def length(self) -> int:
-        """Count the samples per channel."""
-
-    def rate(self) -> float:
-        """Give the nominal sample rate [Hz]."""
-
-    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Read raw readings of `names` in samples start..stop-1, one (stop - start,) array each.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of channels.
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
-
-    def time(self, start: int, stop: int) -> FloatArray:
-        """Give the seconds of samples start..stop-1.
-
-        Parameters
-        ----------
-        start : int
-            First sample.
-        stop : int
-            Sample after the last.
-        """
-
-    def problems(self) -> tuple[Problem, ...]:
-        """Report what does not stop the run from being used."""
+    def refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
+        """The error that stops the reading of the file."""
+        return refuse(self.file, place, fault, remedy, self.run)
 
 
-def refuse_claim(claimed: int, size: int, file: str, run: str | None = None) -> None:
+def refuse_claim(claimed: int, size: int, file: str) -> None:
     """Refuse a file of `size` bytes whose headers claim far more than it can hold, before any of it is read."""
     if claimed > CLAIM_FREE + CLAIM_MULTIPLES * size:
         fault = f"claims {claimed / 1e6:.0f} MB of samples in a file of {size / 1e6:.3g} MB"
-        raise refuse(file, "", fault, "Copy it again from the logger, or split the run", run)
+        raise refuse(file, "", fault, "Copy it again from the logger, or split the run")
 
 
-class GridReader:
-    """What readers of files with several devices have in common."""
-
-    channels: Mapping[str, Channel]
+class RunReader(RecordFile):
+    """Lazy access to one run's record: channels of several devices, each at its own times."""
 
     def _grids(self) -> Sequence[Grid]:
         """Channels at the same times, those of the run's own device first."""
+        raise NotImplementedError
+
+    def _faults(self) -> Mapping[str, RigDataError]:
+        """What is wrong with channels that have no usable times."""
+        raise NotImplementedError
+
+    def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
+        """Seconds (stop - start,) of the times that the file holds under `clock`."""
+        raise NotImplementedError
+
+    def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of channels of one device, (stop - start,) each."""
         raise NotImplementedError
 
     def _grid(self, name: str) -> Grid:
@@ -121,39 +110,76 @@ class GridReader:
         """Channels that are not sampled with the run's own device."""
         return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._grids()[1:]))
 
-    def _other_devices(self) -> tuple[Problem, ...]:
-        """Note the channels that are sampled apart from the run's own device."""
-        if not self.apart():
-            return ()
-        reader: Any = self
-        parts = [f"{', '.join(device.channels[:6])} ({device.rate:.6g} Hz)" for device in self.devices()]
-        text = f"sampled apart: {'; '.join(parts[:6])}"
-        return (Problem("note", reader.file, "channels", text, "Nothing, if that is meant", reader.run),)
+    def problems(self) -> tuple[Problem, ...]:
+        """Report what does not stop the run from being used."""
+        raise NotImplementedError
+
+    def length(self) -> int:
+        """Count the samples per channel of the run's own device."""
+        return self._grids()[0].length
+
+    def rate(self) -> float:
+        """Give the sample rate [Hz]: of the file's times, else what the file or the manifest states."""
+        rate = self._grids()[0].rate
+        if not rate > 0:
+            clocks = [channel.name for channel in self.channels.values() if channel.quantity == "time"]
+            self.read_device(clocks, 0, 0)  # names a time column that the file lacks
+            fault = "there are neither usable times nor a sample rate"
+            remedy = 'Add sample_rate to the run or to [acquisition], a channel with quantity = "time", or in HDF5 the '
+            raise refuse(self.file, "", fault, f"{remedy}group's attribute sample_rate_hz", self.run)
+        return rate
+
+    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
+        """Raw readings of `names` along the run's own times, (stop - start,) each."""
+        faults, apart = self._faults(), self.apart()
+        for name in names:
+            if name in faults:
+                raise faults[name]
+        own = [name for name in names if name not in apart]
+        readings = dict(zip(own, self.read_device(own, start, stop), strict=True))
+        for name in apart.intersection(names):
+            readings[name] = self._along(name, start, stop)
+        return [readings[name] for name in names]
+
+    def time(self, start: int, stop: int) -> FloatArray:
+        """Seconds (stop - start,): the file's, else counted from the rate."""
+        clock = self._grids()[0].clock
+        return self._clock_times(clock, start, stop) if clock else np.arange(start, stop) / self.rate()
+
+    def device_time(self, name: str, start: int, stop: int) -> FloatArray:
+        """Seconds (stop - start,) of a channel's samples: the file's, else counted from its device's rate."""
+        grid = self._grid(name)
+        if grid.clock:
+            return self._clock_times(grid.clock, start, stop)
+        return grid.begin + np.arange(start, stop) / grid.rate
 
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.
 
         Straight lines, missing before the first sample and after the last; no phasor may come from it.
         """
-        reader: Any = self
         length = self._grid(name).length
-        (values,) = reader.read_device([name], 0, length)
-        at = reader.device_time(name, 0, length)
+        (values,) = self.read_device([name], 0, length)
+        at = self.device_time(name, 0, length)
         finite = np.isfinite(values)
         if not finite.any():
             return np.full(stop - start, np.nan)
-        return np.interp(reader.time(start, stop), at[finite], values[finite], left=np.nan, right=np.nan)
+        return np.interp(self.time(start, stop), at[finite], values[finite], left=np.nan, right=np.nan)
 
-
-def undescribed(names: Sequence[str], members: str, file: str, run: str) -> tuple[Problem, ...]:
-    """Note columns or datasets that the manifest does not describe."""
-    if not names:
-        return ()
-    listed = ", ".join(ascii(name)[1:-1][:40] for name in names[:6])
-    if len(names) > 6:
-        listed += f", ... ({len(names)} in all)"
-    remedy = "Nothing, or describe them in the manifest"
-    return (Problem("note", file, members, f"{members} without a description: {listed}", remedy, run),)
+    def _notes(self, members: str, names: Sequence[str], units: Mapping[str, str]) -> tuple[Problem, ...]:
+        """Units other than the manifest's, channels that are sampled apart, and those that nobody describes."""
+        problems = list(unit_problems(self.channels, units, self.file, self.run))
+        if self.apart():
+            parts = [f"{', '.join(device.channels[:6])} ({device.rate:.6g} Hz)" for device in self.devices()]
+            text = f"sampled apart: {'; '.join(parts[:6])}"
+            problems.append(Problem("note", self.file, "channels", text, "Nothing, if that is meant", self.run))
+        extra = [name for name in names if name not in self.channels]
+        if extra:
+            listed = ", ".join(ascii(name)[1:-1][:40] for name in extra[:6])
+            listed += f", ... ({len(extra)} in all)" if len(extra) > 6 else ""
+            text, remedy = f"{members} without a description: {listed}", "Nothing, or describe them in the manifest"
+            problems.append(Problem("note", self.file, members, text, remedy, self.run))
+        return tuple(problems)
 
 
 def rate_of_time(time: FloatArray) -> float:
@@ -182,3 +208,38 @@ def suffix_hint(path: Path) -> str:
     near = nearest_name(suffix, readable)
     hint = f"did you mean {near}?" if near else f"known are {', '.join(readable)}"
     return f"the suffix {suffix or '(none)'} is not known; {hint}"
+
+
+def unit_problems(
+    channels: Mapping[str, Channel], units: Mapping[str, str], file: str, run: str | None
+) -> tuple[Problem, ...]:
+    """An error for every channel whose unit in the file is another than its unit in the manifest."""
+    problems = []
+    for name, text in units.items():
+        channel = channels.get(name)
+        if channel is None or channel.quantity not in DIMENSIONS or text.strip() in ("", channel.unit):
+            continue
+        if len(text) <= _LONGEST and _differ(text.strip(), channel.unit, DIMENSIONS[channel.quantity]):
+            fault = f"the file states {text.strip()!r}, the manifest unit = {channel.unit!r}"
+            cure = "Correct unit in the manifest, or the units of the file if those are wrong"
+            problems.append(Problem("error", file, f"channel {name}", fault, cure, run))
+    return tuple(problems)
+
+
+def _differ(stated: str, manifest: str, dimension: str) -> bool:
+    """Whether two units turn a reading into different numbers; False where the file's is no unit."""
+    try:
+        first, second = _meaning(stated, dimension), _meaning(manifest, dimension)
+    except UnitError:
+        return False
+    (*kind, factor), (*other_kind, other_factor) = first, second
+    return kind != other_kind or not math.isclose(factor, other_factor, rel_tol=_SAME)
+
+
+def _meaning(unit: str, dimension: str) -> tuple[object, float, float]:
+    """What a reading is (a signal's dimension, or the quantity itself), its offset and its factor."""
+    parsed = parse_unit(unit)
+    if is_signal(unit):
+        return parsed.powers, 0.0, parsed.factor
+    offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
+    return dimension, offset, unit_factor(unit, dimension)

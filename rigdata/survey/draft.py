@@ -25,6 +25,14 @@ _HEAD = (
     f"# (guess): confirm or correct. {MARK}: open. After changes `tpjb init --update` fills in what follows from them.",
     "# Signs and frame: docs/guide/mounting.md",
 )
+#: What no record tells, and what it is where nobody says more.
+_TOLD = (
+    'description = ""   # what was tested: reports begin with it, the date and by whom',
+    'date = ""   # when it was measured',
+    'by = ""   # laboratory and person',
+)
+_TURNS = 'rotation = "counter-clockwise"   # (guess) with X to the right and Y up; or "clockwise"'
+_MOUNT = '# mount = "floating"   # hung on stingers, or "cells": on its load cells; else found in the records'
 _SOURCES = {"records": "(records) ", "guess": "(guess) "}
 
 
@@ -32,7 +40,7 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += ['description = ""', "", "[housing]", _open(HOUSING, "mass", "kg"), ""]
+    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _open(HOUSING, "mass", "kg"), _MOUNT, ""]
     if not all(rate > 0 for rate in surveyed.rates):
         lines += ["[acquisition]", _open(ACQUISITION, "sample_rate", "Hz"), ""]
     if surveyed.nameless:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import FORMATS, TEXT, suffix_hint
-from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.base import FORMATS, TEXT, RecordFile, suffix_hint
+from rigdata.readers.file_reader import read_contents
 from rigdata.readers.series import Series, with_unique_names
-from rigdata.readers.text.catman import time_column
 from rigdata.readers.text.head import find_head
 from rigdata.safe_path import inside
 
@@ -59,19 +59,20 @@ def records_below(folder: Path) -> list[Path]:
     return records
 
 
-def read_export(path: Path, name: str | None = None) -> Export:
-    """Read one record file of any known kind, without a manifest."""
-    name = name or path.name
-    series = tuple(with_unique_names(read_foreign(path, name)))
-    if path.suffix.lower() not in TEXT:
-        return Export(name, series)
-    head = find_head(path)
-    if head.header_line:
-        return Export(name, series, time_column(path))
+def read_export(path: Path, name: str | None = None, names: Sequence[str] = ()) -> Export:
+    """Read one record file of any known kind, without a manifest; `names` are of columns that have none."""
+    record, nameless = RecordFile(path, name or path.name), 0
+    if path.suffix.lower() in TEXT:
+        head = find_head(record)
+        if not head.header_line:
+            record, nameless = replace(record, spec=CsvSpec(names=tuple(names))), len(head.names)
+    contents = read_contents(record)
+    series, clock = tuple(with_unique_names(contents.series)), contents.clock
     times = next((s for s in series if _counts_evenly(s)), None)
-    if times is not None:
+    if nameless and not clock and times is not None:
         series = tuple(replace(s, time=times.values) for s in series if s is not times)
-    return Export(name, series, times.name if times is not None else "", len(head.names))
+        clock = times.name
+    return Export(record.file, series, clock, nameless)
 
 
 def _counts_evenly(series: Series) -> bool:
@@ -81,11 +82,11 @@ def _counts_evenly(series: Series) -> bool:
     return mean > 0 and bool(np.all(np.abs(steps - mean) < 0.1 * mean))
 
 
-def read_exports(folder: Path, problems: list[Problem]) -> Iterator[Export]:
+def read_exports(folder: Path, problems: list[Problem], names: Sequence[str] = ()) -> Iterator[Export]:
     """Read all records of a folder one by one; what cannot be read is noted in `problems` and left out."""
     for path in record_files(folder):
         name = path.relative_to(folder).as_posix()
         try:
-            yield read_export(inside(folder, name, name, ""), name)
+            yield read_export(inside(folder, name, name, ""), name, names)
         except RigDataError as error:
             problems.extend(error.problems)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,7 +39,7 @@ _BY_NAME = (
 class RunGuess:
     """What a record may be; loads [N] with their text in the manifest, directions in degrees, frequencies in Hz."""
 
-    file: str
+    export: Export = field(repr=False)
     kind: Entry
     lines: tuple[SpectralPeak, ...] = ()
     load: Entry = OPEN
@@ -48,6 +48,11 @@ class RunGuess:
     pad: Entry = OPEN
     speed: Entry = OPEN
     excitation: Entry = OPEN
+
+    @property
+    def file(self) -> str:
+        """Name of the record's file."""
+        return self.export.name
 
 
 def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
@@ -60,7 +65,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     load, text = _load_of(stem)
     angle = _number_before(stem, r"deg(?:ree)?s?|°|grad")
     return RunGuess(
-        file=export.name,
+        export=export,
         kind=_kind(stem, forces, moves, lines),
         lines=lines,
         load=load,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -62,149 +62,228 @@ def survey(
     pivots: Sequence[float] = (),
 ) -> Survey:
     """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
-    channels: dict[str, ChannelGuess] = {}
-    for export in exports:
-        for series in export.series:
-            if series.name not in channels:
-                guess = guess_channel(series.name, series.unit)
-                channels[series.name] = as_described(guess, (described or {}).get(series.name, {}))
-    runs = [guess_run(export, channels) for export in exports]
-    cells = _cells(exports, channels, runs, pivots)
-    if cells is not None:
-        with_axes(channels, cells)
-        runs = [_loaded(run, export, channels, cells, pivots) for run, export in zip(runs, exports, strict=True)]
-    speed = _common_line(exports, channels, runs)
-    runs = [_with_lines(run, speed) for run in runs]
-    if cells is not None:
-        _other_axes(exports, channels, runs, cells, pivots)
+    folder = _Folder(exports, described or {}, pivots)
+    folder.find_loads()
+    speed = folder.common_line()
+    folder.runs = [_with_lines(run, speed) for run in folder.runs]
+    folder.find_other_axes()
     return Survey(
         rates=tuple(e.rate for e in exports),
-        channels=channels,
-        runs=_set_points(runs),
+        channels=folder.channels,
+        runs=_set_points(folder.runs),
         speed_line=speed.number,
-        per_hertz=_tachometers(exports, channels, runs, speed.number),
+        per_hertz=folder.tachometers(speed.number),
         clock=next((e.clock for e in exports if e.clock), ""),
         nameless=max((e.nameless for e in exports), default=0),
     )
 
 
-def _pair(export: Export, names: tuple[str, str]) -> list[Series]:
+class _Folder:
+    """Channels and runs, of which more is known with every step; `cells` is the frame of the load cells."""
+
+    def __init__(
+        self, exports: Sequence[Export], described: Mapping[str, Mapping[str, Any]], pivots: Sequence[float]
+    ) -> None:
+        self.pivots = pivots
+        self.channels: dict[str, ChannelGuess] = {}
+        for export in exports:
+            for series in export.series:
+                if series.name not in self.channels:
+                    guess = guess_channel(series.name, series.unit)
+                    self.channels[series.name] = as_described(guess, described.get(series.name, {}))
+        self.runs = [guess_run(export, self.channels) for export in exports]
+        self.cells = self._frame_of_cells()
+
+    def _of_kind(self, *kinds: str) -> list[RunGuess]:
+        return [run for run in self.runs if run.kind.value in kinds]
+
+    def _steps(self, names: tuple[str, str]) -> dict[str, FloatArray]:
+        """By how much two channels change from the first to the last step of every dry test, by the run's file."""
+        steps = {}
+        for run in self._of_kind("dry_pivot"):
+            series = _pair(run, names)
+            if series and np.isfinite(change := changes(series)).all() and change.any():
+                steps[run.file] = change
+        return steps
+
+    def _pads_toward(self, files: Iterable[str]) -> list[int]:
+        """Pads that dry tests load, 0 where that is not known."""
+        pads = {run.file: run.pad.value or 0 for run in self.runs}
+        return [pads[file] if pads[file] <= len(self.pivots) else 0 for file in files]
+
+    def _frame_of_cells(self) -> Frame | None:
+        """Frame of the load cells: typed, told by dry steps toward known pads, or as their names hint."""
+        pair = next(iter(pairs(self.channels, "force")), None)
+        if pair is None:
+            return None
+        stated = stated_frame(pair, self.channels)
+        if stated is not None and stated.source == "file":
+            return stated
+        steps = self._steps(pair)
+        toward = self._pads_toward(steps)
+        readings = np.array([step for step, pad in zip(steps.values(), toward, strict=True) if pad])
+        directions = np.array([self.pivots[pad - 1] for pad in toward if pad])
+        if len(set(directions)) > 1:
+            return fitted_frame(pair, readings, directions, f"{len(readings)} dry steps toward their pads") or stated
+        if stated is None or not len(self.pivots) or len(steps) < 2:
+            return stated
+        readings = np.array(list(steps.values()))
+        hinted = stated.direction(readings)
+        nearest = np.array([self._nearest_pad(angle)[1] for angle in hinted])
+        if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
+            return stated  # the names' directions lead to no pads
+        return fitted_frame(pair, readings, nearest, f"its name and {len(steps)} dry steps toward pads") or stated
+
+    def _nearest_pad(self, angle: float) -> tuple[int, float]:
+        """Number and angle [rad] of the pad nearest to a direction."""
+        number = int(np.argmax(np.cos(np.asarray(self.pivots) - angle)))
+        return number + 1, float(self.pivots[number])
+
+    def find_loads(self) -> None:
+        """Give the load cells their axes, and the runs direction, load and pad as the cells tell them."""
+        if self.cells is not None:
+            with_axes(self.channels, self.cells)
+            self.runs = [self._loaded(run, self.cells) for run in self.runs]
+
+    def _loaded(self, run: RunGuess, cells: Frame) -> RunGuess:
+        series = _pair(run, cells.names)
+        if not series or run.kind.value == "clearance":
+            return run
+        is_dry = run.kind.value == "dry_pivot"
+        force = changes(series) if is_dry else means(series)
+        if not force.any() or not np.isfinite(force).all():
+            return run
+        angle = float(cells.direction(force))
+        source = "guess" if cells.source == "guess" else "records"
+        degrees = folded(math.degrees(angle))
+        reason = f"cells {degrees:g} deg" + (", if their axes hold" if source == "guess" else "")
+        if run.direction.source != "file":
+            run = replace(run, direction=Entry(float(round(degrees)), source, reason))
+        if is_dry and len(self.pivots):
+            number, pivot = self._nearest_pad(angle)
+            off = math.degrees(abs(math.remainder(pivot - angle, 2 * math.pi)))
+            if off <= _TOWARD and run.pad.value in (None, number):
+                pad = run.pad if run.pad.value else Entry(number, source, f"{reason}, {off:.1f} deg from it")
+                return replace(run, pad=pad, direction=replace(run.direction, value=folded(math.degrees(pivot))))
+            if run.pad.value:
+                return replace(run, pad=replace(run.pad, source="guess", reason=f"the file's name; {reason}"))
+        newtons = force * [self.channels[name].gain for name in cells.names]
+        return run if is_dry or not np.isfinite(newtons).all() else _with_load(run, float(np.hypot(*newtons)))
+
+    def find_other_axes(self) -> None:
+        """Axes of probes by dry steps or the sweep, of accelerometers by the excitation; hints where these fail."""
+        cells = self.cells
+        if cells is None:
+            return
+        forces = self._steps(cells.names)
+        for pair in pairs(self.channels, "displacement"):
+            steps = {file: step for file, step in self._steps(pair).items() if file in forces}
+            directions = np.array([float(cells.direction(forces[file])) for file in steps])
+            toward = self._pads_toward(steps)
+            if all(toward):
+                directions = np.array([self.pivots[pad - 1] for pad in toward])
+            places = np.array([ends(_pair(run, pair)) for run in self.runs if run.file in steps])
+            frames = [
+                fitted_frame(pair, np.array(list(steps.values())), directions, f"{len(steps)} dry steps"),
+                _frame_by_contacts(pair, places, directions),
+                self._frame_by_sweep(pair, cells),
+            ]
+            if proposals := [frame for frame in frames if frame is not None]:
+                with_axes(self.channels, min(proposals, key=lambda frame: frame.error))
+        for pair in pairs(self.channels, "acceleration"):
+            frame = self._frame_by_excitation(pair, cells) or stated_frame(pair, self.channels)
+            if frame is not None:
+                with_axes(self.channels, frame)
+
+    def _frame_by_sweep(self, pair: tuple[str, str], cells: Frame) -> Frame | None:
+        """Frame of two probes by a small load that goes around: the shaft follows it from corner to corner."""
+        for run in self._of_kind("clearance"):
+            probes, forces = _pair(run, pair), _pair(run, cells.names)
+            if probes and forces:
+                directions = cells.direction(sweep_readings(forces))
+                return fitted_frame(pair, sweep_readings(probes), directions, "the clearance sweep", _CORNERS)
+        return None
+
+    def _frame_by_excitation(self, pair: tuple[str, str], cells: Frame) -> Frame | None:
+        """Frame of two accelerometers: the housing gives way to the force on its cells along the excitation."""
+        readings, directions = [], []
+        for run in self._of_kind("dynamic"):
+            housing, forces = _pair(run, pair), _pair(run, cells.names)
+            frequency = run.excitation.number
+            if housing and forces and frequency > 0:
+                force, acceleration = along(line_phasors(forces, frequency), line_phasors(housing, frequency))
+                readings.append(acceleration)
+                directions.append(float(cells.direction(force)))
+        if not readings:
+            return None
+        reason = f"the excitation of {len(readings)} runs"
+        return fitted_frame(pair, np.array(readings), np.array(directions), reason)
+
+    def tachometers(self, line: float) -> dict[str, float]:
+        """Reading per hertz of speed channels in volts, where it is one in all running records."""
+        per_hertz: dict[str, float] = {}
+        if not math.isfinite(line):
+            return per_hertz
+        ratios: dict[str, list[float]] = {}
+        for run in self._of_kind("dynamic", "locus"):
+            for series in of_quantity(run.export, self.channels, "speed"):
+                if not quantity_of_unit(self.channels[series.name].unit):
+                    ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
+        for name, values in ratios.items():
+            low, high = min(values), max(values)
+            if low > 0 and high - low <= NEAR * high:
+                per_hertz[name] = sorted(values)[len(values) // 2]
+        return per_hertz
+
+    def common_line(self) -> Entry:
+        """Shaft speed [Hz]: line of all running records' displacements, besides an excitation that its name states."""
+        running = []
+        for run in self._of_kind("dynamic", "locus"):
+            peaks = strongest_lines(of_quantity(run.export, self.channels, "displacement"))
+            driven = run.excitation.number
+            running.append([p.frequency for p in peaks if not abs(p.frequency - driven) <= NEAR * p.frequency])
+        if len(running) < 2:
+            return Entry()
+        frequencies = np.sort(np.concatenate(running))
+        # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
+        order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -_count(frequencies, 2 * f), f))
+        least = _MOST_OF * len(running)
+        for candidate in order:
+            near = frequencies[np.abs(frequencies - candidate) < NEAR * candidate]
+            if len(near) < least:
+                continue
+            half = frequencies[np.abs(2 * frequencies - candidate) < NEAR * candidate]
+            speeds = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
+            speed = float(speeds[len(speeds) // 2])
+            once, twice = _count(frequencies, speed), _count(frequencies, 2 * speed)
+            mains = "; it may be the mains" if is_mains(speed) else ""
+            text = f"this line is in {once} of {len(running)} records{mains}"
+            if min(once, twice) < least or mains:
+                return Entry(speed, "guess", text)
+            return Entry(speed, "records", f"{text}, twice it in {twice}")
+        return Entry()
+
+
+def _count(frequencies: FloatArray, frequency: float) -> int:
+    """How many of the lines (n,) [Hz] are near a frequency."""
+    return int((np.abs(frequencies - frequency) < NEAR * frequency).sum())
+
+
+def _pair(run: RunGuess, names: tuple[str, str]) -> list[Series]:
     """The two channels of a record; empty where one is missing or both never move."""
-    series = {s.name: s for s in export.series}
+    series = {s.name: s for s in run.export.series}
     chosen = [series[name] for name in names if name in series]
     return chosen if len(chosen) == 2 and any(np.isfinite(s.values).any() for s in chosen) else []
 
 
-def _steps(exports: Sequence[Export], runs: Sequence[RunGuess], names: tuple[str, str]) -> dict[int, FloatArray]:
-    """By how much two channels change from the first to the last step of every dry test, by the run's number."""
-    steps = {}
-    for number, (export, run) in enumerate(zip(exports, runs, strict=True)):
-        series = _pair(export, names) if run.kind.value == "dry_pivot" else []
-        if series and np.isfinite(change := changes(series)).all() and change.any():
-            steps[number] = change
-    return steps
-
-
-def _cells(
-    exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], pivots: Sequence[float]
-) -> Frame | None:
-    """Frame of the load cells: typed, told by dry steps toward known pads, or as their names hint."""
-    pair = next(iter(pairs(channels, "force")), None)
-    if pair is None:
-        return None
-    stated = stated_frame(pair, channels)
-    if stated is not None and stated.source == "file":
-        return stated
-    steps = _steps(exports, runs, pair)
-    toward = {i: runs[i].pad.value for i in steps if 0 < (runs[i].pad.value or 0) <= len(pivots)}
-    if len(set(toward.values())) > 1:
-        directions = np.array([pivots[pad - 1] for pad in toward.values()])
-        reason = f"{len(toward)} dry steps toward their pads"
-        fitted = fitted_frame(pair, np.array([steps[i] for i in toward]), directions, reason)
-        return fitted or stated
-    if stated is None or not len(pivots) or len(steps) < 2:
-        return stated
-    readings = np.array(list(steps.values()))
-    hinted = stated.direction(readings)
-    nearest = np.array([_nearest_pad(angle, pivots)[1] for angle in hinted])
-    if np.abs(np.angle(np.exp(1j * (hinted - nearest)))).max() > math.radians(_ALIKE):
-        return stated  # the names' directions lead to no pads
-    return fitted_frame(pair, readings, nearest, f"its name and {len(steps)} dry steps toward pads") or stated
-
-
-def _nearest_pad(angle: float, pivots: Sequence[float]) -> tuple[int, float]:
-    """Number and angle [rad] of the pad nearest to a direction."""
-    number = int(np.argmax(np.cos(np.asarray(pivots) - angle)))
-    return number + 1, float(pivots[number])
-
-
-def _loaded(
-    run: RunGuess, export: Export, channels: Mapping[str, ChannelGuess], cells: Frame, pivots: Sequence[float]
-) -> RunGuess:
-    """A run with direction, load and pad as the cells tell them."""
-    series = _pair(export, cells.names)
-    if not series or run.kind.value == "clearance":
-        return run
-    is_dry = run.kind.value == "dry_pivot"
-    force = changes(series) if is_dry else means(series)
-    if not force.any() or not np.isfinite(force).all():
-        return run
-    angle = float(cells.direction(force))
-    source = "guess" if cells.source == "guess" else "records"
-    degrees = folded(math.degrees(angle))
-    reason = f"cells {degrees:g} deg" + (", if their axes hold" if source == "guess" else "")
-    if run.direction.source != "file":
-        run = replace(run, direction=Entry(float(round(degrees)), source, reason))
-    if is_dry and len(pivots):
-        number, pivot = _nearest_pad(angle, pivots)
-        off = math.degrees(abs(math.remainder(pivot - angle, 2 * math.pi)))
-        if off <= _TOWARD and run.pad.value in (None, number):
-            pad = run.pad if run.pad.value else Entry(number, source, f"{reason}, {off:.1f} deg from it")
-            return replace(run, pad=pad, direction=replace(run.direction, value=folded(math.degrees(pivot))))
-        if run.pad.value:
-            return replace(run, pad=replace(run.pad, source="guess", reason=f"the file's name; {reason}"))
-    gains = [channels[name].gain for name in cells.names]
-    return run if is_dry or not all(map(math.isfinite, gains)) else _with_load(run, force * gains, channels, cells)
-
-
-def _with_load(run: RunGuess, force: FloatArray, channels: Mapping[str, ChannelGuess], cells: Frame) -> RunGuess:
+def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
-    load = float(np.hypot(*force))
     kilonewtons = f"{load / 1e3:.3g} kN"
     if run.load.source == "file":
         if abs(load - run.load.number) <= _CONTRADICTS * run.load.number:
             return run
         return replace(run, load=replace(run.load, source="guess", reason=f"the file's name; cells {kilonewtons}"))
     return replace(run, load=Entry(load, "records", f"cells {kilonewtons}"), load_text="")
-
-
-def _other_axes(
-    exports: Sequence[Export],
-    channels: dict[str, ChannelGuess],
-    runs: Sequence[RunGuess],
-    cells: Frame,
-    pivots: Sequence[float],
-) -> None:
-    """Axes of probes by the dry steps, or the sweep; of accelerometers by the excitation; hints where these fail."""
-    forces = _steps(exports, runs, cells.names)
-    for pair in pairs(channels, "displacement"):
-        steps = _steps(exports, runs, pair)
-        used = [i for i in steps if i in forces]
-        directions = np.array([float(cells.direction(forces[i])) for i in used])
-        toward = [runs[i].pad.value for i in used]
-        if all(0 < (pad or 0) <= len(pivots) for pad in toward):
-            directions = np.array([pivots[pad - 1] for pad in toward])
-        frames = [
-            fitted_frame(pair, np.array([steps[i] for i in used]), directions, f"{len(used)} dry steps"),
-            _frame_by_contacts(pair, np.array([ends(_pair(exports[i], pair)) for i in used]), directions),
-            _frame_by_sweep(exports, runs, pair, cells),
-        ]
-        if proposals := [frame for frame in frames if frame is not None]:
-            with_axes(channels, min(proposals, key=lambda frame: frame.error))
-    for pair in pairs(channels, "acceleration"):
-        frame = _frame_by_excitation(exports, runs, pair, cells) or stated_frame(pair, channels)
-        if frame is not None:
-            with_axes(channels, frame)
 
 
 def _frame_by_contacts(pair: tuple[str, str], places: FloatArray, directions: FloatArray) -> Frame | None:
@@ -214,36 +293,6 @@ def _frame_by_contacts(pair: tuple[str, str], places: FloatArray, directions: Fl
     apart = np.exp(1j * directions) - np.exp(1j * directions).mean()
     reason = f"where {len(places)} dry steps end"
     return fitted_frame(pair, places - places.mean(axis=0), np.angle(apart), reason)
-
-
-def _frame_by_sweep(
-    exports: Sequence[Export], runs: Sequence[RunGuess], pair: tuple[str, str], cells: Frame
-) -> Frame | None:
-    """Frame of two probes by a small load that goes around: the shaft follows it from corner to corner."""
-    for export, run in zip(exports, runs, strict=True):
-        probes, forces = _pair(export, pair), _pair(export, cells.names)
-        if run.kind.value == "clearance" and probes and forces:
-            directions = cells.direction(sweep_readings(forces))
-            return fitted_frame(pair, sweep_readings(probes), directions, "the clearance sweep", _CORNERS)
-    return None
-
-
-def _frame_by_excitation(
-    exports: Sequence[Export], runs: Sequence[RunGuess], pair: tuple[str, str], cells: Frame
-) -> Frame | None:
-    """Frame of two accelerometers: the housing gives way to the force on its cells along the excitation."""
-    readings, directions = [], []
-    for export, run in zip(exports, runs, strict=True):
-        housing, forces = _pair(export, pair), _pair(export, cells.names)
-        frequency = run.excitation.number
-        if run.kind.value == "dynamic" and housing and forces and frequency > 0:
-            force, acceleration = along(line_phasors(forces, frequency), line_phasors(housing, frequency))
-            readings.append(acceleration)
-            directions.append(float(cells.direction(force)))
-    if not readings:
-        return None
-    reason = f"the excitation of {len(readings)} runs"
-    return fitted_frame(pair, np.array(readings), np.array(directions), reason)
 
 
 def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
@@ -325,56 +374,6 @@ def _common(
     return set_points
 
 
-def _tachometers(
-    exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess], line: float
-) -> dict[str, float]:
-    """Reading per hertz of speed channels in volts, where it is one in all running records."""
-    per_hertz: dict[str, float] = {}
-    if not math.isfinite(line):
-        return per_hertz
-    ratios: dict[str, list[float]] = {}
-    for export, run in zip(exports, runs, strict=True):
-        for series in of_quantity(export, channels, "speed") if run.kind.value in ("dynamic", "locus") else ():
-            if not quantity_of_unit(channels[series.name].unit):
-                ratios.setdefault(series.name, []).append(float(np.nanmedian(series.values)) / line)
-    for name, values in ratios.items():
-        low, high = min(values), max(values)
-        if low > 0 and high - low <= NEAR * high:
-            per_hertz[name] = sorted(values)[len(values) // 2]
-    return per_hertz
-
-
 def is_mains(frequency: float) -> bool:
     """Whether a frequency [Hz] is that of the mains."""
     return any(abs(frequency - mains) < _MAINS_NEAR * mains for mains in MAINS_FREQUENCIES)
-
-
-def _common_line(exports: Sequence[Export], channels: Mapping[str, ChannelGuess], runs: Sequence[RunGuess]) -> Entry:
-    """Shaft speed [Hz]: line of all running records' displacements, besides an excitation that its name states."""
-    running = []
-    for export, run in zip(exports, runs, strict=True):
-        if run.kind.value in ("dynamic", "locus"):
-            peaks = strongest_lines(of_quantity(export, channels, "displacement"))
-            driven = run.excitation.number
-            running.append([p.frequency for p in peaks if not abs(p.frequency - driven) <= NEAR * p.frequency])
-    if len(running) < 2:
-        return Entry()
-    frequencies = np.sort(np.concatenate(running))
-
-    def count(frequency: float) -> int:
-        return int((np.abs(frequencies - frequency) < NEAR * frequency).sum())
-
-    # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
-    order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -count(2 * f), f))
-    for candidate in order:
-        near = frequencies[np.abs(frequencies - candidate) < NEAR * candidate]
-        if len(near) >= _MOST_OF * len(running):
-            half = frequencies[np.abs(2 * frequencies - candidate) < NEAR * candidate]
-            speeds = half if 2 * len(half) >= len(near) else near  # an oval shaft shows twice its speed more often
-            speed = float(speeds[len(speeds) // 2])
-            mains = "; it may be the mains" if is_mains(speed) else ""
-            text = f"this line is in {count(speed)} of {len(running)} records{mains}"
-            if min(count(speed), count(2 * speed)) < _MOST_OF * len(running) or mains:
-                return Entry(speed, "guess", text)
-            return Entry(speed, "records", f"{text}, twice it in {count(2 * speed)}")
-    return Entry()

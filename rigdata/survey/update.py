@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from rigdata.manifest.fields import MARK, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
-from rigdata.readers.series import is_time, seconds
 from rigdata.survey.draft import channel_blocks, run_lines
 from rigdata.survey.exports import Export
 from rigdata.survey.survey import Survey, survey
@@ -64,9 +63,7 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     before, after = survey(exports, pivots=pivots), survey(exports, described, pivots)
     for merges in (True, False):
         blocks = _blocks(text)
-        changes: list[str] = []
-        _update_channels(blocks, before, after, changes, merges)
-        _update_runs(blocks, before, after, changes, merges)
+        changes = _update(blocks, _tables(before) if merges else None, _tables(after))
         new = "\n".join("\n".join(block.lines).rstrip() + "\n" for block in blocks if block.lines)
         if not merges or _faults(new) <= _faults(text):
             break
@@ -90,50 +87,56 @@ def _blocks(text: str) -> list[_Block]:
         if line.startswith("["):
             parts.append([])
         parts[-1].append(line)
-    blocks = []
-    for lines in parts:
-        try:
-            data = tomllib.loads("\n".join(lines))
-        except tomllib.TOMLDecodeError:  # a text over several lines that begins one with a bracket
-            data = {}
-        kind = next(iter(data), "") if lines and lines[0].startswith("[") else ""
-        inner = data.get(kind, {})
-        name = ""
-        if kind == "channels" and isinstance(inner, dict):
-            name, inner = next(iter(inner.items()), ("", {}))
-        elif kind == "runs" and isinstance(inner, list):
-            inner = inner[0] if inner else {}
-            name = str(inner.get("file", "")) if isinstance(inner, dict) else ""
-        blocks.append(_Block(kind, str(name), lines, inner if isinstance(inner, dict) else {}))
-    return blocks
+    return [_block(lines) for lines in parts]
 
 
-def _update_channels(blocks: list[_Block], before: Survey, after: Survey, changes: list[str], merges: bool) -> None:
-    present = {b.name for b in blocks if b.kind == "channels"}
-    old, new = channel_blocks(before), channel_blocks(after)
+def _block(lines: list[str]) -> _Block:
+    """A table by its heading; what is neither a channel nor a run has no kind."""
+    heading = lines[0].replace(" ", "") if lines else ""
+    try:
+        data = tomllib.loads("\n".join(lines))
+    except tomllib.TOMLDecodeError:  # a text over several lines that begins one with a bracket
+        heading = ""
+    if heading.startswith("[[runs]]"):
+        (run,) = data["runs"]
+        return _Block("runs", str(run.get("file", "")), lines, run)
+    if heading.startswith("[channels."):
+        ((name, channel),) = data["channels"].items()
+        return _Block("channels", name, lines, channel)
+    return _Block("", "", lines, {})
+
+
+def _tables(surveyed: Survey) -> dict[tuple[str, str], list[str]]:
+    """Lines of all tables that a draft has for channels and runs, by kind and name."""
+    tables = {("channels", name): lines for name, lines in channel_blocks(surveyed).items()}
+    return tables | {("runs", run.file): run_lines(run) for run in surveyed.runs}
+
+
+def _update(
+    blocks: list[_Block],
+    old: dict[tuple[str, str], list[str]] | None,
+    new: dict[tuple[str, str], list[str]],
+) -> list[str]:
+    """Merge the tables of a draft into the blocks; the `old` ones tell guesses from what was typed. Add new tables."""
+    changes: list[str] = []
     for block in blocks:
-        if merges and block.kind == "channels" and block.name in new:
-            _merge(block, new[block.name], old.get(block.name, []), f"channel {block.name}", changes)
-    fresh = [_Block("channels", name, lines, {}) for name, lines in new.items() if name not in present]
-    changes += [f"channel {b.name}: new" for b in fresh]
-    at = next((i for i, b in enumerate(blocks) if b.kind == "runs"), len(blocks))
-    blocks[at:at] = fresh
-
-
-def _update_runs(blocks: list[_Block], before: Survey, after: Survey, changes: list[str], merges: bool) -> None:
-    old = {run.file: run_lines(run) for run in before.runs}
-    new = {run.file: run_lines(run) for run in after.runs}
-    present = {b.name for b in blocks if b.kind == "runs"}
-    for block in blocks:
-        run = f"run {block.data.get('id', block.name)}"
-        if merges and block.kind == "runs" and block.name in new:
-            _merge(block, new[block.name], old[block.name], run, changes)
-        elif block.kind == "runs" and block.name and block.name not in new:
-            changes.append(f"{run}: its file {block.name} is not there; left as it is")
-    for name, lines in new.items():
-        if name not in present:
-            blocks.append(_Block("runs", name, lines, {}))
-            changes.append(f"run {name}: new")
+        key = block.kind, block.name
+        place = f"channel {block.name}" if block.kind == "channels" else f"run {block.data.get('id', block.name)}"
+        if old is not None and key in new:
+            _merge(block, new[key], old.get(key, []), place, changes)
+        elif block.kind == "runs" and block.name and key not in new:
+            changes.append(f"{place}: its file {block.name} is not there; left as it is")
+    present = {(block.kind, block.name) for block in blocks}
+    first_run = next((i for i, block in enumerate(blocks) if block.kind == "runs"), len(blocks))
+    for (kind, name), lines in new.items():
+        if (kind, name) in present:
+            continue
+        changes.append(f"{kind.removesuffix('s')} {name}: new")
+        at = len(blocks)
+        if kind == "channels":
+            at, first_run = first_run, first_run + 1
+        blocks.insert(at, _Block(kind, name, lines, {}))
+    return changes
 
 
 def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
@@ -182,18 +185,3 @@ def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
         if key:
             entries[key] = (value, line)
     return entries
-
-
-def renamed(export: Export, names: Sequence[str]) -> Export:
-    """An export whose nameless columns bear the names of the manifest."""
-
-    def name(old: str) -> str:
-        number = old.removeprefix("column")
-        return names[int(number) - 1] if number.isdigit() and 0 < int(number) <= len(names) else old
-
-    series = tuple(replace(s, name=name(s.name)) for s in export.series)
-    clock = name(export.clock)
-    if not clock and (times := next((s for s in series if is_time(s.name)), None)) is not None:
-        series = tuple(replace(s, time=seconds(times.values, times.unit)) for s in series if s is not times)
-        clock = times.name
-    return replace(export, series=series, clock=clock)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -31,13 +30,12 @@ def write_campaign(
     rig: VirtualRig,
     layout: str | Layout = "hdf5",
     *,
-    overwrite: bool = False,
     progress: Progress | None = None,
 ) -> CampaignTruth:
     """Write a campaign in the `tpjb-rig/1` format."""
     target = Path(out)
     chosen = layout_named(layout)
-    _check_target(target, chosen, overwrite)
+    _check_target(target)
     _check_faults(rig, chosen)
     rig = replace(rig, truth=rig.truth.remembered())
     runs = rig.runs()
@@ -53,7 +51,7 @@ def write_campaign(
         else:
             _write_csv(draft, rig, manifest, records, chosen)
         truth = campaign_truth(rig, facts)
-        _put_in_place(draft, target, Path(spare))
+        os.rename(draft, target)
     return truth
 
 
@@ -71,25 +69,11 @@ def _written_records(
             progress(done, total, record.run.id)
 
 
-def _check_target(target: Path, layout: Layout, overwrite: bool) -> None:
+def _check_target(target: Path) -> None:
     if not target.parent.is_dir():
         raise VirtualRigError(f"{target.parent} is not a folder; make it first")
-    if not os.path.lexists(target):
-        return
-    if not overwrite:
-        raise VirtualRigError(f"{target} exists; choose another name, or allow it to be overwritten")
-    if target.is_symlink():
-        raise VirtualRigError(f"{target} is a symbolic link; it is not followed, choose another name")
-    if isinstance(layout, CsvLayout):
-        if not (target.is_dir() and (target / "campaign.toml").is_file()):
-            raise VirtualRigError(f"{target} is not a campaign folder; it is not replaced")
-    elif not (target.is_file() and _is_hdf5(target)):
-        raise VirtualRigError(f"{target} is not an HDF5 file; it is not replaced")
-
-
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(8) == b"\x89HDF\r\n\x1a\n"
+    if os.path.lexists(target):
+        raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
 
 
 def _check_faults(rig: VirtualRig, layout: Layout) -> None:
@@ -102,23 +86,6 @@ def _check_faults(rig: VirtualRig, layout: Layout) -> None:
             raise VirtualRigError(f"fault {fault.kind!r} needs a time column; give the layout a time_name")
 
 
-def _put_in_place(draft: Path, target: Path, spare: Path) -> None:
-    if not draft.is_dir():
-        os.replace(draft, target)
-        return
-    # a folder cannot be renamed onto a full one: the old campaign steps aside first
-    former = spare / "old"
-    if target.exists():
-        os.rename(target, former)
-    try:
-        os.rename(draft, target)
-    except OSError:
-        if former.exists():
-            os.rename(former, target)
-        raise
-    shutil.rmtree(former, ignore_errors=True)
-
-
 def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, layout: Hdf5Layout) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
@@ -126,37 +93,37 @@ def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, l
     """
     import h5py
 
-    precision = layout.precision or ("float64" if rig.noise.bits is None else "float32")
+    kind = np.dtype("float64" if rig.noise.bits is None else "float32")
     with h5py.File(path, "w-", libver="earliest") as file:
         file.attrs["manifest"] = manifest
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
         for record, faults in records:
-            _write_record(groups.create_group(record.run.id), record, layout, precision, faults)
+            _write_record(groups.create_group(record.run.id), record, layout, kind, faults)
         for run in rig.runs():
             if run.record != run.id and run.record in groups:
                 groups[run.id] = groups[run.record]  # a hard link
 
 
 def _write_record(
-    group: Any, record: SimulatedRun, layout: Hdf5Layout, precision: str, faults: tuple[Fault, ...]
+    group: Any, record: SimulatedRun, layout: Hdf5Layout, kind: np.dtype, faults: tuple[Fault, ...]
 ) -> None:
     group.attrs["sample_rate_hz"] = float(record.readings.rate)
     length = 0 if _has("empty_file", faults) else len(record.readings.time)
     if layout.time_name is not None:
-        _write_dataset(group, layout.time_name, record.readings.time[:length], layout)
+        _write_dataset(group, layout.time_name, record.readings.time[:length])
     for name, values in record.readings.columns.items():
         if _has("missing_channel", faults, name):
             continue
         count = length * 3 // 4 if _has("short_channel", faults, name) else length
-        _write_dataset(group, name, values[:count].astype(np.dtype(precision)), layout)
+        _write_dataset(group, name, values[:count].astype(kind))
 
 
-def _write_dataset(group: Any, name: str, values: FloatArray, layout: Hdf5Layout) -> None:
+def _write_dataset(group: Any, name: str, values: FloatArray) -> None:
     packing: dict[str, Any] = {}
-    if layout.compression and len(values):
+    if len(values):
         chunks = (min(len(values), 16384),)
-        packing = {"compression": "gzip", "compression_opts": layout.compression, "shuffle": True, "chunks": chunks}
+        packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks}
     group.create_dataset(name, data=values, track_times=False, **packing)
 
 
@@ -212,4 +179,4 @@ def _rows(table: np.ndarray, forms: list[str], layout: CsvLayout, tail: str) -> 
 
 def _has(kind: str, faults: tuple[Fault, ...], channel: str | None = None) -> bool:
     """Whether one of a record's faults is of a kind, and in a channel."""
-    return any(f.kind == kind and f.affects("*", channel) for f in faults)
+    return any(f.kind == kind and (channel is None or f.is_in(channel)) for f in faults)

@@ -92,11 +92,13 @@ class Fault:
         """Where it sits."""
         return KINDS[self.kind][0]
 
-    def affects(self, run: str, channel: str | None = None) -> bool:
-        """Whether it concerns a run, and a channel of it."""
-        return fnmatchcase(run, self.run) and (
-            channel is None or self.channel is None or fnmatchcase(channel, self.channel)
-        )
+    def affects(self, run: str) -> bool:
+        """Whether it concerns a run."""
+        return fnmatchcase(run, self.run)
+
+    def is_in(self, channel: str) -> bool:
+        """Whether it concerns a channel of its runs."""
+        return self.channel is None or fnmatchcase(channel, self.channel)
 
 
 def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterable[str]) -> None:
@@ -112,12 +114,12 @@ def check_faults(faults: Iterable[Fault], runs: Iterable[str], channels: Iterabl
             raise VirtualRigError(f"fault {fault.kind!r}: there is no {fault.other!r} among {candidates}")
 
 
-def faulty_instruments(instruments: Instruments, faults: Iterable[Fault], run: str) -> Instruments:
-    """Instruments of one run, with the faults of its sensors."""
+def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
+    """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
     sensors = list(instruments.sensors)
     for fault in faults:
         for i, sensor in enumerate(sensors):
-            if fault.place == "sensor" and fault.affects(run, sensor.name) and fault.value is not None:
+            if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
                 sensors[i] = _faulty_sensor(sensor, fault.kind, fault.value)
     return replace(instruments, sensors=tuple(sensors))
 
@@ -133,14 +135,13 @@ def spoil_record(
     readings: Readings,
     instruments: Instruments,
     faults: Iterable[Fault],
-    run: str,
     rng: np.random.Generator,
 ) -> Readings:
-    """Readings with the record faults of this run; the given ones stay as they are."""
+    """Readings with the record faults of their run; the given ones stay as they are."""
     columns = dict(readings.columns)
     time = readings.time
     for fault in faults:
-        if fault.place != "record" or not fault.affects(run):
+        if fault.place != "record":
             continue
         if fault.kind == "time_gap":
             recorded = ~_window(fault, time)
@@ -152,7 +153,7 @@ def spoil_record(
             columns[fault.channel], columns[fault.other] = columns[fault.other], columns[fault.channel]
         else:
             for name in columns:
-                if fault.affects(run, name):
+                if fault.is_in(name):
                     columns[name] = _spoilt(columns[name], fault, instruments.named(name), time)
     return Readings(time, columns, readings.rate)
 

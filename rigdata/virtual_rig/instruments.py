@@ -10,6 +10,7 @@ from math import radians
 
 import numpy as np
 
+from rigdata.vector import directions
 from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 _STANDARD_GRAVITY = 9.80665
@@ -85,7 +86,7 @@ class Sensor:
         if self.axis is None:
             raise VirtualRigError(f"channel {self.name} has no axis")
         angle = self.axis + (0.0 if stated else self.error.angle)
-        return np.array([np.cos(angle), np.sin(angle)])
+        return directions(angle)
 
 
 @dataclass(frozen=True)

@@ -39,13 +39,7 @@ class CsvLayout:
 class Hdf5Layout:
     """One HDF5 file, a group per run, a dataset per channel."""
 
-    precision: str | None = None
-    compression: int = 4
     time_name: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.precision not in (None, "float32", "float64"):
-            raise VirtualRigError(f'precision must be "float32" or "float64", got {self.precision!r}')
 
 
 Layout = CsvLayout | Hdf5Layout

@@ -86,7 +86,7 @@ def run_facts(record: SimulatedRun) -> dict[str, object]:
     return {
         "kind": record.run.kind,
         "recorded_in": record.source,
-        **record.physics.facts,
+        **record.motion.facts,
         "glitches": [asdict(glitch) for glitch in record.glitches],
     }
 

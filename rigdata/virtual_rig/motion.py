@@ -6,14 +6,14 @@ there are dry load steps toward one pad, and a small load swept once around the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.vector import directions
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
@@ -21,40 +21,6 @@ from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector
 
 _SETTLING = 0.1  # time constant of an overshoot [s]
 _UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one
-
-
-class Motion(Protocol):
-    """A run's physics, to be sampled at any time."""
-
-    @property
-    def temperature(self) -> FloatArray:
-        """Film temperatures (n_pads,) [degC]."""
-
-    @property
-    def speed(self) -> float:
-        """Shaft speed [rad/s]."""
-
-    def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) -> (n, 2).
-
-        Parameters
-        ----------
-        quantity : str
-            ``"displacement"`` [m], ``"force"`` [N] or ``"acceleration"`` [m/s^2].
-        time : (n,) ndarray
-            [s]
-        """
-
-    def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """Surface runout (n,) [m] that a probe at `axis` [rad] sees.
-
-        Parameters
-        ----------
-        axis : float
-            Direction [rad].
-        time : (n,) ndarray
-            [s]
-        """
 
 
 @dataclass(frozen=True)
@@ -73,19 +39,23 @@ class MotionLine:
 
 
 @dataclass(frozen=True)
-class _SteadyMotion:
-    """A mean state with spectral lines on it."""
+class Motion:
+    """What shaft and housing do in one run, to be sampled at any time: a mean state, and spectral lines on it."""
 
-    position: FloatArray  #: (2,) each: m, N
-    load: FloatArray
-    lines: tuple[MotionLine, ...]
+    time: FloatArray = field(repr=False)  #: (n,), s: of the samples
+    position: FloatArray = field(repr=False)  #: (2,) or, of a quasi-static test, (n, 2): m
+    load: FloatArray = field(repr=False)  #: the same, N
     temperature: FloatArray  #: (n_pads,), degC
-    speed: float  #: rad/s, about +z
-    surface: ComplexArray  #: (n_orders,), runout of 1X, 2X, ... [m]
+    facts: Mapping[str, object]
+    lines: tuple[MotionLine, ...] = ()
+    speed: float = 0.0  #: rad/s, about +z
+    surface: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))  #: runout of 1X, 2X, ... [m]
 
     def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`; (n, 2) at `time` (n,) [s]."""
+        """X and Y of "displacement" [m], "force" [N] or "acceleration" [m/s^2] at `time` (n,) [s] -> (n, 2)."""
         mean = {"displacement": self.position, "force": self.load}.get(quantity, np.zeros(2))
+        if mean.ndim == 2 and not np.array_equal(time, self.time):
+            mean = np.stack([np.interp(time, self.time, column) for column in mean.T], axis=1)
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
             phasor = line.phasor(quantity)
@@ -94,48 +64,18 @@ class _SteadyMotion:
         return out
 
     def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`. A point of the surface passes the probe at `axis` that much later."""
+        """Surface runout (n,) [m] that a probe at `axis` [rad] sees: a point of the surface passes it that much later.
+
+        Of a shaft that does not turn it is part of the gap voltage.
+        """
         out = np.zeros(len(time))
         for order, phasor in enumerate(self.surface, 1):
             out += (phasor * np.exp(1j * order * (self.speed * time - axis))).real
         return out
 
 
-@dataclass(frozen=True)
-class _SlowMotion:
-    """A quasi-static test, given on a time grid: no accelerations, no rotation."""
-
-    time: FloatArray  #: (n,), s
-    position: FloatArray  #: (n, 2) each: m, N
-    load: FloatArray
-    temperature: FloatArray  #: (n_pads,), degC
-    speed: float = 0.0
-
-    def at(self, quantity: str, time: FloatArray) -> FloatArray:
-        """See `Motion`."""
-        if quantity == "acceleration":
-            return np.zeros((len(time), 2))
-        values = self.position if quantity == "displacement" else self.load
-        if time is self.time or np.array_equal(time, self.time):
-            return values.copy()
-        return np.stack([np.interp(time, self.time, column) for column in values.T], axis=1)
-
-    def runout(self, axis: float, time: FloatArray) -> FloatArray:
-        """See `Motion`: the shaft does not turn, its runout is part of the gap voltage."""
-        return np.zeros(len(time))
-
-
-@dataclass(frozen=True)
-class RunPhysics:
-    """A run as it really was."""
-
-    time: FloatArray = field(repr=False)  #: (n,), s
-    motion: Motion = field(repr=False)
-    facts: Mapping[str, object]
-
-
-def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a dynamic or locus run.
+def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, noise: Noise, seed: int) -> Motion:
+    """Motion in a dynamic or locus run.
 
     The actuators' force goes through the film: F_oil = H d at every line, d shaft relative to housing. The
     housing stands on its cells, so F_oil = F_cell + m_h a_h with F_cell = k_cell x_h.
@@ -144,8 +84,6 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
         raise VirtualRigError(f"run {run.id} needs a set point")
     rng = stream(seed, run.record, "physics")
     actual = _missed(run.point, noise, rng)
-    stiffness_point = actual if noise.set_point.stiffness_follows else run.point
-    position_point = actual if noise.set_point.position_follows else run.point
     shaft_angle = rng.uniform(0, 2 * np.pi)
     forces = _actuator_forces(run, noise, rng)
     unbalance = noise.shaft.unbalance * actual.shaft_speed**2
@@ -156,21 +94,22 @@ def running_physics(run: PlannedRun, truth: RigTruth, instruments: Instruments, 
     runout = np.array(noise.shaft.runout, dtype=float)
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
     orders = np.arange(1, len(runout) + 1)
-    steady = replace(position_point, excitation=0.0)
+    steady = replace(actual, excitation=0.0)
     lines = []
     for frequency, force in forces:
-        h = truth.h(replace(stiffness_point, excitation=frequency))
+        h = truth.h(replace(actual, excitation=frequency))
         lines.append(answer(frequency, force, h, instruments))
-    motion = _SteadyMotion(
-        position=truth.centre(steady),
+    position = truth.centre(steady)
+    return Motion(
+        time=np.arange(round(run.seconds * run.rate)) / run.rate,
+        position=position,
         load=load_vector(actual),
-        lines=tuple(lines),
         temperature=truth.temperatures(steady),
+        facts=_facts(actual, position, lines),
+        lines=tuple(lines),
         speed=actual.spin,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
     )
-    time = np.arange(round(run.seconds * run.rate)) / run.rate
-    return RunPhysics(time, motion, _facts(actual, motion))
 
 
 def _missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
@@ -190,7 +129,7 @@ def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) ->
     forces: list[tuple[float, ComplexArray]] = []
     if run.direction is None:
         return forces
-    along = _unit(run.direction)
+    along = directions(run.direction)
     across = np.array([-along[1], along[0]])
     defects = noise.actuators
     for frequency, amplitude in run.lines:
@@ -222,18 +161,18 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
     )
 
 
-def _facts(actual: OperatingPoint, motion: _SteadyMotion) -> dict[str, object]:
-    lines = []
-    for line in motion.lines:
+def _facts(actual: OperatingPoint, position: FloatArray, lines: Sequence[MotionLine]) -> dict[str, object]:
+    phasors_of_lines = []
+    for line in lines:
         phasors = {"oil_force_N": _parts(line.oil_force), "displacement_m": _parts(line.displacement)}
-        lines.append({"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **phasors})
+        phasors_of_lines.append({"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **phasors})
     return {
         "static_load_N": actual.static_load,
         "static_load_direction_deg": actual.static_load_direction_deg,
         "shaft_speed_Hz": actual.shaft_speed_hz,
-        "x_m": float(motion.position[0]),
-        "y_m": float(motion.position[1]),
-        "lines": lines,
+        "x_m": float(position[0]),
+        "y_m": float(position[1]),
+        "lines": phasors_of_lines,
     }
 
 
@@ -242,14 +181,14 @@ def _parts(phasor: ComplexArray) -> list[list[float]]:
     return [[float(p.real), float(p.imag)] for p in phasor]
 
 
-def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a dry pivot test: position along the pad = clearance + deflection under the load on the pivot."""
+def dry_motion(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Motion:
+    """Motion in a dry pivot test: position along the pad = clearance + deflection under the load on the pivot."""
     test = run.test
     if not isinstance(test, DryTest) or run.direction is None:
         raise VirtualRigError(f"run {run.id} is not a dry pivot test")
     rng = stream(seed, run.record, "dry")
     pad = test.pad - 1
-    toward = _unit(run.direction)
+    toward = directions(run.direction)
     sideways = np.array([-toward[1], toward[0]])
     time, load = load_history(test, run.rate)
     flaws = noise.dry
@@ -262,8 +201,6 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
     missing = gap * np.exp(-load / flaws.contact_load)
     radial = truth.clearance[pad] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
-    direction = run.direction + off
-    motion = _SlowMotion(time, position, np.outer(load, _unit(direction)), truth.cold_temperatures)
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
         "side_share": side,
@@ -271,7 +208,7 @@ def dry_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Ru
         "contact_gap_m": gap,
         "friction": flaws.friction,
     }
-    return RunPhysics(time, motion, facts)
+    return Motion(time, position, np.outer(load, directions(run.direction + off)), truth.cold_temperatures, facts)
 
 
 def load_history(test: DryTest, rate: float) -> tuple[FloatArray, FloatArray]:
@@ -321,8 +258,8 @@ def _either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float
     return float(rng.uniform(*limits) * rng.choice([-1.0, 1.0]))
 
 
-def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> RunPhysics:
-    """Physics of a clearance sweep."""
+def clearance_motion(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Motion:
+    """Motion in a clearance sweep."""
     sweep = run.test
     if not isinstance(sweep, ClearanceSweep):
         raise VirtualRigError(f"run {run.id} is not a clearance sweep")
@@ -331,8 +268,8 @@ def clearance_physics(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int)
     time = np.arange(round(sweep.seconds * run.rate)) / run.rate
     direction = sweep.start + 2 * np.pi * time / sweep.seconds
     position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
-    load = push * np.stack([np.cos(direction), np.sin(direction)], axis=1)
-    return RunPhysics(time, _SlowMotion(time, position, load, truth.cold_temperatures), {"push_N": push})
+    load = push * directions(direction)
+    return Motion(time, position, load, truth.cold_temperatures, {"push_N": push})
 
 
 def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:
@@ -369,12 +306,6 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
     return np.asarray(position)
 
 
-def corners(truth: RigTruth) -> FloatArray:
-    """Corners (n_sides, 2) [m] of the cold polygon without load, counter-clockwise."""
-    pads = _sides(truth)
-    return np.array([_corner(truth, k, pads[(i + 1) % len(pads)]) for i, k in enumerate(pads)])
-
-
 def _sides(truth: RigTruth) -> list[int]:
     """Pads in counter-clockwise order, less those that the shaft cannot touch between their neighbours."""
     pads = sorted(range(len(truth.pivot_angles)), key=lambda k: truth.pivot_angles[k] % (2 * np.pi))
@@ -385,7 +316,7 @@ def _sides(truth: RigTruth) -> list[int]:
             before, after = pads[i - 1], pads[(i + 1) % len(pads)]
             if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
                 continue
-            reach = _corner(truth, before, after) @ _unit(truth.pivot_angles[k])
+            reach = _corner(truth, before, after) @ directions(truth.pivot_angles[k])
             if reach <= truth.clearance[k]:
                 pads.remove(k)
                 removed = True
@@ -403,8 +334,4 @@ def _corner(truth: RigTruth, first: int, second: int) -> FloatArray:
 
 def _normals(truth: RigTruth, pads: list[int]) -> FloatArray:
     """Unit vectors toward the pads, (len(pads), 2)."""
-    return np.stack([_unit(truth.pivot_angles[pad]) for pad in pads])
-
-
-def _unit(angle: float) -> FloatArray:
-    return np.array([np.cos(angle), np.sin(angle)])
+    return directions([truth.pivot_angles[pad] for pad in pads])

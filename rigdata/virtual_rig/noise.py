@@ -57,8 +57,6 @@ class SetPointMiss:
     load: float = 0.0
     direction: float = 0.0
     speed: float = 0.0
-    stiffness_follows: bool = True
-    position_follows: bool = True
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from rigdata.virtual_rig.faults import Fault, check_faults, faulty_instruments, spoil_record
 from rigdata.virtual_rig.instruments import Instruments
-from rigdata.virtual_rig.motion import RunPhysics, clearance_physics, dry_physics, running_physics
+from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun, RigPlan
 from rigdata.virtual_rig.sensing import Glitch, Readings, add_glitches, analogue_readings, converted, draw_glitches
@@ -21,7 +21,7 @@ class SimulatedRun:
 
     run: PlannedRun
     readings: Readings = field(repr=False)
-    physics: RunPhysics = field(repr=False)
+    motion: Motion = field(repr=False)
     glitches: tuple[Glitch, ...] = ()
     source: str = ""
 
@@ -72,11 +72,11 @@ class VirtualRig:
             yield self._recorded(run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
-        """Faults that strike one of the runs of a record, made to strike it."""
+        """Faults that strike one of the runs of a record."""
         if not self.faults:
             return ()
         members = [run.id for run in self.runs() if run.record == record]
-        return tuple(replace(fault, run="*") for fault in self.faults if any(map(fault.affects, members)))
+        return tuple(fault for fault in self.faults if any(map(fault.affects, members)))
 
     def _recorded(self, run: PlannedRun) -> SimulatedRun:
         """Simulate a run, or the one whose record was copied in its place."""
@@ -90,23 +90,23 @@ class VirtualRig:
         faults = self.faults_of(run.record)
         if any(fault.kind == "missing_excitation" for fault in faults):
             run = replace(run, lines=())
-        instruments = faulty_instruments(self.instruments, faults, run.id)
-        physics = self._physics(run, instruments)
-        columns = analogue_readings(physics, instruments, self.noise, self.seed, run.id)
+        instruments = faulty_instruments(self.instruments, faults)
+        motion = self._motion(run, instruments)
+        columns = analogue_readings(motion, instruments, self.noise, self.seed, run.id)
         glitches: tuple[Glitch, ...] = ()
         if run.kind in ("dynamic", "locus"):
-            glitches = draw_glitches(instruments, self.noise, len(physics.time), self.seed, run.id)
+            glitches = draw_glitches(instruments, self.noise, len(motion.time), self.seed, run.id)
         add_glitches(columns, instruments, glitches)
         columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
-        readings = Readings(physics.time, columns, run.rate)
+        readings = Readings(motion.time, columns, run.rate)
         if faults:
             rng = stream(self.seed, run.id, "faults")
-            readings = spoil_record(readings, instruments, faults, run.id, rng)
-        return SimulatedRun(run, readings, physics, glitches, run.id)
+            readings = spoil_record(readings, instruments, faults, rng)
+        return SimulatedRun(run, readings, motion, glitches, run.id)
 
-    def _physics(self, run: PlannedRun, instruments: Instruments) -> RunPhysics:
+    def _motion(self, run: PlannedRun, instruments: Instruments) -> Motion:
         if run.kind == "dry_pivot":
-            return dry_physics(run, self.truth, self.noise, self.seed)
+            return dry_motion(run, self.truth, self.noise, self.seed)
         if run.kind == "clearance":
-            return clearance_physics(run, self.truth, self.noise, self.seed)
-        return running_physics(run, self.truth, instruments, self.noise, self.seed)
+            return clearance_motion(run, self.truth, self.noise, self.seed)
+        return running_motion(run, self.truth, instruments, self.noise, self.seed)

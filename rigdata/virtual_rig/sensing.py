@@ -10,7 +10,7 @@ from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.instruments import Instruments, Sensor
-from rigdata.virtual_rig.motion import RunPhysics
+from rigdata.virtual_rig.motion import Motion
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 
 
@@ -34,10 +34,10 @@ class Readings:
 
 
 def analogue_readings(
-    physics: RunPhysics, instruments: Instruments, noise: Noise, seed: int, run: str
+    motion: Motion, instruments: Instruments, noise: Noise, seed: int, run: str
 ) -> dict[str, FloatArray]:
     """Readings of all sensors before the converter, each (n,) in its own unit."""
-    time = physics.time
+    time = motion.time
     disturbance = channel_noise(instruments.sensors, noise, time, seed, run)
     vectors: dict[tuple[str, float], FloatArray] = {}
     columns = {}
@@ -45,8 +45,8 @@ def analogue_readings(
         key = (sensor.quantity, sensor.error.delay)
         if sensor.axis is not None and key not in vectors:
             # sampled at the delayed time instead of shifted: exact for any fraction of a sample
-            vectors[key] = physics.motion.at(sensor.quantity, time - sensor.error.delay)
-        value = _sensed(sensor, instruments, physics, vectors.get(key))
+            vectors[key] = motion.at(sensor.quantity, time - sensor.error.delay)
+        value = _sensed(sensor, instruments, motion, vectors.get(key))
         error = sensor.error
         columns[sensor.name] = (
             sensor.polarity * sensor.scale * (error.gain * value + error.offset + added) + sensor.zero
@@ -54,17 +54,17 @@ def analogue_readings(
     return columns
 
 
-def _sensed(sensor: Sensor, instruments: Instruments, physics: RunPhysics, vector: FloatArray | None) -> FloatArray:
+def _sensed(sensor: Sensor, instruments: Instruments, motion: Motion, vector: FloatArray | None) -> FloatArray:
     """Quantity (n,) [SI, degC for temperatures] that a sensor feels, from the vector (n, 2) at its delayed time."""
-    n = len(physics.time)
+    n = len(motion.time)
     if sensor.quantity == "temperature":
-        return np.full(n, physics.motion.temperature[(sensor.pad or 1) - 1])
+        return np.full(n, motion.temperature[(sensor.pad or 1) - 1])
     if sensor.quantity == "speed" or vector is None or sensor.axis is None:
-        return np.full(n, abs(physics.motion.speed))
+        return np.full(n, abs(motion.speed))
     value = vector @ felt_direction(sensor, instruments)
     if sensor.quantity == "displacement":
-        late = physics.time - sensor.error.delay
-        value = value + physics.motion.runout(sensor.axis + sensor.error.angle, late)
+        late = motion.time - sensor.error.delay
+        value = value + motion.runout(sensor.axis + sensor.error.angle, late)
     return value
 
 

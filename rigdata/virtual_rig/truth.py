@@ -17,6 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigError
+from rigdata.vector import directions
 
 PointLaw = Callable[[OperatingPoint], Any]
 
@@ -107,8 +108,7 @@ class RigTruth:
 
 def load_vector(point: OperatingPoint) -> FloatArray:
     """Static load of a point as (2,) [N]: what pushes the shaft, and what the film puts on the housing."""
-    angle = point.static_load_direction
-    return point.static_load * np.array([np.cos(angle), np.sin(angle)])
+    return point.static_load * directions(point.static_load_direction)
 
 
 def hz(frequency: float) -> float:

@@ -112,12 +112,7 @@ def test_sweeps_side_by_side(whole, measured):
 def test_the_cold_sweep_counts_however_small_the_hot_ones_push(whole):
     source, _ = whole
     light, heavy = source.of_kind("clearance")
-
-    def warmer(name):
-        record = light.record(name)
-        return replace(record, values=record.values + 20.0)
-
-    warm = OtherRun(light, id="warm", record=warmer)
+    warm = OtherRun(light, id="warm", mean_temperature=lambda: light.mean_temperature() + 20.0)
     assert coldest_run([warm, heavy]).id == heavy.id
     assert coldest_run([warm]).id == "warm"
 

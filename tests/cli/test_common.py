@@ -201,7 +201,8 @@ def test_init_of_nothing(tmp_path):
 
 @pytest.mark.slow
 def test_show_lists_runs_and_channels(small_campaign):
-    assert "d-02500-25-01" in tpjb("show", small_campaign).stdout
+    (line,) = (line for line in tpjb("show", small_campaign).stdout.splitlines() if "d-02500-25-01" in line)
+    assert line.split()[-2:] == ["-", "counter-clockwise"]
     shown = tpjb("show", small_campaign, "--run", "d-02500-25-01").stdout
     assert "X1A" in shown
     assert "25" in shown

@@ -149,3 +149,12 @@ def test_numbers_are_compared_by_size_and_texts_as_texts(tmp_path, name, first, 
     difference = pair(tmp_path, name, first, second)
     assert difference.state == state
     assert difference.matters == (state in ("differs", "missing", "new"))
+
+
+def test_what_should_be_zero_differs_by_rounding(tmp_path):
+    head = "static_load_N,x_m,y_m"
+    rounded = pair(tmp_path, "locus.csv", f"{head}\n5000,6.4e-20,-4.2e-5\n", f"{head}\n5000,1.8e-19,-4.2e-5\n")
+    assert rounded.state == "numbers"
+    moved = pair(tmp_path, "locus.csv", f"{head}\n5000,6.4e-20,-4.2e-5\n", f"{head}\n5000,1e-9,-4.2e-5\n")
+    assert moved.state == "differs"
+    assert moved.where == "x_m, row 1: 6.4e-20, now 1e-09"

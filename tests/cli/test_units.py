@@ -76,3 +76,20 @@ def test_a_prediction_is_printed_in_pounds_and_written_in_both(tmp_path):
     assert us["shaft_speed_rpm"].iloc[0] == 60 * si["shaft_speed_Hz"].iloc[0]
     again = tpjb(*words, "--out", tmp_path / "p")
     assert "load kN" in again.output
+
+
+@pytest.mark.slow
+def test_a_report_in_us_units_holds_no_other(tmp_path):
+    result = tpjb(
+        "compare", "rigdata/samples/demo.h5", "--pivots", "measured", "--units", "us", "--out", tmp_path / "o"
+    )
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+    words = " ".join(re.sub(r"<style.*?</style>|<script.*?</script>|<[^>]*>", " ", page, flags=re.S).split())
+    assert not re.search(r"MN/m|\bkN\b|kN s/m|µm|[0-9] mm\b|MPa|°C", words)
+    assert not re.search(r"e\+0|\b[0-9]{6,}(?= +[0-9]{6,})", words), "no exponents, no wide ticks in a row"
+    first = pd.read_csv(tmp_path / "o" / "coefficients_us.csv").iloc[0]
+    shown = re.search(r"Measured \(mm-eiv\).*? Hz ([0-9]+) ± ([0-9]+) ", words)
+    half = 0.5 * (first["kxx_lbf_per_in_hi"] - first["kxx_lbf_per_in_lo"])
+    assert float(shown[1]) == pytest.approx(first["kxx_lbf_per_in"], abs=0.05 * half)
+    assert float(shown[2]) == pytest.approx(half, rel=0.05)

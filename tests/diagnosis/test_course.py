@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 
-from model.effects import Effect
+from model.effects import Effect, known_effects
 from model.setup import Mesh
-from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
+from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
 from tpjb_ident.diagnosis.comparison.amplitude_path import path_through
+from tpjb_ident.diagnosis.comparison.fit import Start, fitted
 from tpjb_ident.diagnosis.comparison.search import compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.comparison.unknowns import prediction
 from tpjb_ident.diagnosis.diagnose import pose
-from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.workers import workers
-from tpjb_ident.diagnosis.planned import planned_observations
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import dynamic, planned_observations
 
 NODES = (0.8, -0.8, 1.6, -1.6, 3.0, -3.0)
 
@@ -60,16 +63,48 @@ def test_slopes_are_those_of_the_course():
 
 
 @pytest.mark.slow  # seconds: the bearing model itself
-def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact():
+@pytest.mark.parametrize(
+    ("name", "parameter", "size"),
+    [("thermal_growth", "clearance_change", 1.1e-5), ("preload_error", "pad_clearance_change", -3.4e-5)],
+)
+def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact(name, parameter, size):
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
     setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
     layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0), sweep_first=False)
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)
-    hidden = forward.fresh()([Effect("thermal_growth", clearance_change=1.1e-5)])
+    hidden = forward.fresh()([Effect(name, **{parameter: size})])
     settings = DiagnoseSettings(workers=1)
     problem = pose(noisy(planned, hidden, 7), forward, settings)
     with workers(forward, problem, 1) as run:
         best = compare(run, problem, settings).best
-    assert best.label == "thermal_growth"
-    assert best.amplitudes[0][0] == pytest.approx(1.1e-5, abs=3e-7)
+    assert best.label == name
+    assert best.effects[0].parameters[parameter] == pytest.approx(size, rel=0.03)
+
+
+class Narrow(Forward):
+    """A bearing that has no equilibrium where an effect turns the probes by more than a degree."""
+
+    def __call__(self, effects=(), change=None):
+        if any(abs(effect.parameters["angle"]) > np.radians(1.0) for effect in effects):
+            raise NoEquilibriumError("beyond a degree")
+        return super().__call__(effects, change)
+
+    def fresh(self):
+        return self
+
+
+def test_a_start_without_an_equilibrium_is_taken_nearer_to_what_is_stated():
+    setup = rocker_setup(Mesh(24, 4), accuracy=1e-5)
+    planned = planned_observations(setup, Layout(dynamic([5000.0], [SPEED], SPEED, -np.pi / 2, 0)))
+    forward = Narrow(setup, planned.layout, planned.elements)
+    skipped = frozenset(known_effects()) - {"probe_rotation"}
+    problem = pose(planned, forward, DiagnoseSettings(skip=skipped, workers=1))
+    (fault,) = problem.faults
+    theta = np.zeros(1 + len(problem.nuisances))
+    theta[0] = np.radians(2.0)
+    jacobian = np.column_stack([np.zeros(len(planned)), problem.scaled(problem.columns)])
+    with workers(forward, problem, 1) as run:
+        assert next(iter(run(prediction, [((fault,), theta)]))) is None
+        fit = fitted(run, problem, Start((fault,), theta, jacobian))
+    assert abs(fit.point.theta[0]) <= np.radians(1.0)

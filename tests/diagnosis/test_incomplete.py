@@ -9,7 +9,8 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.campaign import unknown_centre
-from tpjb_ident.diagnosis.observations.observe import UNSEEN_DIFFERENCE, _mains_on_excitation, observe
+from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.observations.observe import _mains_on_excitation, observe
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 
 
@@ -42,4 +43,4 @@ def test_a_point_struck_by_mains_is_left_out_unless_it_was_corrected():
 def test_two_directions_widen_the_covariance_by_what_runs_differ_by():
     plain, two = (observe(SimpleNamespace(points=(point(*q),))) for q in ((), ("no-spare-direction",)))
     more = np.diag(two.covariance - plain.covariance)
-    np.testing.assert_allclose(more, (UNSEEN_DIFFERENCE * np.repeat([2e8, 3e7], 4)) ** 2, rtol=1e-6)
+    np.testing.assert_allclose(more, (Deciding.unseen * np.repeat([2e8, 3e7], 4)) ** 2, rtol=1e-6)

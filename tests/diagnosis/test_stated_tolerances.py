@@ -1,13 +1,15 @@
 """What may be off is stated: in the bearing file, on the command line, by default; each with its source."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from model.bearing_file import load_bearing
+from model.effects import Effect, apply_effects, kind_of
 from tests.diagnosis.rocker_case import ROCKER, rocker_setup
-from tpjb_ident.diagnosis.forward.nuisance import Shift, nuisances
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Shift, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
 from tpjb_ident.errors import BadInputError
 
@@ -51,3 +53,20 @@ def test_nuisances_change_what_they_say():
     assert bent.oil.viscosity_40 == pytest.approx(bearing.oil.viscosity_40 * math.exp(0.1))
     shifts = [b.assembled_clearance - a.assembled_clearance for a, b in zip(bearing.pads, bent.pads, strict=True)]
     assert np.allclose(shifts, [0.0, 0.0, 4e-6, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_tolerance_that_an_effect_says_does_what_the_effect_does():
+    drawn = rocker_setup()
+    oil = replace(drawn.bearing.oil, supply_temperature=50.0)  # where an exponent about 40 °C is another one
+    setup = drawn.change(bearing=replace(drawn.bearing, oil=oil))
+    said = [n for n in nuisances((), setup, Tolerances()) if n.effect]
+    assert {n.effect.split()[0] for n in said} == set(OWN_NUMBERS)
+    for nuisance in said:
+        name, _, pad = nuisance.effect.partition(" pad ")
+        number = OWN_NUMBERS[name]
+        parameter = kind_of(name).parameters[-1].name
+        place = {"pad": int(pad)} if pad else {}
+        size = number.change(number.parameter(-nuisance.sigma))
+        assert size == pytest.approx(-nuisance.sigma)
+        effect = Effect(name, **place, **{parameter: number.parameter(size)})
+        assert nuisance.change(setup, size) == apply_effects(setup, [effect])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigdata import load_campaign
+from rigdata.readers import series
 from rigdata.readers.hdf5.reader import Hdf5Reader
 from rigdata.readers.text import csv
 from tests.rigs.campaign_file import BEARING, manifest_text, plans_of, write_campaign
@@ -47,8 +48,8 @@ def test_the_beginning_of_a_record_is_read_once(campaign, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_csv_file_above_the_limit_gives_the_same_and_is_parsed_a_few_times_only(tmp_path, monkeypatch):
-    """Such a file is parsed by groups of channels; a look at its beginning must not cost one parse a channel."""
+def test_a_long_csv_file_gives_the_same_and_is_parsed_a_few_times_only(tmp_path, monkeypatch):
+    """Its columns wait in files; a look at its beginning must not cost one parse a channel."""
     rig, plans = replace(QUICK, keyphasor=True), ONE_LOAD[:3]
     rng = np.random.default_rng(4)
     text = manifest_text(rig, plans, {})
@@ -62,7 +63,7 @@ def test_a_csv_file_above_the_limit_gives_the_same_and_is_parsed_a_few_times_onl
     small = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
     parsed = []
     plain = csv.read_table
-    monkeypatch.setattr(csv, "_LARGE_FILE", 1000)
+    monkeypatch.setattr(series, "IN_MEMORY", 1000)
     monkeypatch.setattr(csv, "read_table", lambda source, wanted: parsed.append(len(wanted)) or plain(source, wanted))
     large = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
     np.testing.assert_array_equal(large.points[0].stiffness.h, small.points[0].stiffness.h)

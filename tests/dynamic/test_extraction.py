@@ -71,58 +71,27 @@ def readings(count, n=50, seed=1):
     return {f"X{k}": np.random.default_rng([seed, k]).standard_normal(n) for k in range(count)}
 
 
-@pytest.mark.parametrize("axes", [(45.0, 135.0), (0.0, 90.0), (90.0, 0.0), (10.0, 70.0), (0.0, 3.0), (180.0, 90.0)])
-@pytest.mark.parametrize(("zero", "polarity"), [(0.0, 1), (2e-3, -1), (1.0, 1)])
-def test_two_channels_become_rows_in_one_request(axes, zero, polarity):
-    tach = Channel("K", "speed", "Hz", 2 * math.pi)
-    cells = [Channel(name, "force", axis=axis) for name, axis in (("LH", 0.0), ("LV", math.pi / 2))]
-    data = readings(2) | {"K": np.full(50, 22.0), "LH": np.ones(50), "LV": np.ones(50)}
-    run = run_of(data, [*probes(axes, zero, polarity), tach, *cells])
-    expected = run.vector("displacement", 7, 30).values.T
-    run.reader.asked.clear()
-    with run.opened():
-        stretches = run.row_reader(("displacement",))
-        found = stretches.read(7, 30)
-    assert run.reader.asked == [("X0", "X1", "K")]
-    np.testing.assert_allclose(found.rows["displacement"], expected, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.speed, 2 * math.pi * 22.0)
-    assert found.time is None
-
-
 @pytest.mark.parametrize("bad", [np.nan, 3e38, -3e38, np.inf])
 @pytest.mark.parametrize("name", ["X0", "X1"])
 def test_a_reading_that_is_none_is_none(bad, name):
     data = readings(2)
     data[name][20] = bad
     run = run_of(data, probes((45.0, 135.0)), stamps=0.5 + np.arange(50) / RATE)
-    with run.opened():
-        stretches = run.row_reader(("displacement",))
-        found = stretches.read(10, 40)
-        sound = stretches.read(30, 40)
-        none = stretches.read(5, 5)
-    np.testing.assert_array_equal(found.rows["displacement"], run.vector("displacement", 10, 40).values.T)
-    assert np.isnan(found.rows["displacement"][:, 10]).all()
-    np.testing.assert_allclose(sound.rows["displacement"], run.vector("displacement", 30, 40).values.T, rtol=1e-12)
-    assert none.rows["displacement"].shape == (2, 0)
-    np.testing.assert_array_equal(found.time, 0.5 + np.arange(10, 40) / RATE)
-    assert found.speed is None
+    whole = run.vector("displacement", 10, 40)
+    assert np.isnan(whole.values[10]).all()
+    np.testing.assert_allclose(run.vector("displacement", 30, 40).values, whole.values[20:], rtol=1e-12)
+    assert run.vector("displacement", 5, 5).values.shape == (0, 2)
+    np.testing.assert_array_equal(whole.time, 0.5 + np.arange(10, 40) / RATE)
 
 
-def test_three_channels_and_those_without_an_axis_are_left_to_the_run():
-    run = run_of(readings(3), probes((45.0, 135.0, 80.0)))
-    with run.opened():
-        stretches = run.row_reader(("displacement",))
-        rows = stretches.read(0, 50).rows["displacement"]
-    np.testing.assert_array_equal(rows, run.vector("displacement").values.T)
+def test_a_channel_without_an_axis_is_no_part_of_the_vector():
     other = Channel("T", "displacement", "um", 1e-6)
-    two = run_of(readings(2) | {"T": np.zeros(50)}, [*probes((45.0, 135.0)), other])
-    with two.opened():
-        stretches = two.row_reader(("displacement",))
-        rows = stretches.read(0, 50).rows["displacement"]
-    np.testing.assert_allclose(rows, two.vector("displacement").values.T, rtol=1e-12)
+    two, three = probes((45.0, 135.0)), readings(2) | {"T": np.zeros(50)}
+    expected = run_of(readings(2), two).vector("displacement").values
+    np.testing.assert_array_equal(run_of(three, [*two, other]).vector("displacement").values, expected)
     for axes in ((45.0, 47.5), (45.0, 225.0)):
         with pytest.raises(RigDataError, match="all measure along one line"):
-            run_of(readings(2), probes(axes)).row_reader(("displacement",)).read(0, 50)
+            run_of(readings(2), probes(axes)).vector("displacement")
 
 
 LINES = known_lines((DRIVEN,), 22.0, RATE)

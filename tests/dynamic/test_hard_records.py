@@ -215,6 +215,16 @@ def test_windows_without_drive_are_none(begin, end):
     assert not result.conditions
 
 
+def test_few_long_windows_tell_a_drive_that_starts_late():
+    """One hertz beside the shaft's line, windows are long and few."""
+    point = replace(POINT, excitation=2 * np.pi * 23.0)
+    result = phasors_of(record(drive=23.0, level=(TIME >= 0.4 * SECONDS).astype(float)), point)
+    driven = np.isfinite(result.z[:, 0, 0])
+    assert 2 <= driven.sum() <= 4
+    assert (result.start[driven] >= 0.4 * SECONDS - 0.1).all()
+    assert error(result) < 3e-3
+
+
 def test_a_drive_that_is_switched_over_gives_its_longest_stretch():
     """From one direction to the other after 2.2 s: both channels of a quantity change."""
     data = record()

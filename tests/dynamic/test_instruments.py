@@ -14,7 +14,7 @@ from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect
 from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
-from tpjb_ident.dynamic.results.frequency_fit import chance_of
+from tpjb_ident.dynamic.results.frequency_model import chance_of
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.compensation import slower_channel

@@ -15,7 +15,7 @@ from rigdata.operating_point import OperatingPoint
 from tests.dynamic import phasor_cases
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
-from tpjb_ident.dynamic.results.frequency_fit import REFUSED, fit_over_frequency, fits_per_load
+from tpjb_ident.dynamic.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
 from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
@@ -33,13 +33,11 @@ def estimate(omega, mass=0.0, off=0.0, error=1e6, covariance=None):
 
 def test_stiffness_and_damping_that_are_there_are_found_exactly():
     fit = fit_over_frequency([estimate(w) for w in OMEGAS], "K-C")
-    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
-    np.testing.assert_allclose(fit.C, C, rtol=1e-9)
-    np.testing.assert_array_equal(fit.M, 0.0)
+    np.testing.assert_allclose(fit.parameters, np.concatenate([K.ravel(), C.ravel()]), rtol=1e-9)
     assert fit.chi_square < 1e-3
     assert fit.misfit < 1e-9
-    assert (fit.dof, fit.n_frequencies) == (24, 4)
-    assert fit.omega_range == (OMEGAS[0], OMEGAS[-1])
+    assert (fit.spare, fit.n_frequencies) == (24, 4)
+    np.testing.assert_allclose(fit.band, (15.0, 60.0), rtol=1e-12)
     np.testing.assert_allclose(fit.h(100.0), K + 100j * C, rtol=1e-9)
     # equal errors: K is a mean, C a slope through the origin
     expected = np.repeat([1e6**2 / 4, 1e6**2 / np.sum(OMEGAS**2)], 4)
@@ -51,10 +49,10 @@ def test_stiffness_and_damping_that_are_there_are_found_exactly():
 def test_a_mass_is_found_and_its_want_refused():
     given = [estimate(w, mass=1.0, error=1e5) for w in OMEGAS]
     fit = fit_over_frequency(given, "K-C-M")
-    np.testing.assert_allclose(fit.M, M, rtol=1e-6)
-    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
+    np.testing.assert_allclose(fit.parameters[8:], M.ravel(), rtol=1e-6)
+    np.testing.assert_allclose(fit.parameters[:4], K.ravel(), rtol=1e-9)
     np.testing.assert_allclose(fit.h(200.0), K - 200.0**2 * M + 200j * C, rtol=1e-8)
-    assert fit.dof == 20
+    assert fit.spare == 20
     assert not fit.refused
     without = fit_over_frequency(given, "K-C")
     assert without.refused
@@ -80,19 +78,19 @@ def test_chi_square_is_the_weighted_sum_of_what_is_left():
             left += vector @ np.linalg.solve(est.covariance, vector)
         assert fit.chi_square == pytest.approx(left, rel=1e-6)
         turned = fit_over_frequency(given[::-1], model)
-        np.testing.assert_allclose(turned.K, fit.K, rtol=1e-9)
+        np.testing.assert_allclose(turned.parameters, fit.parameters, rtol=1e-9)
 
 
 def test_one_frequency_is_its_own_answer():
     fit = fit_over_frequency([estimate(OMEGAS[1])], "K-C")
-    np.testing.assert_allclose(fit.C, C, rtol=1e-9)
-    assert fit.dof == 0
+    np.testing.assert_allclose(fit.parameters[4:], C.ravel(), rtol=1e-9)
+    assert fit.spare == 0
     assert math.isnan(fit.probability)
     assert not fit.refused
     np.testing.assert_allclose(fit.standard_error, np.sqrt(np.diag(fit.covariance)))
     # two estimates at one frequency: the second model still needs another
     twice = [estimate(OMEGAS[1]), estimate(OMEGAS[1])]
-    assert fit_over_frequency(twice, "K-C").dof == 8
+    assert fit_over_frequency(twice, "K-C").spare == 8
     with pytest.raises(ValueError, match="K-C-M needs 2 frequencies with an answer, got 1"):
         fit_over_frequency(twice, "K-C-M")
     with pytest.raises(ValueError, match="K-C needs 1 frequencies with an answer, got 0"):
@@ -104,8 +102,41 @@ def test_one_frequency_is_its_own_answer():
 def test_estimates_without_an_interval_are_left_out():
     lost = replace(estimate(OMEGAS[2], off=1e9), covariance=np.full((8, 8), np.nan))
     fit = fit_over_frequency([estimate(OMEGAS[0]), lost, estimate(OMEGAS[3])], "K-C")
-    np.testing.assert_allclose(fit.K, K, rtol=1e-9)
+    np.testing.assert_allclose(fit.parameters[:4], K.ravel(), rtol=1e-9)
     assert fit.n_frequencies == 2
+
+
+def test_a_gain_that_all_frequencies_share_is_in_the_interval_as_it_is_in_theirs():
+    gain = 0.01 * np.array([estimate(w).vector for w in OMEGAS])
+    given = [replace(estimate(w, error=1.0), systematic=np.outer(g, g)) for w, g in zip(OMEGAS, gain, strict=True)]
+    fit = fit_over_frequency(given, "K-C", gain.reshape(1, -1))
+    truth = np.concatenate([K.ravel(), C.ravel()])
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.systematic)), np.abs(0.01 * truth), rtol=1e-6)
+    # each frequency's own errors average out
+    single = fit_over_frequency(given, "K-C")
+    np.testing.assert_allclose(np.diag(single.systematic)[:4], (0.01 * K.ravel()) ** 2 / 4, rtol=1e-6)
+
+
+def test_intervals_over_frequency_hold_the_truth():
+    rng = np.random.default_rng(11)
+    dof, draws, inside = 16.0, 400, 0
+    truth = np.concatenate([K.ravel(), C.ravel()])
+    for _ in range(draws):
+        common = 0.003 * rng.standard_normal()
+        given, changes = [], []
+        for w in OMEGAS[:3]:
+            exact = estimate(w)
+            error = 1e6 * rng.standard_normal(8)
+            measured = 1e12 * np.eye(8) * rng.chisquare(dof) / dof
+            h = exact.h * (1 + common) + error[:4].reshape(2, 2) + 1j * error[4:].reshape(2, 2)
+            change = 0.003 * exact.vector
+            given.append(
+                replace(exact, h=h, covariance=measured, dof=np.full(8, dof), systematic=np.outer(change, change))
+            )
+            changes.append(change)
+        fit = fit_over_frequency(given, "K-C", np.concatenate(changes)[None])
+        inside += np.count_nonzero(np.abs(fit.parameters - truth) < fit.half_width())
+    assert 0.93 < inside / (8 * draws) < 0.98
 
 
 def point(stiffness, load=5000.0, direction=-90.0, speed=22.0):
@@ -117,7 +148,7 @@ def point(stiffness, load=5000.0, direction=-90.0, speed=22.0):
 def test_the_simplest_model_that_is_not_refused_is_supported(mass, wild, supported):
     off = wild * np.array([1, -1, 1, -1])
     points = tuple(point(estimate(w, mass, o, error=1e5)) for w, o in zip(OMEGAS, off, strict=True))
-    (found,) = fits_per_load(points)
+    (found,) = fits_over_frequency(points)
     assert found.supported == supported
     assert set(found.fits) == {"K-C", "K-C-M"}
     assert found.points == points
@@ -129,7 +160,7 @@ def test_loads_directions_and_speeds_are_fitted_apart():
     points = [point(estimate(w), *place) for w in two for place in places]
     points.append(point(estimate(two[0]), load=7e3))  # alone at its load
     points += [point(estimate(two[0]), load=8e3), point(replace(estimate(two[1]), h=np.full((2, 2), np.nan)), load=8e3)]
-    found = fits_per_load(tuple(points))
+    found = fits_over_frequency(tuple(points))
     assert [len(f.points) for f in found] == [2, 2, 2, 2]
     assert 0.0 < REFUSED < 0.05
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tpjb_ident.columns import use_units
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import COLUMNS, FORMATS, ExportError, export_format, static_points
 from tpjb_ident.exports.rotor_programs import (
@@ -67,7 +68,7 @@ def test_points_without_an_answer_are_left_out_aloud():
     frame.loc[3, "cyy_Ns_per_m"] = math.nan
     chosen = static_points(frame)
     assert [p.load for p in chosen.points] == [5000.0]
-    assert chosen.left_out == ("2500 N, 25 Hz",)
+    assert chosen.left_out == ("2.5 kN, 25 Hz",)
 
 
 def ross_elements(folder, points, version):
@@ -349,13 +350,94 @@ def test_dyrobes_and_ansys_files_have_their_fields_in_place(tmp_path):
     write_dyrobes(tmp_path, speeds(), "c")
     write_ansys(tmp_path, speeds(), "c")
     first, *rows = (tmp_path / "dyrobes_5000N_-90deg_25Hz.txt").read_text(encoding="utf-8").splitlines()
-    assert [int(v) for v in first.split("  ")[0].split(",")] == [2, 4, 8, 0, 0, 0, 0]
+    assert [int(v) for v in first.split("  ")[0].split(",")] == [2, 3, 8, 0, 0, 0, 0]  # 3: s, m, N, kg
     assert float(rows[1].split(",")[3]) == 33e6
     lines = (tmp_path / "ansys_5000N_-90deg_25Hz.txt").read_text(encoding="utf-8").splitlines()
     assert [int(lines[3][i : i + 10]) for i in (0, 10, 20)] == [2, 0, 1]
     assert (int(lines[4][:10]), float(lines[4][10:20])) == (1, 1320.0)
     assert float(lines[5][30:45]) == 22e6
     assert all(len(line) <= 80 for line in lines)
+
+
+LBF_PER_INCH = 4.4482216152605 / 0.0254
+
+
+@pytest.fixture
+def us():
+    use_units("us")
+    yield
+    use_units("si")
+
+
+def rows_of_a_rotor_program(path, to):
+    """Speeds and coefficients of a file, and what it says of its units."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    if to == "ansys":
+        counts, *rows = lines[3:]
+        cells = [f"{speed[10:]} {k} {c}" for speed, k, c in zip(rows[::3], rows[1::3], rows[2::3], strict=True)]
+        return np.loadtxt(cells, ndmin=2), int(counts[10:20])
+    first = lines.index(next(line for line in lines if re.match(r"\d", line)))
+    if to == "dyrobes":
+        return np.loadtxt(lines[first + 1 :], delimiter=",", ndmin=2), int(lines[0].split(",")[1])
+    return np.loadtxt(lines[first:], ndmin=2), re.findall(r"\((.+?)\)", lines[first - 1])
+
+
+@pytest.mark.usefixtures("us")
+def test_every_format_writes_us_units_or_refuses_them_by_name(to, tmp_path):
+    frame = doubtful_table()
+    if to == "ross":
+        with pytest.raises(ExportError, match="--units us: --to ross writes SI"):
+            export(frame, to, tmp_path / "o")
+        assert not (tmp_path / "o").exists()
+        return
+    written = export(frame, to, tmp_path, force=True)
+    rotor = to in {"xltrc", "dyrobes", "ansys"}
+    stem = "bearing_coefficients_intervals" if rotor else "bearing_coefficients"
+    assert f"{stem}_us.csv" in written.files
+    table_us = pd.read_csv(tmp_path / f"{stem}_us.csv")
+    point = written.chosen.points[1]
+    at_point = np.isclose(table_us["static_load_lbf"], 5000.0 / 4.4482216152605)
+    assert np.allclose(table_us["kxy_lbf_per_in_hi"][at_point], point.high["kxy"] / LBF_PER_INCH)
+    assert np.allclose(table_us["cyy_lbfs_per_in"][at_point], point.coefficients["cyy"] / LBF_PER_INCH)
+    assert table_us["shaft_speed_rpm"].unique().tolist() == [1320.0]
+    assert not [name for name in table_us if re.search(r"_N\b|_N_|_Ns_|_m\b", name)]
+    if rotor:
+        path = tmp_path / f"{to}_5000N_-90deg_25Hz.txt"
+        cells, units = rows_of_a_rotor_program(path, to)
+        at_25_hz = [values[1] for values in point.coefficients.values()]
+        assert np.allclose(cells[0], [1320.0, *(value / LBF_PER_INCH for value in at_25_hz)], rtol=1e-6)
+        assert units == {"xltrc": ["rpm", *["lbf/in"] * 4, *["lbf-s/in"] * 4], "dyrobes": 2, "ansys": 1}[to]
+        text = path.read_text(encoding="utf-8")
+        assert "static load 1124.04 lbf" in text
+        assert to == "ansys" or f"{stem}_us.csv" in text
+
+
+@pytest.mark.parametrize("to", ["csv", "parquet", "excel", "mat"])
+def test_tables_stay_si_beside_those_in_us_units(to, tmp_path):
+    if to == "excel":
+        pytest.importorskip("openpyxl")
+    for system in ("si", "us"):
+        use_units(system)
+        try:
+            export(table(SERIES), to, tmp_path / system)
+        finally:
+            use_units("si")
+    (path,) = (tmp_path / "si").iterdir()
+    assert path.read_bytes() == (tmp_path / "us" / path.name).read_bytes()
+
+
+def test_the_command_line_exports_us_units_and_refuses_them_for_ross(tmp_path):
+    from tests.command_line import tpjb
+
+    table(SERIES).to_csv(tmp_path / "coefficients.csv", index=False)
+    refused = tpjb("export", tmp_path, "--to", "ross", "--units", "us", "--out", tmp_path / "r")
+    assert refused.exit_code == 2
+    assert "Leave --units us out" in " ".join(refused.stderr.split())
+    done = tpjb("export", tmp_path, "--to", "parquet", "--units", "us", "--out", tmp_path / "o")
+    assert done.exit_code == 0, done.output
+    assert "bearing_coefficients_us.csv" in " ".join(done.output.split())
+    frame = pd.read_csv(tmp_path / "o" / "bearing_coefficients_us.csv")
+    assert frame["kxx_lbf_per_in"].max() == pytest.approx(5.0e8 / LBF_PER_INCH, rel=1e-6)
 
 
 def test_a_synchronous_prediction_is_named_so():

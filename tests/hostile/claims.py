@@ -106,7 +106,7 @@ def read(path: Path) -> str:
     """Read a file as whoever opens it would; what it is answered with."""
     from rigdata import load_campaign
     from rigdata.problem import RigDataError
-    from rigdata.readers.formats.foreign import read_foreign
+    from rigdata.readers.file_reader import read_series
 
     try:
         if path.suffix == ".h5":
@@ -114,7 +114,7 @@ def read(path: Path) -> str:
             for run in campaign.runs:
                 run.vector("displacement")
         else:
-            read_foreign(path, path.name)
+            read_series(path, path.name)
     except RigDataError as error:
         return str(error)
     return "read"

@@ -135,14 +135,14 @@ def csv_target(folder: Path) -> Target:
     """One CSV record: dialect, numbers, times."""
     from rigdata.manifest.manifest import parse_manifest
     from rigdata.problem import RigDataError
-    from rigdata.readers.text.csv import CsvReader
+    from rigdata.readers.file_reader import FileReader
 
     manifest = parse_manifest(CSV_MANIFEST)
     record = folder / "c-1.csv"
 
     def feed(data: bytes) -> None:
         record.write_bytes(data)
-        reader = CsvReader(record, "c-1.csv", "c-1", manifest.channels, manifest.sample_rate, spec=manifest.csv)
+        reader = FileReader(record, "c-1.csv", "c-1", manifest.channels, manifest.sample_rate, manifest.csv)
         length = reader.length()
         reader.read(["X1A", "X1B"], 0, length)
         reader.rate(), reader.time(0, length), reader.problems()
@@ -200,7 +200,7 @@ def hdf5_target(folder: Path) -> Target:
 def foreign_target(folder: Path, suffix: str) -> Target:
     """One of the other loggers' formats."""
     from rigdata.problem import RigDataError
-    from rigdata.readers.formats.foreign import read_foreign
+    from rigdata.readers.file_reader import read_series
 
     ending = ".mat" if suffix == ".mat73" else suffix
     path = folder / f"fuzzed{ending}"
@@ -209,7 +209,7 @@ def foreign_target(folder: Path, suffix: str) -> Target:
 
     def feed(data: bytes) -> None:
         path.write_bytes(data)
-        read_foreign(path, path.name, "r")
+        read_series(path, path.name)
 
     return Target(suffix.lstrip("."), (seed.read_bytes(),), feed, (RigDataError,))
 

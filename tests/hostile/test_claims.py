@@ -13,9 +13,8 @@ import pytest
 from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.readers import base
-from rigdata.readers.formats.foreign import read_foreign
-from rigdata.readers.grids import arranged
-from rigdata.readers.series import Series
+from rigdata.readers.file_reader import read_series
+from rigdata.readers.series import Series, arranged
 from tests.hostile import claims
 from tests.hostile.fuzz_targets import CSV_MANIFEST
 
@@ -75,7 +74,7 @@ def test_links_within_the_file_count_every_time(tmp_path, monkeypatch):
 def test_each_format_is_refused_by_what_it_claims(make, tmp_path):
     path = make(tmp_path, 2**25) if make is claims.parquet else make(tmp_path)
     with pytest.raises(RigDataError, match=f"{path.name}: claims"):
-        read_foreign(path, path.name)
+        read_series(path, path.name)
 
 
 @pytest.mark.slow
@@ -84,8 +83,8 @@ def test_mdf_is_refused_by_what_it_claims_in_the_process_that_reads_it(tmp_path)
     path = claims.mdf(tmp_path)
     assert path.stat().st_size < 10_000
     with pytest.raises(RigDataError, match=r"claims\.mf4: claims 34360 MB of samples"):
-        read_foreign(path, path.name)
-    assert len(read_foreign(claims.mdf(tmp_path, 20), path.name)) == 1
+        read_series(path, path.name)
+    assert len(read_series(claims.mdf(tmp_path, 20), path.name)) == 1
 
 
 def test_short_channels_are_not_spread_over_a_long_clock():

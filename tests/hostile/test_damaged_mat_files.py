@@ -12,7 +12,7 @@ from scipy.io import savemat
 
 from rigdata.problem import RigDataError
 from rigdata.readers import base
-from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.file_reader import read_series
 from rigdata.readers.formats.mat import check_mat5
 
 TIME = np.arange(120) / 100.0
@@ -39,7 +39,7 @@ def test_sound_files_of_every_class_pass(tmp_path, compressed):
     path = tmp_path / "all.mat"
     savemat(path, content, do_compression=compressed)
     check_mat5(path)
-    assert {s.name for s in read_foreign(path, "all.mat")} >= {"s.a", "single"}
+    assert {s.name for s in read_series(path, "all.mat")} >= {"s.a", "single"}
 
 
 @pytest.mark.parametrize("kind", [0, 8, 10, 11, 14, 19, 0xFFFF, 0x7FFFFFFF])
@@ -49,7 +49,7 @@ def test_a_type_that_is_none_is_refused_before_scipy_looks_it_up(good, kind):
     struct.pack_into("<I", data, at, kind)
     good.write_bytes(data)
     with pytest.raises(RigDataError, match="damaged"):
-        read_foreign(good, "a.mat")
+        read_series(good, "a.mat")
 
 
 @pytest.mark.slow
@@ -62,7 +62,7 @@ def test_any_changed_byte_ends_in_numbers_or_in_a_named_error(good):
         data[128 + rng.randrange(64) + 1016 * rng.randrange(3)] = rng.randrange(256)
         good.write_bytes(data)
         try:
-            read_foreign(good, "a.mat")
+            read_series(good, "a.mat")
             outcomes.add("read")
         except RigDataError:
             outcomes.add("refused")
@@ -78,11 +78,11 @@ def test_a_compressed_bomb_is_refused_and_the_limit_can_be_moved(tmp_path, monke
     assert path.stat().st_size < 2**14
     monkeypatch.setattr(base, "CLAIM_FREE", 2**20)
     with pytest.raises(RigDataError, match="claims 34 MB"):
-        read_foreign(path, "bomb.mat")
+        read_series(path, "bomb.mat")
 
 
 def test_a_version_4_file_that_claims_more_than_fits(tmp_path):
     path = tmp_path / "old.mat"
     path.write_bytes(struct.pack("<5i", 0, 2**31 - 1, 2**30, 0, 2) + b"a\0" + bytes(64))
     with pytest.raises(RigDataError, match=r"old\.mat"):
-        read_foreign(path, "old.mat")
+        read_series(path, "old.mat")

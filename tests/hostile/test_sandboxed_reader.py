@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import tempfile
@@ -13,37 +12,50 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
+from rigdata.readers.file_reader import read_series
 from rigdata.readers.formats import sandbox
-from rigdata.readers.formats.foreign import read_foreign
 from rigdata.readers.series import Series
 
 DAMAGED = Path(__file__).parent / "damaged"
 
 
-def test_numbers_cross_the_wall_bit_for_bit(capsysbinary):
+def through_the_wall(folder, monkeypatch, read_in_sandbox):
+    """What a reader of that kind gives, written and read back."""
+    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_in_sandbox=read_in_sandbox))
+    monkeypatch.setattr(sandbox, "_limit_memory", lambda path: None)
+    sandbox.main("talks", folder, folder / "answer.npz")
+    return sandbox._answered(folder / "answer.npz")
+
+
+def test_numbers_cross_the_wall_bit_for_bit(tmp_path, monkeypatch):
     given = [
         Series("X1A", "V", np.array([1.0, np.nan, -np.inf, 5e-324]), np.arange(4.0), "group 1"),
         Series("Temperatür", "°C", np.array([]), None, "group 2"),
     ]
-    sandbox._send(given)
-    head, _, body = capsysbinary.readouterr().out.partition(b"\n")
-    for one, back in zip(given, sandbox._unpack(json.loads(head), body), strict=True):
+    for one, back in zip(given, through_the_wall(tmp_path, monkeypatch, lambda path: given), strict=True):
         assert (one.name, one.unit, one.group) == (back.name, back.unit, back.group)
         assert one.values.tobytes() == back.values.tobytes()
         assert (one.time is None) == (back.time is None)
         assert one.time is None or one.time.tobytes() == back.time.tobytes()
 
 
-def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch, capsysbinary):
+@pytest.mark.parametrize(
+    ("error", "says"), [(MemoryError(), "claims more data"), (KeyError("x"), r"cannot be read \(KeyError: 'x'\)")]
+)
+def test_an_error_behind_the_wall_is_the_files_fault(tmp_path, monkeypatch, error, says):
+    def read_in_sandbox(path):
+        raise error
+
+    with pytest.raises(RigDataError, match=says):
+        through_the_wall(tmp_path, monkeypatch, read_in_sandbox)
+
+
+def test_what_a_library_prints_is_no_part_of_the_answer(tmp_path, monkeypatch):
     def read_in_sandbox(path):
         print("a channel looks odd")  # asammdf says such things of files that it can read
         return [Series("X1A", "V", np.arange(3.0), None, "")]
 
-    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_in_sandbox=read_in_sandbox))
-    monkeypatch.setattr(sandbox, "_limit_memory", lambda path: None)
-    sandbox.main("talks", tmp_path)
-    head, _, body = capsysbinary.readouterr().out.partition(b"\n")
-    (back,) = sandbox._unpack(json.loads(head), body)
+    (back,) = through_the_wall(tmp_path, monkeypatch, read_in_sandbox)
     assert back.values.tolist() == [0.0, 1.0, 2.0]
 
 
@@ -83,4 +95,4 @@ def test_what_fuzzing_found_is_refused(name, monkeypatch):
     pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
     monkeypatch.setattr(sandbox, "SECONDS", 10.0)
     with pytest.raises(RigDataError, match=rf"{name}\.mf4"):
-        read_foreign(DAMAGED / f"{name}.mf4", f"{name}.mf4")
+        read_series(DAMAGED / f"{name}.mf4", f"{name}.mf4")

@@ -17,7 +17,7 @@ from model.pivots import load_pivots
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.readers.base import FORMATS
-from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.file_reader import read_series
 from tests.manifests import PROBE, manifest
 
 pytestmark = pytest.mark.slow
@@ -161,7 +161,7 @@ def test_channel_names_of_any_writing_are_taken_or_told_in_print(tmp_path, name)
 def test_a_folder_in_the_place_of_a_record(tmp_path, suffix):
     (tmp_path / f"r{suffix}").mkdir()
     with pytest.raises(RigDataError, match=r"not there|not an ordinary file"):
-        read_foreign(tmp_path / f"r{suffix}", f"r{suffix}")
+        read_series(tmp_path / f"r{suffix}", f"r{suffix}")
 
 
 @pytest.mark.parametrize("load", [load_bearing, load_pivots, load_effects, rigdata.load_campaign])

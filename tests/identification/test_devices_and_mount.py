@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.estimate.block_cases import Case, made
-from tpjb_ident.identification.campaign_blocks import found_mount, with_start
+from tests.estimate.block_cases import Case, made, solved
+from tpjb_ident.estimate.sensors import found_mount
+from tpjb_ident.identification.campaign_blocks import with_start
+from tpjb_ident.identification.campaign_solution import learnt_rig
 from tpjb_ident.identification.unstated_clocks import with_found_devices
 
 CASE = Case(hertz=(30.0, 60.0, 90.0))
@@ -77,3 +79,14 @@ def test_further_devices_start_late_by_what_nobody_states():
     assert (late["D1"], late["F1"], late["A1"]) == (0.0, 1e-4, 1e-4)
     told = replace(rig.sensors[2], delay_uncertainty=3e-3)
     assert with_start((*rig.sensors[:2], told), 1e-4)[2].delay_uncertainty == 3e-3
+
+
+@pytest.mark.parametrize(("gain", "name"), [(0.0, None), (0.05, "probe-gains-differ"), (0.5, "records-contradicted")])
+def test_probes_that_differ_are_told_though_their_gains_are_taken_as_uncertain_as_that(gain, name):
+    case = replace(CASE, probes=3, gains={"D1": gain}, stated={"displacement": {"uncertainty": 0.005}})
+    rig, blocks, truth = made(case)
+    learnt = learnt_rig(rig, solved(rig, blocks, truth))
+    assert (learnt is rig) is (name is None)
+    told = solved(learnt, blocks, truth).conditions()
+    assert [str(condition) for condition in told] == ([] if name is None else [name])
+    assert all("beyond the uncertainty stated of D1" in condition.detail for condition in told)

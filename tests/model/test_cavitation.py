@@ -10,8 +10,6 @@ import pytest
 from model.bearing import Bearing
 from model.dynamics import bearing_impedance
 from model.effects import Effect
-from model.film.models import FILM_MODELS
-from model.film.reynolds import solve_film
 from model.options import CAVITATION, Options
 from model.predict import predict
 from model.prediction import Prediction
@@ -51,7 +49,6 @@ def test_pads_that_are_held_notice(rocker):
 def test_what_lies_behind_the_rupture_is_known(spherical):
     p = run(spherical, 8750.0)
     film = p.equilibrium.films[0]
-    assert FILM_MODELS["swift-stieber"] is solve_film
     wedge = (film.pad.pad_clearance, *film.approach(p.bearing_position))
     theta = fluid_fraction(film.grid, film.work, wedge, SPEED * spherical.journal_radius)
     ruptured = film.work.ruptured.copy()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -9,12 +12,16 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from model.film.cavitation import solve_flooded_film
+from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
-from model.film.models import FilmSolver
 from model.film.reynolds import FilmForces, solve_film
 
 MU, RHO, SPEED, RADIUS, CLEARANCE = 0.03, 850.0, 7.0, 0.05, 1e-4
+
+
+def solve_flooded_film(*args: Any) -> FilmForces:
+    """Mass conserved, as much oil supplied as the gap takes."""
+    return solve_film_jfo(*args, (1.0, np.inf))
 
 
 def solve(
@@ -24,7 +31,7 @@ def solve(
     arc: tuple[float, float] = (-0.5, 0.5),
     sharp: bool = False,
     symmetric: bool = True,
-    solver: FilmSolver = solve_film,
+    solver: Callable[..., FilmForces] = solve_film,
 ) -> tuple[FilmGrid, FilmWork, FilmForces]:
     """Solve one isoviscous film; `wedge` is (a, b) over the clearance."""
     grid = film_grid(*arc, RADIUS, length, shape, symmetric)

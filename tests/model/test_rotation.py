@@ -12,6 +12,7 @@ from model.bearing import ROTATIONS, BearingError
 from model.bearing_file import parse_bearing
 from model.effects import Effect
 from model.errors import OptionError
+from model.mirror import as_it_turns
 from model.predict import predict
 from rigdata import operating_point
 
@@ -76,8 +77,16 @@ def test_a_shaft_against_the_stated_sense_enters_at_the_other_edge(rocker):
 def test_the_sense_of_the_bearing_is_the_default(rocker):
     assert predict(with_offset(rocker, 0.6, "clockwise"), **POINT).rotation == "clockwise"
     assert predict(rocker, **POINT).rotation == "counter-clockwise"
-    assert with_offset(rocker, 0.6).stated_for("clockwise").rotation == "clockwise"
-    assert with_offset(rocker, 0.6, "clockwise").stated_for("counter-clockwise").rotation == "clockwise"
+
+
+def test_leading_edges_belong_to_the_stated_sense_else_to_that_of_the_runs(rocker):
+    right, left = ROTATIONS
+    assert as_it_turns(with_offset(rocker, 0.6), {left}, right).rotation == left
+    assert as_it_turns(with_offset(rocker, 0.6, left), {*ROTATIONS}, right).rotation == left
+    assert as_it_turns(rocker, {*ROTATIONS}, left).rotation == left
+    assert as_it_turns(rocker, set(), left).rotation == left
+    with pytest.raises(BearingError, match=r"\[bearing\] rotation: the shaft turns both ways"):
+        as_it_turns(with_offset(rocker, 0.6), {*ROTATIONS})
 
 
 def test_a_sense_that_there_is_not_is_refused(rocker, rocker_file):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
+from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import (
@@ -341,20 +342,13 @@ class Run:
         self.displacement = vectors(ANGLES[0], REACH + SCALE * load) + 2e-8 * rng.standard_normal((n, 2))
 
     def vector(self, quantity):
-        return _Vector(getattr(self, quantity), self.time)
+        values = getattr(self, quantity)
+        return VectorRecord(quantity, values, self.time[: len(values)], self.sample_rate, ("H", "V"))
 
     def record(self, name):
         vector = getattr(self, CHANNELS[name].quantity)
         axis = CHANNELS[name].axis
         return SimpleNamespace(values=vector @ np.array([math.cos(axis), math.sin(axis)]))
-
-
-class _Vector:
-    def __init__(self, values, time):
-        self.values, self.time = values, time[: len(values)]
-
-    def __len__(self):
-        return len(self.values)
 
 
 def read(run, **settings):

@@ -13,11 +13,16 @@ from pathlib import Path
 import h5py
 
 _ANGLES = re.compile(r'^(axis|static_load_direction|excitation_direction) = "([-+.\d]+) deg"', re.MULTILINE)
+_SENSE = re.compile(r'^rotation = "(.*)"', re.MULTILINE)
 _CHANNEL = re.compile(r"^\[channels\.(\w+)\]$", re.MULTILINE)
 
 
 def _turned(degrees: str) -> str:
     return f"{(360.0 - float(degrees)) % 360.0 - 180.0:.12g}"
+
+
+def _turning_back(text: str) -> str:
+    return _SENSE.sub(lambda found: f'rotation = "{"counter-" if found[1] == "clockwise" else ""}clockwise"', text)
 
 
 def mirrored_manifest(text: str, pads: int) -> tuple[str, set[str]]:
@@ -33,8 +38,10 @@ def mirrored_manifest(text: str, pads: int) -> tuple[str, set[str]]:
         blocks[i] = re.sub(
             r"^pad = (\d+)", lambda found: f"pad = {pads + 1 - int(found[1])}", block, flags=re.MULTILINE
         )
-    blocks.insert(1, '[shaft]\nrotation = "clockwise"\n\n')
-    return "".join(blocks), negated
+    text = _turning_back("".join(blocks))
+    if "[shaft]" not in text:
+        text = text.replace("[", '[shaft]\nrotation = "clockwise"\n\n[', 1)
+    return text, negated
 
 
 def mirrored_bearing(text: str) -> tuple[str, int]:
@@ -49,7 +56,7 @@ def mirrored_bearing(text: str) -> tuple[str, int]:
             entries = [f'"{_turned(entry.strip(chr(34)).removesuffix(" deg"))} deg"' for entry in entries]
         return f"{found[1]} = [{', '.join(entries)}]"
 
-    return re.sub(r"^(\w+) = \[(.*?)\]", turn, text, flags=re.MULTILINE), pads
+    return _turning_back(re.sub(r"^(\w+) = \[(.*?)\]", turn, text, flags=re.MULTILINE)), pads
 
 
 def mirror_campaign(source: Path, target: Path) -> Path:

@@ -74,7 +74,7 @@ ONE_RUN = {
         Fault("swapped", RUN, "A1H", other="A1V"),
         "warning",
         "channels A1H and A1V",
-        "the cell force and the other runs",
+        "the housing's mount and the other runs",
     ),
     "accelerometer inverted": (Fault("inverted", RUN, "A1H"), "warning", "channels A1H", "A1H had the wrong sign"),
     "other load": (Fault("wrong_load", RUN, value=1.6), "error", "mean force", "static_load says 8000 N"),
@@ -127,7 +127,7 @@ ALL_RUNS = {
     "horizontal cell inverted": (Fault("inverted", "*", "L1H"), "L1H had the wrong sign"),
     "cells a tenth": (Fault("scaled", "*", "L1*", value=0.1), "10 times too large"),
     "probe ten times": (Fault("scaled", "*", "X1A", value=10.0), "one sensitivity were ten times off"),
-    "accelerometer inverted": (Fault("inverted", "*", "A1H"), "in phase with the cell force"),
+    "accelerometer inverted": (Fault("inverted", "*", "A1H"), "they move with the cells' force"),
     "accelerometer dead": (Fault("dead", "*", "A1H"), "is dead"),
     "speed doubled": (Fault("scaled", "*", "K1", value=2.0), "shaft_speed says 22 Hz"),
 }

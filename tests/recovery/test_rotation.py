@@ -1,16 +1,34 @@
-"""A campaign and its mirror image, whose shaft turns clockwise: the same answers, in each rig's own frame."""
+"""A campaign and its mirror image, whose shaft turns clockwise: the same answers, in each rig's own frame.
+
+And campaigns that turn both ways, with pivots off the middle: the leading edge is where each run's shaft comes from.
+"""
 
 from __future__ import annotations
 
 import math
+import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
 import rigdata
 import tpjb_ident as ti
+from model.bearing import BearingError
+from model.bearing_file import parse_bearing
+from model.effects import Effect, known_effects
+from rigdata.operating_point import ROTATIONS
+from rigdata.virtual_rig import ClearanceSweep, Instruments, RigPlan, VirtualRig, locus_points, operating_points
+from tests.command_line import tpjb
+from tests.good_campaigns import BEARINGS, directions
 from tests.recovery.mirrored_campaign import mirror_campaign
+from tpjb_ident.compare.predictions import ModelSettings
+from tpjb_ident.compare.rig_from_model import rig_truth
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 
 pytestmark = pytest.mark.slow
 MIRROR = np.diag([-1.0, 1.0])
@@ -53,3 +71,131 @@ def test_pivots_clearance_and_locus_are_the_mirror_image(tmp_path):
     assert {(180 - angle) % 360 for angle in places[1]} == set(places[0])
     for angle, place in places[1].items():
         np.testing.assert_allclose(MIRROR @ place, places[0][(180 - angle) % 360], atol=1e-14)
+
+
+OFFSET = (BEARINGS / "rocker.toml").read_text("utf-8").replace("pivot_offset = 0.5", "pivot_offset = 0.6")
+STATED = OFFSET.replace("[bearing]", '[bearing]\nrotation = "counter-clockwise"')
+RIGID = ti.CompareSettings(variants=("rigid",), thermal="isothermal")
+ONE_WAY = RigPlan(
+    dynamic=operating_points([(3000.0, 25.0), (6000.0, 25.0)]), directions=directions(3), locus=locus_points(4)
+)
+
+
+def both_ways(plan):
+    back = plan.turning("clockwise")
+    return replace(
+        plan, dynamic=plan.dynamic + back.dynamic, locus=plan.locus + back.locus, clearance=(ClearanceSweep(),)
+    )
+
+
+def offset_rig(text, plan, model=None):
+    truth = rig_truth(parse_bearing(text, "b.toml"), model or ModelSettings("rigid", "isothermal"), text)
+    return VirtualRig(truth, plan, Instruments.like_paper(5, 3), seed=11)
+
+
+@pytest.fixture(scope="module")
+def both(campaign_of):
+    return campaign_of(offset_rig(STATED, both_ways(ONE_WAY)), name="both")
+
+
+def comparison_of(path):
+    campaign = ti.load_campaign(path)
+    return ti.compare_campaign(campaign, ti.load_bearing(campaign.bearing_text), RIGID)
+
+
+@pytest.fixture(scope="module")
+def compared(both):
+    return comparison_of(both)
+
+
+def rewritten(campaign, target, attribute, change):
+    """A copy whose manifest or bearing file is another text."""
+    shutil.copy(campaign, target)
+    target.chmod(0o644)
+    with h5py.File(target, "r+") as file:
+        file.attrs[attribute] = change(str(file.attrs[attribute]))
+    return target
+
+
+def test_each_sense_of_one_campaign_has_its_own_leading_edge(both, compared):
+    truth = rig_truth(parse_bearing(STATED, "b.toml"), ModelSettings("rigid", "isothermal"))
+    for measured, predicted in zip(compared.identification.points, compared.variant("rigid").points, strict=True):
+        h = truth.stiffness(measured.point)
+        size = np.abs(h).max()
+        np.testing.assert_allclose(predicted.k + 1j * measured.point.excitation * predicted.c, h, atol=1e-9 * size)
+        np.testing.assert_allclose(measured.stiffness.h, h, atol=0.01 * size)
+    kxx = {p.point.key: p.stiffness.h[0, 0].real for p in compared.identification.points}
+    assert len(kxx) == 4
+    for (*point, rotation), k in kxx.items():
+        assert rotation == "clockwise" or k > 5.0 * kxx[(*point, "clockwise")]
+    places = {rotation: compared.locus.to_frame().query("rotation == @rotation") for rotation in ROTATIONS}
+    assert [len(frame) for frame in places.values()] == [4, 4]
+    measured, predicted = compared.locus.to_frame(), [p.prediction.position for p in compared.variant("rigid").locus]
+    np.testing.assert_allclose(predicted, measured[["x_m", "y_m"]], atol=5e-7)
+
+
+def test_identify_marks_the_points_that_turn_clockwise(both, tmp_path):
+    lines = tpjb("identify", both, "--out", tmp_path / "out").stdout.splitlines()
+    rows = [line.split() for line in lines if re.match(r" *[36] +-90 ", line)]
+    table = pd.read_csv(tmp_path / "out" / "coefficients.csv")
+    assert sorted(table["rotation"]) == sorted(2 * ROTATIONS)
+    assert [row[2:4] == ["22", "cw"] for row in rows] == list(table["rotation"] == "clockwise")
+
+
+def test_the_mirror_image_of_both_senses(both, compared, tmp_path):
+    image = rewritten(both, tmp_path / "copy.h5", "manifest", str)
+    mirrored = comparison_of(mirror_campaign(image, tmp_path / "mirrored.h5"))
+    image_of = {p.point.key: (p, q) for p, q in zip(
+        mirrored.identification.points, mirrored.variant("rigid").points, strict=True)}  # fmt: skip
+    for p, q in zip(compared.identification.points, compared.variant("rigid").points, strict=True):
+        *point, rotation = p.point.key
+        measured, predicted = image_of[(*point, ROTATIONS[rotation == ROTATIONS[0]])]
+        size = np.abs(p.stiffness.h).max()
+        np.testing.assert_allclose(MIRROR @ measured.stiffness.h @ MIRROR, p.stiffness.h, atol=1e-9 * size)
+        np.testing.assert_allclose(MIRROR @ predicted.k @ MIRROR, q.k, atol=1e-9 * size)
+        np.testing.assert_allclose(MIRROR @ predicted.c @ MIRROR, q.c, atol=1e-9 * size / p.point.excitation)
+
+
+def test_runs_that_all_state_the_sense_are_the_shaft_that_states_it(campaign_of, tmp_path):
+    stated = campaign_of(offset_rig(OFFSET, ONE_WAY.turning("clockwise")), name="clockwise")
+
+    def run_by_run(text):
+        without = text.replace('[shaft]\nrotation = "clockwise"\n', "")
+        assert len(without) < len(text)
+        return re.sub(r'^(kind = "(?:dynamic|locus)")', r'\1\nrotation = "clockwise"', without, flags=re.MULTILINE)
+
+    by_run = rewritten(stated, tmp_path / "runs.h5", "manifest", run_by_run)
+    one, many = (comparison_of(path).to_dataframe() for path in (stated, by_run))
+    assert set(many["rotation"]) == {"clockwise"}
+    np.testing.assert_allclose(many["kxx_N_per_m_predicted"], many["kxx_N_per_m"], rtol=0.01)
+    for name in ("kxx", "kxy", "cyy"):
+        np.testing.assert_allclose(many[f"{name}_N{'s' * (name[0] == 'c')}_per_m_predicted"],
+                                   one[f"{name}_N{'s' * (name[0] == 'c')}_per_m_predicted"], rtol=1e-9)  # fmt: skip
+
+
+def test_an_edge_that_nothing_states_is_asked_for(both, tmp_path):
+    unstated = rewritten(both, tmp_path / "unstated.h5", "bearing", lambda text: OFFSET)
+    points = [run.point for run in ti.load_campaign(both).of_kind("dynamic")]
+    for command in (
+        lambda: comparison_of(unstated),
+        lambda: ti.diagnose(unstated),
+        lambda: ti.plan(ti.load_bearing(OFFSET), points),
+    ):
+        with pytest.raises(BearingError, match=r"\[bearing\] rotation: the shaft turns both ways.* Write rotation = "):
+            command()
+    central = rewritten(both, tmp_path / "central.h5", "bearing", lambda text: OFFSET.replace("0.6", "0.5"))
+    assert len(comparison_of(central).to_dataframe()) == 4
+
+
+def test_a_diagnosis_of_both_senses_names_what_is_there(campaign_of):
+    soft = ModelSettings("kirk", "isothermal", (Effect("soft_pivot", pad=1, stiffness_factor=0.4),))
+    plan = replace(both_ways(ONE_WAY), locus=())
+    campaign = campaign_of(offset_rig(STATED, plan, soft), name="soft")
+    others = frozenset(known_effects()) - {"pivot_flexibility", "soft_pivot"}
+    result = ti.diagnose(campaign, thermal="isothermal", settings=DiagnoseSettings(skip=others))
+    verdict = result.diagnosis.verdict
+    assert verdict.verdict == "named"
+    (effect,) = verdict.effects
+    assert effect.name == "soft_pivot"
+    assert effect.parameters["pad"].value == 1
+    assert effect.parameters["stiffness_factor"].value == pytest.approx(0.4, abs=0.05)

@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 from rigdata.operating_point import OperatingPoint
+from rigdata.record import VectorRecord
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
@@ -157,6 +158,7 @@ class Shaken:
 
     id: str = "d-1"
     sample_rate: float = 1000.0
+    cells_every: int = 1  #: samples of the probes to one of the cells
 
     def __post_init__(self):
         rng = np.random.default_rng(4)
@@ -167,16 +169,10 @@ class Shaken:
         self.point = OperatingPoint(5000.0, 0.0, 2 * np.pi * 22.0, 2 * np.pi * 25.0)
 
     def vector(self, quantity):
-        return _Vector(self.data[quantity])
-
-
-class _Vector:
-    def __init__(self, values):
-        self.values = values
-        self.time = np.arange(len(values)) / Shaken.sample_rate
-
-    def __len__(self):
-        return len(self.values)
+        step = self.cells_every if quantity == "force" else 1
+        values = self.data[quantity][::step]
+        rate = self.sample_rate / step
+        return VectorRecord(quantity, values, np.arange(len(values)) / rate, rate, ("H", "V"))
 
 
 def windows() -> SimpleNamespace:

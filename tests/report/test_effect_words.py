@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from model.effects import kind_of, known_effects
-from tpjb_ident.compare.effect_words import amount, finding, label_in_words, words_of
-from tpjb_ident.diagnosis.verdict.verdict import Assumption
-from tpjb_ident.report.diagnosis_page import _row
+from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, words_of
+from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
+from tpjb_ident.report.diagnosis_page import _evidence_sections, _other_explanations, _row
 from tpjb_ident.report.diagnosis_words import in_words, place
 
 
@@ -42,14 +42,14 @@ def test_numbers_of_a_sentence_are_in_the_units_that_people_read():
 
 def test_tolerances_are_in_the_units_that_people_read():
     rows = [_row(Assumption(*one)) for one in (
-        ("clearance_scatter", 2e-6, [6.6e-07, -1.2e-06], "m", "default"),
+        ("clearance_scatter", 2e-6, [6.6e-07, -1.2e-06], "m", "default", 3.4),
         ("film_heat", 0.07, -0.0357, "1", "default"),
-        ("supply_temperature", 0.5, -0.39, "K", "default"),
+        ("supply_temperature", 0.5, -0.39, "K", "default", -0.78),
     )]  # fmt: skip
     assert rows == [
-        ["clearance scatter", "2 µm", "default", "+0.7, −1.2 µm"],
-        ["film heat", "7 %", "default", "−3.6 %"],
-        ["supply temperature", "0.5 K", "default", "−0.4 K"],
+        ["clearance scatter", "2 µm", "default", "+0.7, −1.2 µm", "+3.4"],
+        ["film heat", "7 %", "default", "−3.6 %", ""],
+        ["supply temperature", "0.5 K", "default", "−0.4 K", "−0.8"],
     ]
 
 
@@ -88,3 +88,41 @@ def test_places_have_kilonewtons_and_degrees():
     assert place("static_load_direction -90-72 deg") == "at load direction -90 to 72°"
     assert place("pad 5") == "at pad #5"
     assert in_words("repeat dry_compliance at pad 2") == "repeat the dry pivot tests at pad #2"
+
+
+def oil(factor):
+    return {"oil_viscosity": {"factor": {"value": factor, "lo": factor - 0.02, "hi": factor + 0.02, "unit": "1"}}}
+
+
+GROWTH = {"thermal_growth": {"clearance_change": {"value": 9e-6, "lo": 8.8e-6, "hi": 9.2e-6, "unit": "m"}}}
+
+
+@pytest.mark.parametrize(
+    ("alone", "both", "says"),
+    [
+        (0.264, 0.736, "It may also be that the running clearance is 9.00 ± 0.20 µm larger than cold and the oil is "
+                       "12.0 ± 2.0 % thinner than stated: probability 0.74, that of what is named 0.26."),
+        (0.90, 0.05, "probability 0.05, that of what is named 0.90."),
+        (0.96, 0.04, "No other explanation that was fitted comes within odds of 1 to 19 of it."),
+        (0.0, 0.9, "probability 0.90, that of what is named 0.00."),
+    ],
+)  # fmt: skip
+def test_a_rival_that_the_data_do_not_rule_out_stands_beside_the_name(alone, both, says):
+    named = RankedCandidate("thermal_growth", 40.0, 0.3, GROWTH, alone)
+    rival = RankedCandidate("thermal_growth + oil_viscosity", 43.0, 0.2, GROWTH | oil(0.88), both)
+    found = FoundEffect("thermal_growth", {"clearance_change": Estimate(9e-6, 8.8e-6, 9.2e-6, "m")})
+    verdict = Verdict("named", (found,), (), (), "", (rival, named), (), {}, {}, Remainder(0.2, 0.0, "kyy", 0.5))
+    (section,) = _other_explanations(verdict)
+    assert len(section.notes) == 1
+    assert section.notes[0].endswith(says)
+
+
+def test_a_tolerance_beyond_three_deviations_is_said_under_its_table():
+    assumptions = tuple(Assumption(name, 0.05, -0.1, "1", "default", far) for name, far in (
+        ("viscosity", -3.2), ("film_heat", 2.9), ("probe_gain", 0.0),
+    ))  # fmt: skip
+    left = Remainder(0.2, 0.0, "kyy", 0.5)
+    verdict = Verdict("consistent", (), (), (), "", (), (), {}, {}, left, assumptions=assumptions)
+    section = _evidence_sections(verdict)[-1]
+    assert section.notes[1:] == ["The viscosity is 3.2 standard deviations from what is stated: check it."]
+    assert [row[-1] for row in section.tables[0].rows] == ["−3.2", "+2.9", ""]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import rigdata
 from rigdata.problem import RigDataError
-from rigdata.readers.cached_reader import ReadingCache
+from rigdata.readers.file_reader import ReadingCache
 from rigdata.readers.text.cells import MISSING
 from tests.manifests import PROBES, SWEEP, manifest
 from tpjb_ident.check.campaign import check_campaign
@@ -320,10 +320,12 @@ def test_file_with_none_of_the_used_channels(tmp_path):
     refused(make(tmp_path, text, clock={"quantity": "ignore"}), "none of the channels")
 
 
-def test_large_files_are_parsed_by_column(tmp_path, monkeypatch):
-    monkeypatch.setattr("rigdata.readers.text.csv._LARGE_FILE", 100)
+def test_long_columns_wait_in_files(tmp_path, monkeypatch):
+    monkeypatch.setattr("rigdata.readers.series.IN_MEMORY", 100)
     expect_good(make(tmp_path, table()))
-    expect_good(make(tmp_path, table() + ";;\r\n"))
+    run = make(tmp_path, table() + ";;\r\n")
+    expect_good(run)
+    assert isinstance(run.reader._layout().values["X1A"], np.memmap)
 
 
 def test_a_cache_lets_go_of_old_runs():

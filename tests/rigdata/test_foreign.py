@@ -15,10 +15,8 @@ from scipy.io import savemat
 from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
 from rigdata.readers.base import FORMATS
-from rigdata.readers.cached_reader import ReadingCache
-from rigdata.readers.formats.foreign import ForeignReader, is_foreign, read_foreign
-from rigdata.readers.grids import arranged
-from rigdata.readers.series import Series, equidistant, is_time, seconds, with_unique_names
+from rigdata.readers.file_reader import FileReader, ReadingCache, read_series
+from rigdata.readers.series import Series, arranged, equidistant, is_time, seconds, with_unique_names
 from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
 
@@ -166,7 +164,7 @@ def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
 def test_a_broken_file_is_refused_by_name(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(RigDataError) as caught:
-        read_foreign(tmp_path / name, name)
+        read_series(tmp_path / name, name)
     assert name in str(caught.value)
 
 
@@ -177,27 +175,27 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "nptdms", None)
     monkeypatch.delitem(sys.modules, "rigdata.readers.formats.tdms", raising=False)
     with pytest.raises(RigDataError, match=r'pip install "tpjb-ident\[tdms\]"'):
-        read_foreign(tmp_path / "a.tdms", "a.tdms")
+        read_series(tmp_path / "a.tdms", "a.tdms")
 
 
 def test_links_out_of_a_matlab_file_are_refused(tmp_path):
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         file["x"] = h5py.ExternalLink("/etc/passwd", "/x")
     with pytest.raises(RigDataError, match="is a link"):
-        read_foreign(tmp_path / "a.mat", "a.mat")
+        read_series(tmp_path / "a.mat", "a.mat")
 
 
 @pytest.mark.parametrize("suffix", sorted(FORMATS))
 def test_an_empty_file_is_called_empty(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_bytes(b"")
     with pytest.raises(RigDataError, match="is empty"):
-        read_foreign(tmp_path / f"a{suffix}", f"a{suffix}")
+        read_series(tmp_path / f"a{suffix}", f"a{suffix}")
 
 
 def test_a_matlab_file_without_vectors_says_what_it_holds(tmp_path):
     savemat(tmp_path / "a.mat", {"gain": 2.0, "note": "bearing 3"})
     with pytest.raises(RigDataError, match="no vector of at least 8 numbers, only gain, note"):
-        read_foreign(tmp_path / "a.mat", "a.mat")
+        read_series(tmp_path / "a.mat", "a.mat")
 
 
 @pytest.mark.parametrize("name", ["one.tdms", "one.parquet", "one.unv"])
@@ -206,10 +204,10 @@ def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeyp
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         WRITERS[name](path)
-    short = ForeignReader(path, path.name, "r", {})
+    short = FileReader(path, path.name, "r", {})
     monkeypatch.setattr(series, "IN_MEMORY", 1000)
     equidistant.cache_clear()
-    long = ForeignReader(path, path.name, "r", {})
+    long = FileReader(path, path.name, "r", {})
     assert any(isinstance(v, np.memmap) for v in long._layout().values.values())
     for start, stop in ((0, COUNT), (17, 400), (COUNT - 3, COUNT)):
         np.testing.assert_array_equal(long.read(["X1A"], start, stop), short.read(["X1A"], start, stop))
@@ -220,7 +218,7 @@ def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
     cache = ReadingCache(limit=3 * 8 * COUNT)
     for i in range(6):
         savemat(tmp_path / f"{i}.mat", {"X1A": X + i, "fs": RATE})
-        reader = ForeignReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", {}, cache=cache)
+        reader = FileReader(tmp_path / f"{i}.mat", f"{i}.mat", "r", {}, cache=cache)
         assert reader.read(["X1A"], 0, 1)[0][0] == X[0] + i
     assert cache.nbytes <= 3 * 8 * COUNT
 
@@ -238,7 +236,7 @@ def test_slow_channels_stay_at_their_own_times():
     layout = arranged([slow, fast], {}, None, "f", "r")
     first, second = layout.grids
     assert (first.length, first.rate, second.length) == (11, 10.0, 2)
-    np.testing.assert_array_equal(layout.time(second, 0, 2), slow.time)
+    np.testing.assert_array_equal(layout.times[second.clock], slow.time)
     np.testing.assert_array_equal(layout.values["b"], slow.values)
 
 
@@ -248,18 +246,17 @@ def test_channels_of_one_name_get_their_groups_name_or_a_number(groups, names):
     assert [channel.name for channel in series] == names
 
 
-def test_only_these_suffixes_are_foreign(tmp_path):
-    (tmp_path / "a.txt").write_text("t;x\n0;1\n1;2\n2;3\n", encoding="utf-8")
-    assert not is_foreign(tmp_path / "a.txt")
-    assert not is_foreign(tmp_path / "a.csv")
-    assert all(is_foreign(tmp_path / f"a{suffix}") for suffix in FORMATS)
+def test_a_text_of_any_suffix_is_a_table(tmp_path):
+    (tmp_path / "a.xyz").write_text("t;x\n0;1\n1;2\n2;3\n", encoding="utf-8")
+    (column,) = read_series(tmp_path / "a.xyz", "a.xyz")
+    assert (column.name, column.values.tolist(), column.rate) == ("x", [1.0, 2.0, 3.0], 1.0)
 
 
 def test_a_rate_is_asked_for_where_the_file_knows_none(tmp_path):
     savemat(tmp_path / "a.mat", {"X1A": X})
     with pytest.raises(RigDataError, match="sample_rate"):
-        ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}).rate()
-    assert ForeignReader(tmp_path / "a.mat", "a.mat", "r", {}, stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
+        FileReader(tmp_path / "a.mat", "a.mat", "r", {}).rate()
+    assert FileReader(tmp_path / "a.mat", "a.mat", "r", {}, stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
 
 
 TIMES = ("Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps")
@@ -273,3 +270,8 @@ def test_times_by_name(name):
 
 def test_times_in_other_units():
     np.testing.assert_allclose(seconds(np.array([1.0, 2.0]), "[ms]"), [1e-3, 2e-3])
+
+
+def test_a_signalling_nan_among_times_is_a_missing_time():
+    times = np.array([0, 0x7FF0000000000001, 0x4000000000000000], dtype="u8").view("f8")
+    np.testing.assert_array_equal(seconds(times, "ms"), [0.0, np.nan, 0.002])

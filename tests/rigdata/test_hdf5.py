@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tracemalloc
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 import rigdata
 from rigdata.problem import RigDataError
 from rigdata.readers import base
+from rigdata.readers.hdf5 import guards
 from rigdata.readers.hdf5.guards import too_long_text
 from tests.manifests import PROBES, SWEEP, manifest
 from tpjb_ident.check.campaign import check_campaign
@@ -309,9 +311,10 @@ def test_samples_that_look_like_a_heap_by_chance_are_none(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["manifest", "bearing"])
-@pytest.mark.parametrize("block", [0, 512])
-def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, name, block):
+@pytest.mark.parametrize(("block", "piece"), [(0, 2**20), (512, 2**20), (0, 9)])
+def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, monkeypatch, name, block, piece):
     """A wrong byte in the length of a text: found by fuzzing, the library made room for 4 GB."""
+    monkeypatch.setattr(guards, "_PIECE", piece)
     path = tmp_path / "a.h5"
     texts = {"manifest": MANIFEST, "bearing": 'name = "b"' + " " * 300}
     with h5py.File(path, "w", userblock_size=block) as file:
@@ -326,6 +329,18 @@ def test_a_text_that_claims_gigabytes_is_refused_before_room_is_made(tmp_path, n
     assert too_long_text(path, list(texts), block) == name
     with pytest.raises(RigDataError, match=f"attribute {name}: claims a text longer than the file"):
         rigdata.load_campaign(path)
+
+
+def test_opening_a_large_file_takes_no_memory_that_grows_with_it(tmp_path):
+    with changed(tmp_path / "c.h5") as group:
+        group.create_dataset("other", data=np.ones(2**22))  # 32 MB
+    tracemalloc.start()
+    try:
+        rigdata.load_campaign(tmp_path / "c.h5")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 2**23
 
 
 @pytest.mark.parametrize("rate", ["1e-300 Hz", "1e13 Hz"])

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN, markdown
+from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN
 from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
 from rigdata.problem import Problem, RigDataError
 from rigdata.units import SI_UNITS, parse_quantity
+from tests.rigdata.manifest_tables import markdown
 
 GOOD = """\
 schema = "tpjb-rig/1"
@@ -276,7 +277,6 @@ def test_mutated_manifests_parse_or_tell_their_problems(data):
 
 
 def test_every_key_is_in_the_docs(checkout):
-    # python -c "from rigdata.manifest.fields import markdown; print(markdown())"
     assert markdown() in (checkout / "docs" / "campaigns.md").read_text("utf-8")
 
 

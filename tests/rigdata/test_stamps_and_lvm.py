@@ -8,7 +8,7 @@ import pytest
 from scipy.io import savemat
 
 from rigdata import RigDataError, load_campaign
-from rigdata.readers.formats.foreign import read_foreign
+from rigdata.readers.file_reader import read_series
 from rigdata.readers.text.cells import stamp_seconds
 from rigdata.survey.exports import read_export
 from tests.manifests import PROBE, SET_POINT, manifest
@@ -129,7 +129,7 @@ def lvm(x_columns: str, separator: str = "\t", decimal: str = ".", segments: int
 def test_labview_measurement_files_of_every_layout(tmp_path, x_columns, separator, decimal):
     path = tmp_path / "a.lvm"
     path.write_text(lvm(x_columns, separator, decimal), newline="")
-    x, force, warm = read_foreign(path, "a.lvm")
+    x, force, warm = read_series(path, "a.lvm")
     assert [(s.name, s.unit) for s in (x, force, warm)] == [("X1A", "V"), ("L1H", "mV"), ("T1", "degC")]
     assert (x.rate, warm.rate) == (RATE, RATE / 10)
     np.testing.assert_allclose(x.values, X, atol=1e-9)
@@ -139,7 +139,7 @@ def test_labview_measurement_files_of_every_layout(tmp_path, x_columns, separato
 def test_segments_of_a_labview_file_follow_each_other(tmp_path):
     path = tmp_path / "a.lvm"
     path.write_text(lvm("One", segments=3), newline="")
-    x = read_foreign(path, "a.lvm")[0]
+    x = read_series(path, "a.lvm")[0]
     assert len(x) == 3 * COUNT
     np.testing.assert_allclose(x.time, np.arange(3 * COUNT) / RATE, atol=1e-9)
     assert x.values[-1] == pytest.approx(X[-1] + 2)
@@ -148,7 +148,7 @@ def test_segments_of_a_labview_file_follow_each_other(tmp_path):
 def test_a_labview_file_whose_rows_end_before_the_column_of_comments(tmp_path):
     lines = [line.removesuffix("\t") for line in lvm("One").replace("a remark", "").split("\r\n")]
     (tmp_path / "a.lvm").write_text("\r\n".join(lines), newline="")
-    np.testing.assert_allclose(read_foreign(tmp_path / "a.lvm", "a.lvm")[1].values, -X, atol=1e-9)
+    np.testing.assert_allclose(read_series(tmp_path / "a.lvm", "a.lvm")[1].values, -X, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_a_labview_file_whose_rows_end_before_the_column_of_comments(tmp_path):
 def test_what_cannot_be_read_says_why(tmp_path, name, content, says):
     (tmp_path / name).write_text(content, newline="")
     with pytest.raises(RigDataError, match=says):
-        read_foreign(tmp_path / name, name)
+        read_series(tmp_path / name, name)
 
 
 def test_a_universal_file_without_time_records_says_what_it_holds(tmp_path):
@@ -178,7 +178,7 @@ def test_a_universal_file_without_time_records_says_what_it_holds(tmp_path):
     )  # fmt: skip
     pyuff.UFF(str(path)).write_sets(data, "add")
     with pytest.raises(RigDataError, match="no record over time, only 1 x frequency response function"):
-        read_foreign(path, "a.uff")
+        read_series(path, "a.uff")
 
 
 @pytest.mark.parametrize("rows", [False, True])
@@ -186,7 +186,7 @@ def test_a_matrix_is_named_by_the_texts_beside_it(tmp_path, rows):
     data = np.stack([TIME, X, -X], axis=1)
     names, units = np.array(["Time", "X1A", "L1H"], dtype=object), np.array(["ms", "V", "mV"], dtype=object)
     savemat(tmp_path / "a.mat", {"Data": data.T if rows else data, "ChannelNames": names, "ChannelUnits": units})
-    x, force = read_foreign(tmp_path / "a.mat", "a.mat")
+    x, force = read_series(tmp_path / "a.mat", "a.mat")
     assert [(s.name, s.unit) for s in (x, force)] == [("X1A", "V"), ("L1H", "mV")]
     np.testing.assert_allclose(x.values, X)
     assert x.rate == pytest.approx(1e3 * RATE)
@@ -201,7 +201,7 @@ def test_a_matrix_in_a_file_of_version_seven_three_is_named_likewise(tmp_path):
             text.attrs["MATLAB_class"] = np.bytes_("char")
             cells.append(text.ref)
         file.create_dataset("ChannelNames", data=np.array([cells], dtype=object).T, dtype=h5py.ref_dtype)
-    x, force = read_foreign(tmp_path / "a.mat", "a.mat")
+    x, force = read_series(tmp_path / "a.mat", "a.mat")
     assert (x.name, force.name) == ("X1A", "L1H")
     np.testing.assert_allclose(x.values, X)
     assert x.rate == pytest.approx(RATE)

@@ -8,7 +8,7 @@ import pytest
 
 from rigdata import load_campaign
 from rigdata.calibration import Channel
-from rigdata.stated_units import unit_problems
+from rigdata.readers.base import unit_problems
 from tests.hostile.fuzz_targets import CSV_MANIFEST
 from tpjb_ident.check.campaign import check_campaign
 

@@ -12,6 +12,7 @@ import pytest
 from rigdata import RigDataError, load_campaign
 from rigdata.manifest.fields import MARK
 from rigdata.problem import Problem
+from rigdata.readers.base import RecordFile
 from rigdata.readers.series import Series
 from rigdata.readers.text.head import find_head
 from rigdata.survey.channels import guess_channel, usable_unit
@@ -68,6 +69,8 @@ def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, 
     folder, original = exports
     draft = draft_manifest(found, "rig", "bearing.toml")
     assert MARK in draft
+    for line in ('rotation = "counter-clockwise"   # (guess)', 'date = ""', 'by = ""', '# mount = "floating"'):
+        assert line in draft
     (folder / "draft.toml").write_text(draft, encoding="utf-8")
     problems = check_campaign(folder / "draft.toml")
     assert {p.severity for p in problems} == {"error"}
@@ -75,7 +78,7 @@ def test_a_draft_says_what_is_missing_and_works_when_that_is_filled_in(exports, 
     assert "places open" in problem.what
     assert "sensitivity" in problem.what
     assert "line" in problem.place
-    filled = draft.replace('"?? kg"', '"30 kg"')
+    filled = draft.replace('"?? kg"', '"30 kg"').replace("# mount", "mount").replace('date = ""', 'date = "2026-03-12"')
     for name, lines in _calibrations(original).items():
         head, _, rest = filled.partition(f"[channels.{name}]\n")
         body, _, tail = rest.partition("\n\n")
@@ -144,14 +147,14 @@ def test_units_are_spelt_as_a_manifest_spells_them():
 )
 def test_the_head_of_an_unknown_text_file_is_found(tmp_path, text, names, units, decimal):
     (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-    head = find_head(tmp_path / "a.txt")
+    head = find_head(RecordFile(tmp_path / "a.txt", "a.txt"))
     assert (head.names, head.units, head.decimal) == (names, units, decimal)
 
 
 def test_a_text_without_numbers_is_no_record(tmp_path):
     (tmp_path / "a.txt").write_text("Dear Sir,\nplease find\n", encoding="utf-8")
     with pytest.raises(RigDataError, match="no table of numbers"):
-        find_head(tmp_path / "a.txt")
+        find_head(RecordFile(tmp_path / "a.txt", "a.txt"))
 
 
 def test_a_folder_without_records_says_what_would_be_one(tmp_path):

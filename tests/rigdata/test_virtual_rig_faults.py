@@ -219,4 +219,6 @@ def test_the_truth_tells_all_faults(tmp_path):
     truth = write_campaign(tmp_path / "c.h5", rig(fault))
     assert truth.faults == ({"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0},)
     assert all(text for _, text in KINDS.values())
-    assert replace(fault, run="*").affects(SECOND, "X1A")
+    assert replace(fault, run="*").affects(SECOND)
+    assert fault.is_in("X1A")
+    assert not fault.is_in("X1B")

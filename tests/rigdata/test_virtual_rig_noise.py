@@ -154,7 +154,7 @@ def test_actuator_harmonics_and_cross_talk():
     talk = rig(noise, directions=directions, timing=Timing(dynamic_seconds=0.01))
     along, across = [], []
     for run in talk.runs()[:200]:
-        oil_force = talk.simulate(run.id).physics.motion.lines[0].oil_force / 500.0
+        oil_force = talk.simulate(run.id).motion.lines[0].oil_force / 500.0
         turn = np.exp(-1j * run.direction)
         unit = np.array([turn.real, -turn.imag])
         along.append(abs(oil_force @ unit))
@@ -167,7 +167,7 @@ def test_set_points_are_missed_by_as_much_as_stated():
     noise = replace(Noise.none(), set_point=SetPointMiss(load=0.003, direction=0.0035, speed=0.001))
     plan = replace(RigPlan(locus=locus_points(300)), timing=Timing(locus_seconds=0.02))
     many = VirtualRig(TRUTH, plan, Instruments.like_paper(), noise, seed=2)
-    facts = [record.physics.facts for record in many.simulate_all()]
+    facts = [record.motion.facts for record in many.simulate_all()]
     assert np.std([f["static_load_N"] / 5000 for f in facts]) == pytest.approx(0.003, rel=0.15)
     assert np.std([f["shaft_speed_Hz"] / 22 for f in facts]) == pytest.approx(0.001, rel=0.15)
     off = [f["static_load_direction_deg"] - p.static_load_direction_deg for f, p in zip(facts, plan.locus)]
@@ -216,8 +216,8 @@ def test_one_kind_of_noise_leaves_the_others_as_they_were():
     quiet = rig(replace(Noise.like_samples(), displacement=ChannelNoise()))
     loud = rig(Noise.like_samples(), locus=locus_points(7))
     first, second = (r.simulate("d-05000-25-01") for r in (quiet, loud))
-    assert first.physics.facts == second.physics.facts
+    assert first.motion.facts == second.motion.facts
     np.testing.assert_array_equal(first.readings.columns["L1H"], second.readings.columns["L1H"])
     assert np.any(first.readings.columns["X1A"] != second.readings.columns["X1A"])
     other = replace(quiet, seed=12).simulate("d-05000-25-01")
-    assert other.physics.facts != first.physics.facts
+    assert other.motion.facts != first.motion.facts

@@ -18,7 +18,6 @@ from rigdata.virtual_rig import (
     CsvLayout,
     DryTest,
     Glitches,
-    Hdf5Layout,
     Instruments,
     Noise,
     RigPlan,
@@ -68,23 +67,18 @@ def test_both_forms_hold_the_same_readings(campaign_of):
             assert np.abs(first - second).max() <= 0.02 * np.min(np.diff(np.unique(first)))
 
 
-def test_an_existing_target_is_replaced_only_on_request_and_only_if_it_is_a_campaign(tmp_path):
+def test_an_existing_target_is_never_replaced(tmp_path):
     for layout, name in (("hdf5", "c.h5"), ("csv", "c")):
-        target = tmp_path / name
-        write_campaign(target, rig(1), layout)
-        before = digest(target)
-        with pytest.raises(VirtualRigError, match="exists"):
-            write_campaign(target, rig(2), layout)
-        assert digest(target) == before
-        write_campaign(target, rig(2), layout, overwrite=True)
-        assert digest(target) != before
+        write_campaign(tmp_path / name, rig(1), layout)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "thesis.tex").write_text("mine")
     (tmp_path / "link").symlink_to(tmp_path / "c")
-    for name, layout in (("notes.txt", "hdf5"), ("folder", "csv"), ("c", "hdf5"), ("c.h5", "csv"), ("link", "csv")):
-        with pytest.raises(VirtualRigError, match=r"not replaced|not followed"):
-            write_campaign(tmp_path / name, rig(), layout, overwrite=True)
+    before = digest(tmp_path / "c"), digest(tmp_path / "c.h5")
+    for name, layout in (("notes.txt", "hdf5"), ("folder", "csv"), ("c", "csv"), ("c.h5", "hdf5"), ("link", "csv")):
+        with pytest.raises(VirtualRigError, match="exists"):
+            write_campaign(tmp_path / name, rig(2), layout)
+    assert (digest(tmp_path / "c"), digest(tmp_path / "c.h5")) == before
     assert (tmp_path / "folder" / "thesis.tex").read_text() == "mine"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c", "c.h5", "folder", "link", "notes.txt"]
 
@@ -98,11 +92,6 @@ def test_a_failure_on_the_way_leaves_nothing_behind(tmp_path, layout):
     with pytest.raises(VirtualRigError, match=r"stiffness\(.*finite"):
         write_campaign(tmp_path / "c", rig(truth=truth), layout)
     assert list(tmp_path.iterdir()) == []
-    write_campaign(tmp_path / "c", rig(), layout)
-    before = digest(tmp_path / "c")
-    with pytest.raises(VirtualRigError, match="finite"):
-        write_campaign(tmp_path / "c", rig(truth=truth), layout, overwrite=True)
-    assert digest(tmp_path / "c") == before
     with pytest.raises(VirtualRigError, match="not a folder"):
         write_campaign(tmp_path / "no" / "c", rig(), layout)
 
@@ -136,11 +125,11 @@ def test_a_rigid_rig_has_a_truth_file_too(tmp_path):
 def test_float32_holds_16_bit_readings_exactly(campaign_of):
     import h5py
 
-    double = campaign_of(rig(), Hdf5Layout(precision="float64"))
-    with h5py.File(campaign_of(rig())) as narrow, h5py.File(double) as wide:
-        first, second = (f["runs/d-02500-25-01/X1A"] for f in (narrow, wide))
-        assert (first.dtype, second.dtype) == (np.float32, np.float64)
-        np.testing.assert_array_equal(np.rint(first[:] / (20 / 2**16)), np.rint(second[:] / (20 / 2**16)))
+    exact = rig().simulate("d-02500-25-01").readings.columns["X1A"]
+    with h5py.File(campaign_of(rig())) as narrow:
+        stored = narrow["runs/d-02500-25-01/X1A"]
+        assert stored.dtype == np.float32
+        np.testing.assert_array_equal(np.rint(stored[:] / (20 / 2**16)), np.rint(exact / (20 / 2**16)))
         assert narrow["runs/d-02500-25-01"].attrs["sample_rate_hz"] == 1000.0
 
 
@@ -151,7 +140,6 @@ SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=l
     ("make", "message"),
     [
         (lambda: CsvLayout(delimiter=",", decimal=","), "must differ"),
-        (lambda: Hdf5Layout(precision="float16"), "precision"),
         (lambda: write_campaign("x", rig(), "tdms"), "no layout 'tdms'"),
         (lambda: RigPlan().runs(TRUTH.pivot_angles), "empty"),
         (lambda: RigPlan(dry=(DryTest(6),)).runs(TRUTH.pivot_angles), "pads 1 to 5"),

@@ -3,7 +3,7 @@
     python -m tests.rigs.laboratories [--docs]
 
 Every folder holds the records of `strange_exports` and the bearing's file, nothing else. What a person types is here:
-commands, and lines of the drafted manifest. Printed: lines edited by hand, messages,
+commands, and lines of the drafted manifest. Printed: lines edited by hand, messages, seconds that the commands took,
 largest difference of a direct coefficient from the numbers that the rig was made of; ``--docs`` puts the table into
 the tutorial.
 """
@@ -15,6 +15,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -28,7 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BEARING = ROOT / "model" / "bearings" / "rocker.toml"
 PAGE = ROOT / "docs" / "guide" / "tutorial.md"
 BEGIN, END = "<!-- laboratories: begin -->\n", "<!-- laboratories: end -->"
-HEAD = "| export | lines typed | marked (guess) | messages | worst K | worst C |\n|---|---|---|---|---|---|\n"
+HEAD = "| export | lines typed | marked (guess) | messages | seconds | worst K | worst C |\n"
+HEAD += "|---" * HEAD.count(" | ") + "|---|\n"
 #: What a person fills in: (channel or table, key) -> value; the mark of comment before the key goes.
 Edits = Mapping[tuple[str, str], str]
 
@@ -59,7 +61,7 @@ def through(laboratory: Laboratory, folder: Path, last: str = "identify") -> dic
     records, out = folder / "records", folder / "out"
     write_exports(records, laboratory)
     shutil.copy(BEARING, records)
-    messages, lines, guesses = 0, 0, 0
+    messages, lines, guesses, began = 0, 0, 0, time.perf_counter()
     for command in (("init",), ("init", "--update"), ("check",), (last,)):
         name, *options = command
         done = tpjb(name, records, *options, *(() if name == "init" else ("--out", out)))
@@ -73,7 +75,8 @@ def through(laboratory: Laboratory, folder: Path, last: str = "identify") -> dic
             lines = edited_lines(before, manifest.read_text("utf-8"))
             guesses = sum("(guess)" in line for line in before.splitlines()[3:])
     worst = worst_errors(out / "coefficients.csv") if (out / "coefficients.csv").exists() else {}
-    return {"lines": lines, "guesses": guesses, "messages": messages, **worst}
+    seconds = time.perf_counter() - began
+    return {"lines": lines, "guesses": guesses, "messages": messages, "seconds": seconds, **worst}
 
 
 def worst_errors(table: Path) -> dict[str, float]:
@@ -91,8 +94,8 @@ def main(folder: Path, docs: bool) -> None:
     """Print the table of all laboratories, and put it into the tutorial with `docs`."""
     rows = []
     for number, laboratory in enumerate(LABORATORIES):
-        way = through(laboratory, folder / str(number))
-        row = "| {name} | {lines} | {guesses} | {messages} | {K:.2f} % | {C:.2f} % |"
+        way = through(laboratory, folder / str(number), last="compare")
+        row = "| {name} | {lines} | {guesses} | {messages} | {seconds:.0f} | {K:.2f} % | {C:.2f} % |"
         rows.append(row.format(name=laboratory.name, **way))
         print(rows[-1], flush=True)
     if docs:

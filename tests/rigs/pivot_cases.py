@@ -106,7 +106,8 @@ def campaign(path: Path | str, laws: Sequence, seed: int, **changes) -> tuple[Ca
         seed=seed,
         **changes,
     )
-    written = write_campaign(path, rig, overwrite=True)
+    Path(path).unlink(missing_ok=True)
+    written = write_campaign(path, rig)
     return load_campaign(path), written
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.runtime.test_executors import dies_once
-from tpjb_ident.runtime.executors import local_workers, map_ordered
+from tpjb_ident.runtime import executors
+from tpjb_ident.runtime.executors import LostJobsError, local_workers, map_ordered
 from tpjb_ident.runtime.workers import ClusterError, dask_workers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -161,6 +162,25 @@ def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign
     tpjb("identify", campaign_file, "--workers", "1", "--out", alone)
     for name in ("coefficients", "estimators", "windows"):
         assert (out / f"{name}.csv").read_bytes() == (alone / f"{name}.csv").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_lost_half_way_is_the_end_and_is_named(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(executors, "_STALLED", 2.0)
+    cluster = Cluster(tmp_path)
+
+    def lose() -> None:
+        with dask_workers(str(cluster.file), 5.0) as workers:
+            for _ in map_ordered(workers, time.sleep, [(0.1,)] * 200):
+                cluster.scheduler.kill()
+
+    try:
+        wait_for(str(cluster.file), 2)
+        with pytest.raises(LostJobsError, match="workers"):
+            lose()
+    finally:
+        cluster.close()
+    assert "exception calling callback" not in caplog.text
 
 
 @pytest.mark.slow

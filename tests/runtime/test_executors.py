@@ -15,14 +15,14 @@ import pytest
 
 from tpjb_ident.runtime import executors
 from tpjb_ident.runtime.executors import (
-    InProcessWorkers,
     LostJobsError,
     PoolWorkers,
+    Workers,
     background_job,
     local_workers,
     map_ordered,
 )
-from tpjb_ident.runtime.threads import _loaded, limited_threads
+from tpjb_ident.runtime.threads import _loaded, limit_threads, one_thread_each
 from tpjb_ident.runtime.workers import open_workers
 
 
@@ -101,7 +101,7 @@ def test_answers_stand_in_order_even_if_they_end_in_another():
 @pytest.mark.slow
 def test_here_and_in_processes_alike(two):
     shared = {"offset": 100}
-    for workers in (InProcessWorkers(), two):
+    for workers in (Workers(), two):
         assert list(map_ordered(workers, doubled, jobs(9))) == [2 * i for i in range(9)]
         assert list(map_ordered(workers, with_shared, jobs(3), shared)) == [100, 101, 102]
         assert list(map_ordered(workers, doubled, [])) == []
@@ -109,7 +109,7 @@ def test_here_and_in_processes_alike(two):
 
 @pytest.mark.slow
 def test_the_first_error_in_order_is_raised_where_it_stands(two):
-    for workers in (InProcessWorkers(), two):
+    for workers in (Workers(), two):
         answers = map_ordered(workers, refused, jobs(8))
         assert [next(answers) for _ in range(3)] == [0, 1, 2]
         with pytest.raises(ValueError, match="no 3"):
@@ -143,7 +143,7 @@ def test_a_job_that_kills_every_worker_is_given_up():
 
 def test_one_worker_is_this_process():
     with open_workers(1) as workers:
-        assert isinstance(workers, InProcessWorkers)
+        assert type(workers) is Workers
 
 
 def _threads() -> list[int]:
@@ -153,7 +153,8 @@ def _threads() -> list[int]:
 @pytest.mark.skipif(not _loaded(), reason="no OpenBLAS that can be asked")
 def test_linear_algebra_that_is_loaded_takes_one_thread_in_workers_and_beside_them():
     """Processes that are forked have numpy already: the environment does not reach it."""
-    with limited_threads(2):
+    with one_thread_each():  # which gives back what it finds
+        limit_threads(2)
         with local_workers(2, start="fork") as workers:
             assert set(next(map_ordered(workers, _threads, [()]))) == {1}
             assert set(_threads()) == {1}

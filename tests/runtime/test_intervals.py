@@ -11,7 +11,7 @@ from tests.rigs.band_rig import BandRig, band_plans
 from tpjb_ident.runtime.table_reader import column_of, read_table
 
 #: Tables whose intervals are a half width to either side of the value.
-SYMMETRIC = ("coefficients", "estimators", "frf", "frf_estimators", "frf_models")
+SYMMETRIC = ("coefficients", "estimators", "frf", "frf_estimators", "frf_models", "frequency_fits")
 
 
 def check_limits(folder) -> dict[str, int]:

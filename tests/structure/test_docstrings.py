@@ -18,19 +18,14 @@ from tests.structure.sources import ROOT, trees
 HANDED_ON = ("tpjb_ident/__init__.py", "model/__init__.py", "rigdata/__init__.py", "docs/api.md")
 #: File and name of what a user's own piece implements or is handed; "=" is the name of the file.
 EXTENSION_POINTS = {
-    "an effect": ("model/effects/*.py:apply", "model/setup.py:Setup"),
+    "an effect": ("model/effects/kind.py:EffectKind", "model/setup.py:Setup"),
     "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
     "a film": ("model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
-    "a reader": (
-        "rigdata/readers/formats/*.py:read_series",
-        "rigdata/readers/*.py:Series",
-        "rigdata/readers/*.py:RunReader",
-    ),
+    "a reader": ("rigdata/readers/formats/*.py:read_series", "rigdata/readers/*.py:Series"),
     "an estimator": ("tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",),
     "a term": ("tpjb_ident/estimate/term.py:Term",),
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
-    "a motion of the virtual rig": ("rigdata/virtual_rig/motion.py:Motion",),
     "a plot": ("tpjb_ident/report/plots/*.py:=",),
     "what a face returns": (
         "model/bearing.py:Pad",

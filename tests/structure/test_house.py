@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "estimate": {"rigdata"},
     "terms": {"rigdata", "estimate"},
     "phasors": {"rigdata"},
-    "check": {"rigdata", "phasors"},
+    "check": {"rigdata", "phasors", "estimate", "terms"},
     "pivot": {"rigdata", "runtime", "slow_records"},
     "clearance": {"rigdata", "runtime", "slow_records", "pivot"},
     "dynamic": {"rigdata", "runtime", "phasors", "check", "estimate", "terms"},

@@ -19,8 +19,10 @@ from tpjb_ident.terms.registry import TERMS
 ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phasors/")
 #: Terms that code outside their files asks for: clocks are put right before windows are averaged, with gains and the
 #: housing in the way; a load's direction is not learnt where nothing is to be corrected; a lag is the housing's. Over a
-#: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them.
+#: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them. The check
+#: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
+    "tpjb_ident/check/rig_fit.py": {"Axis", "Delay", "Gain", "Housing", "Tilt"},
     "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
     "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
 }

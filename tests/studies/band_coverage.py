@@ -135,7 +135,7 @@ class Tally:
 
 
 def true_parameters(rig: BandRig, load: float) -> np.ndarray:
-    """K, C, M of the rig's bearing at a load, in the order of `BandModel.parameters`."""
+    """K, C, M of the rig's bearing at a load, in the order of `FrequencyModel.parameters`."""
     share = load / NOMINAL
     bearing = rig.bearing
     K = np.ravel(bearing.K) * share**bearing.stiffness_exponent

@@ -17,7 +17,7 @@ import math
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,15 +53,40 @@ print(json.dumps(out))
 """
 
 
-def bearing() -> Bearing:
-    """The rocker bearing with the references' oil."""
-    one = load_bearing(FILE)
-    return replace(one, oil=replace(one.oil, viscosity_40=VISCOSITY))
+@dataclass(frozen=True)
+class Case:
+    """What both programs solve: `offset` is the pivot's place from the leading edge, as a share of the arc."""
+
+    name: str
+    mesh: tuple[int, int] = (40, 20)
+    thermal: str = "isothermal"
+    pivots: float = 0.0
+    offset: float = 0.5
+
+    @property
+    def bearing(self) -> Bearing:
+        """The rocker bearing with the references' oil."""
+        drawn = load_bearing(FILE)
+        moved = drawn.with_pads(tuple(replace(pad, pivot_offset=self.offset) for pad in drawn.pads))
+        return replace(moved, oil=replace(drawn.oil, viscosity_40=VISCOSITY))
 
 
-def peer_case(thermal: str | None, mesh: tuple[int, int], pivots: float) -> dict[str, Any]:
+CASES = (
+    Case("isothermal, rigid pivots"),
+    Case("isothermal, rigid pivots", (80, 40)),
+    Case("isothermal, pivots of 5e8 N/m", pivots=5e8),
+    Case("adiabatic, rigid pivots", thermal="adiabatic"),
+    Case("isothermal, rigid pivots at 0.6", (20, 10), offset=0.6),
+    Case("isothermal, rigid pivots at 0.6", offset=0.6),
+    Case("isothermal, rigid pivots at 0.6", (80, 40), offset=0.6),
+    Case("adiabatic, rigid pivots at 0.6", thermal="adiabatic", offset=0.6),
+    Case("isothermal, rigid pivots at 0.4", offset=0.4),
+)
+
+
+def peer_case(case: Case) -> dict[str, Any]:
     """Arguments of the peer's constructor, SI."""
-    b = bearing()
+    b, mesh, pivots = case.bearing, case.mesh, case.pivots
     pads, oil = b.pads, b.oil
     return {
         "frequency": [SPEED],
@@ -86,7 +111,7 @@ def peer_case(thermal: str | None, mesh: tuple[int, int], pivots: float) -> dict
         "oil_flow_v": 4e-4,
         "weight": LOAD,
         "bearing_type": "conventional_tilting_pad",
-        "thermal_type": thermal,
+        "thermal_type": None if case.thermal == "isothermal" else case.thermal,
         "deform_type": "pad_pivot_mechanical" if pivots else None,
         "pivot_type": "user_specified_stiffness",
         "pivot_stiffness": pivots,
@@ -109,29 +134,29 @@ def run_peer(python: str, case: dict[str, Any], repeats: int) -> dict[str, Any]:
     return result
 
 
-def run_ours(thermal: str, pivots: float, repeats: int, mesh: Mesh | None = None) -> tuple[Prediction, float]:
+def run_ours(case: Case, repeats: int, mesh: Mesh | None = None) -> tuple[Prediction, float]:
     """The same point here, and its least processor time [s]."""
-    b = bearing()
+    b, pivots = case.bearing, case.pivots or "rigid"
     times = []
     for _ in range(repeats + 1):
         began = time.process_time()
-        p = predict(b, LOAD, -math.pi / 2, SPEED, pivots=pivots or "rigid", thermal=thermal, mesh=mesh)
+        p = predict(b, LOAD, -math.pi / 2, SPEED, pivots=pivots, thermal=case.thermal, mesh=mesh)
         times.append(time.process_time() - began)
     return p, min(times[1:])
 
 
-def compared(name: str, thermal: str, pivots: float, mesh: tuple[int, int], asked: argparse.Namespace) -> list[str]:
+def compared(case: Case, asked: argparse.Namespace) -> list[str]:
     """One row of the table: the peer less this model on a fine mesh; SystemExit if there is no peer."""
-    peer = run_peer(asked.python, peer_case(None if thermal == "isothermal" else thermal, mesh, pivots), 2)
+    peer = run_peer(asked.python, peer_case(case), 1)
     if "missing" in peer or "failed" in peer:
         sys.exit(f"no result of the ROSS fluid-film engine in {asked.python}: {peer}")
-    ours, seconds = run_ours(thermal, pivots, asked.repeats)
-    fine, _ = run_ours(thermal, pivots, 1, Mesh(320, 24))
+    ours, seconds = run_ours(case, asked.repeats)
+    fine, _ = run_ours(case, 1, Mesh(320, 24))
     own = max(abs(getattr(ours, key) / getattr(fine, key) - 1.0) for key in NAMES)
-    print(f"{name}: ROSS {peer['version']}, default mesh here within {own:.2%} of 320 x 24", flush=True)
+    print(f"{case.name}: ROSS {peer['version']}, default mesh here within {own:.2%} of 320 x 24", flush=True)
     shares = [f"{peer[key] / getattr(fine, key) - 1.0:+.1%}" for key in NAMES]
     times = [f"{peer['seconds']:.1f} s", f"{1e3 * seconds:.1f} ms", f"{peer['seconds'] / seconds:.0f}"]
-    return [name, f"{mesh[0]} x {mesh[1]}", *shares, *times]
+    return [case.name, f"{case.mesh[0]} x {case.mesh[1]}", *shares, *times]
 
 
 def main() -> None:
@@ -140,13 +165,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
-    cases = [
-        ("isothermal, rigid pivots", "isothermal", 0.0, (40, 20)),
-        ("isothermal, rigid pivots", "isothermal", 0.0, (80, 40)),
-        ("isothermal, pivots of 5e8 N/m", "isothermal", 5e8, (40, 20)),
-        ("adiabatic, rigid pivots", "adiabatic", 0.0, (40, 20)),
-    ]
-    rows = [compared(*case, asked) for case in cases]
+    rows = [compared(case, asked) for case in CASES]
     text = table(("case", "ROSS mesh", *NAMES, "ROSS", "here (80 x 6)", "ratio"), rows)
     print(text)
     if asked.write:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -49,6 +50,18 @@ def live(finished, tmp_path):
     for path in finished.glob("*.toml"):
         shutil.copy(path, folder)
     return folder
+
+
+def test_the_page_begins_with_what_was_tested_what_it_gives_and_a_picture(finished, live, tmp_path):
+    land(finished, live, *DYNAMIC)
+    done = tpjb("watch", live, "--once", "--settle", "2 s", "--units", "us", "--out", tmp_path / "o")
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "o" / "watch.html").read_text(encoding="utf-8")
+    first = page[page.index('<dl class="tested">') : page.index("<nav")]
+    for words in ("Bearing:", "Static load:", "1124 lbf", "K, lbf/in", "C, lbf s/in", "How far the plan is"):
+        assert words in first, done.output
+    assert "Next: <code>" not in first, "runs are still to come"
+    assert not re.search(r"MN/m|kN|µm", page)
 
 
 def land(source, live, *runs):

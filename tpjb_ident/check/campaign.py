@@ -8,18 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigdata.campaign import Campaign
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.arguments import as_campaign
-from tpjb_ident.check.consistency import check_housing, check_load_ratios, check_positions
+from tpjb_ident.check.consistency import check_load_ratios, check_positions
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.redundant_channels import report_inconsistent_channels
-from tpjb_ident.check.response import check_accelerometers, check_responses
+from tpjb_ident.check.response import check_responses
+from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_follows, check_sweeps
+from tpjb_ident.conditions import Condition
 
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 Progress = Callable[[int, int], None]
@@ -57,13 +58,18 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         observations.append(observe(run))
         if progress is not None:
             progress(count, len(campaign.runs))
-    findings: list[Finding] = [f for observation in judged(campaign, observations) for f in observation.report.found]
+    observations, conditions = judged(campaign, observations)
+    findings: list[Finding] = [f for observation in observations for f in observation.report.found]
     merged = merge(findings, campaign.path.name, campaign.runs)
-    return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
+    rig = [_problem(condition, campaign.path.name) for condition in conditions]
+    return _sorted([*campaign.notes, *merged, *rig, *_leftovers(campaign)])
 
 
-def judged(campaign: Campaign, observations: Sequence[Observation]) -> list[Observation]:
-    """Judge runs beside each other; what is found stands in the reports of the copies that are given back."""
+def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], tuple[Condition, ...]]:
+    """Judge runs beside each other; what is found stands in the reports of the copies that are given back.
+
+    And what contradicts the description of the rig in all runs: identification finds that by itself.
+    """
     observations = [replace(observation, report=observation.report.copy()) for observation in observations]
     of_kind = {k: [s for s in observations if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
     dynamic = of_kind["dynamic"]
@@ -79,15 +85,21 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> list[Obse
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(observations)
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
-    check_accelerometers(dynamic)
     check_rotation(of_kind["dynamic"])
-    check_housing(of_kind["dynamic"])
-    report_inconsistent_channels(dynamic)
     check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
     _check_duplicates(observations)
-    return observations
+    fit = rig_fit(campaign, dynamic)
+    if fit is None:
+        return observations, ()
+    check_accelerometers(fit)
+    return observations, fit.solution.conditions()
+
+
+def _problem(condition: Condition, file: str) -> Problem:
+    severity: Severity = "error" if condition.severity == "error" else "warning"
+    return Problem(severity, file, str(condition), condition.detail, condition.meaning)
 
 
 def _spread_doubts(observations: Sequence[Observation]) -> None:

@@ -1,20 +1,14 @@
-"""Runs against each other: static loads as the cells read them, housing acceleration per cell force, mean positions.
-
-Both ratios belong to the rig and not to the bearing, so all runs share them, whatever their operating point.
-"""
+"""Runs against each other: static loads as the cells read them, mean positions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import excited, plane_vector
-from tpjb_ident.check.wiring import repairs
+from tpjb_ident.check.set_points import plane_vector
 
 #: Runs needed before one can be told apart.
 _MIN_RUNS = 4
@@ -22,10 +16,6 @@ _MIN_RUNS = 4
 _LOAD_OFF = 0.04
 #: In units of the robust standard deviation over the runs.
 _MANY = 6.0
-#: Share of the foretold acceleration.
-_ACCELERATION_OFF = 0.1
-#: Lines below this many times their noise say nothing.
-_CLEAR = 30.0
 #: No film bearing lets its shaft travel further [m].
 _MAX_TRAVEL = 1e-3
 #: Runs needed before one can be told apart.
@@ -66,71 +56,6 @@ def check_load_ratios(runs: Sequence[Observation]) -> None:
             )
             cure = "Check static_load and its direction in this run, and the gain of the cells"
             observation.report.say("load ratio", "warning", "mean force", text, cure)
-
-
-def check_housing(runs: Sequence[Observation]) -> None:
-    """Acceleration against cell force of the dynamic runs of one frequency: one matrix serves them all."""
-    groups: dict[tuple[float, tuple[str, ...]], list[tuple[Observation, ComplexArray, ComplexArray]]] = {}
-    for observation in runs:
-        accelerometers = observation.pick("acceleration")
-        if (
-            observation.lines is None
-            or len(accelerometers) != 2
-            or "force" in observation.report.doubts
-            or not excited(observation)
-        ):
-            continue
-        force = plane_vector(observation, "force", observation.lines.phasor)
-        readings = observation.lines.phasor[accelerometers]
-        if force is None or not np.all(np.isfinite(readings)):
-            continue
-        if np.linalg.norm(readings) < _CLEAR * np.linalg.norm(observation.lines.floor[accelerometers]):
-            continue
-        names = tuple(observation.channels[i].name for i in accelerometers)
-        key = (round(observation.run.point.excitation_hz, 6), names)
-        groups.setdefault(key, []).append((observation, force, np.asarray(readings)))
-    for (_, names), group in groups.items():
-        if len(group) >= _MIN_RUNS:
-            _judge_housing(group, names)
-
-
-def _misfit(force: ComplexArray, readings: ComplexArray, matrix: ComplexArray) -> float:
-    return float(np.linalg.norm(readings - matrix @ force) / np.linalg.norm(readings))
-
-
-def _common_matrix(group: Sequence[tuple[Observation, ComplexArray, ComplexArray]]) -> ComplexArray | None:
-    """Matrix (2, 2) from cell force to readings with the least median misfit among all pairs of runs."""
-    best: tuple[float, ComplexArray] | None = None
-    all_forces, all_readings = np.array([f for _, f, _ in group]), np.array([r for _, _, r in group])
-    sizes = np.linalg.norm(all_readings, axis=1)
-    for first, second in combinations(group[:24], 2):
-        forces = np.stack([first[1], second[1]], axis=1)
-        scaled = forces / np.linalg.norm(forces, axis=0)
-        if np.linalg.svd(scaled, compute_uv=False)[-1] < 0.3:
-            continue
-        matrix = np.asarray(np.linalg.solve(forces.T, np.stack([first[2], second[2]])).T, dtype=np.complex128)
-        misfit = float(np.median(np.linalg.norm(all_readings - all_forces @ matrix.T, axis=1) / sizes))
-        if best is None or misfit < best[0]:
-            best = (misfit, matrix)
-    return None if best is None else best[1]
-
-
-def _judge_housing(group: Sequence[tuple[Observation, ComplexArray, ComplexArray]], names: Sequence[str]) -> None:
-    matrix = _common_matrix(group)
-    if matrix is None:
-        return
-    misfits = np.array([_misfit(f, r, matrix) for _, f, r in group])
-    allowed = max(_ACCELERATION_OFF, _MANY * float(np.median(misfits)))
-    for (observation, force, readings), misfit in zip(group, misfits):
-        if misfit <= allowed:
-            continue
-        channels = [observation.channels[i] for i in observation.pick("acceleration")]
-        tried = sorted((_misfit(force, m @ readings, matrix), words) for words, m in repairs(channels, scales=True))
-        hint = f"; as if {tried[0][1]}" if tried[0][0] < min(misfit / 3, tried[1][0] / 2) else ""
-        text = f"differs by {misfit:.0%} from what the cell force and the other runs at this frequency foretell{hint}"
-        cure = "Check polarity, cables and sensitivity of the accelerometers in this run"
-        place = f"channels {' and '.join(names)}"
-        observation.report.say("housing", "warning", place, text, cure)
 
 
 def check_positions(runs: Sequence[Observation]) -> None:

@@ -29,11 +29,10 @@ class Reporter:
     run: Run
     found: list[Finding] = field(default_factory=list)
     doubts: set[str] = field(default_factory=set)
-    gains: dict[str, float] = field(default_factory=dict)
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return Reporter(self.run, list(self.found), set(self.doubts), dict(self.gains))
+        return Reporter(self.run, list(self.found), set(self.doubts))
 
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str, channels: Sequence[str] = ()) -> None:
         """Note a finding; `key` is the same for equal findings in other runs, `channels` whose nature it is."""
@@ -78,7 +77,6 @@ class Verdicts:
     unusable: dict[str, Problem] = field(default_factory=dict)
     shared: dict[str, list[Problem]] = field(default_factory=dict)
     doubtful: dict[str, list[Problem]] = field(default_factory=dict)
-    gains: dict[str, float] = field(default_factory=dict)
     run_gains: dict[str, list[Problem]] = field(default_factory=dict)
     swept: dict[tuple[str, str], float] = field(default_factory=dict)  #: m: half a probe's travel, by sweep and probe
 
@@ -112,7 +110,6 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
     result = Verdicts()
     for report in reports:
-        result.gains.update(report.gains)
         for finding in report.found:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
     alike = len({report.run.id for report in reports})

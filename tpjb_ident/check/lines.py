@@ -77,15 +77,15 @@ def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[fl
 
 def band_lines(
     run: Run, values: FloatArray, force: Sequence[int], disturbing: Sequence[float]
-) -> tuple[ComplexArray, FloatArray]:
-    """Phasors (k, m) at strong lines of an excitation over a band, and what noise makes of a line (m,).
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Phasors (k, m) at strong lines of an excitation over a band, what noise makes of a line (m,), the lines [Hz].
 
     What channels owe one another (two planes of probes, cells and accelerometers) holds at every line, so a few that
     stand clear of the noise, away from shaft and mains, serve the checks as the one line of a sine does.
 
     `values` (n, m).
     """
-    none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan)
+    none = np.empty((0, values.shape[1]), complex), np.full(values.shape[1], np.nan), np.empty(0)
     finite = np.isfinite(values)
     if run.band is None or not len(force) or len(values) < 64 or not finite.any(axis=0).all():
         return none
@@ -102,4 +102,5 @@ def band_lines(
         return none
     power = np.sum(np.abs(spectrum[:, list(force)]) ** 2, axis=1)
     chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, _BAND_LINES)]
-    return np.asarray(spectrum[chosen]), np.median(np.abs(spectrum[above]), axis=0)
+    floor = np.asarray(np.median(np.abs(spectrum[above]), axis=0))
+    return np.asarray(spectrum[chosen]), floor, np.asarray(frequency[chosen])

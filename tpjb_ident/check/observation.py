@@ -50,14 +50,15 @@ class Observation:
     digest: str
     report: Reporter = field(repr=False)
     band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)  #: (k, m) complex
+    omega: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)  #: (k,), rad/s: of `band`
     shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
 
     @property
-    def phasors(self) -> ComplexArray:
-        """Phasors of `channels` at the excitation, one row per line that is looked at, SI."""
-        if len(self.band) or self.lines is None:
-            return self.band
-        return np.asarray(self.lines.phasor, dtype=np.complex128)[None]
+    def phasors(self) -> list[tuple[float, ComplexArray]]:
+        """Frequency [rad/s] and phasors (m,) of `channels` at every line of the excitation that is looked at, SI."""
+        if self.run.excitation_kind != "sine" or self.lines is None:
+            return list(zip(self.omega.tolist(), self.band))
+        return [(self.run.point.excitation, self.lines.phasor)]
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`."""
@@ -95,7 +96,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     if time is None or not live:
         return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
     thin = slice(None, None, max(1, len(time) // _DECIMATED))
-    band, lines = _over_band(run, live, used[:_FITTED], lines)
+    band, omega, lines = _over_band(run, live, used[:_FITTED], lines)
     return Observation(
         run=run,
         channels=live,
@@ -107,21 +108,22 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         digest=digest,
         report=report,
         band=band,
+        omega=omega,
         shaft_force=shaft_force(phasors),
     )
 
 
 def _over_band(
     run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None
-) -> tuple[ComplexArray, RecordLines | None]:
-    """Phasors at some lines of an excitation over a band, and the run's lines with what noise makes of one of them."""
+) -> tuple[ComplexArray, FloatArray, RecordLines | None]:
+    """Phasors at some lines of a band, their frequencies [rad/s], and the run's lines with what noise makes of one."""
     if run.excitation_kind == "sine" or lines is None:
-        return np.empty((0, len(live)), complex), lines
+        return np.empty((0, len(live)), complex), np.empty(0), lines
     turning = [run.point.shaft_speed_hz] if run.point.shaft_speed > 0 else []
     force = [i for i, c in enumerate(live) if c.quantity == "force"]
-    rows, floor = band_lines(run, used, force, [*turning, *MAINS_FREQUENCIES])
+    rows, floor, frequencies = band_lines(run, used, force, [*turning, *MAINS_FREQUENCIES])
     first = rows[0] if len(rows) else np.full(len(live), np.nan + 0j)
-    return rows, replace(lines, phasor=first, floor=floor)
+    return rows, 2 * np.pi * frequencies, replace(lines, phasor=first, floor=floor)
 
 
 def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:

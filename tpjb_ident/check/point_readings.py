@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.calibration import Channel
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import plane_of, to_plane
+from tpjb_ident.check.set_points import oil_force, plane_of, to_plane
 
 #: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.
 _SECTORS, _MET = 36, 0.9
 #: Smaller over larger extent of displacements that move along one line.
 _ONE_LINE = 0.2
+#: Runs whose pairs are tried.
+_PAIRED = 24
 
 
 @dataclass(frozen=True)
@@ -23,13 +27,18 @@ class PointReadings:
     """Readings of the n runs of one operating point, SI."""
 
     probes: ComplexArray  #: (n, 2) complex, m
-    cells: ComplexArray  #: (n, 2) complex, N
+    cells: ComplexArray  #: (n, 2) complex, N; X and Y where the runs have not the same two
     inertia: ComplexArray  #: (n, 2) complex, N: housing mass times acceleration, X and Y
     probe_means: FloatArray  #: (n, 2), m
     cell_means: FloatArray  #: (n, 2), N
     probe_plane: FloatArray  #: `probe_plane`, `cell_plane` (2, 2): from the two readings to X and Y
     cell_plane: FloatArray
     centre: tuple[float | None, float | None] = (None, None)
+    seen: tuple[Observation, ...] = field(default=(), repr=False)
+    channels: tuple[Channel, ...] = ()  #: the probes, and the cells where there are two in all runs
+
+    def __len__(self) -> int:
+        return len(self.probes)
 
     @property
     def displacement(self) -> ComplexArray:
@@ -42,23 +51,36 @@ class PointReadings:
         return np.asarray(self.cells @ self.cell_plane.T + self.inertia)
 
     def stiffness(self, runs: Sequence[int]) -> ComplexArray | None:
-        """H (2, 2) of F = H D over some runs; None where not determined."""
-        return stiffness_of(self.displacement[list(runs)], self.force[list(runs)])
+        """H (2, 2) of F = H D over some runs, each weighted by one over its displacement.
 
+        None where they move along one line.
+        """
+        D, F = self.displacement[list(runs)], self.force[list(runs)]
+        sizes = np.linalg.norm(D, axis=1)
+        if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
+            return None
+        unit = D / sizes[:, None]
+        singular = np.linalg.svd(unit, compute_uv=False)
+        if singular[-1] < _ONE_LINE * singular[0]:
+            return None
+        return np.asarray(np.linalg.lstsq(unit, F / sizes[:, None], rcond=None)[0].T)
 
-def stiffness_of(displacement: ComplexArray, force: ComplexArray) -> ComplexArray | None:
-    """H (2, 2) of F = H D, every run weighted by one over its displacement; None where they move along one line.
+    def misfits(self, stiffness: ComplexArray) -> FloatArray:
+        """Share of every run's force that H does not explain, (n,)."""
+        rest = self.force - self.displacement @ stiffness.T
+        return np.asarray(np.linalg.norm(rest, axis=1) / np.linalg.norm(self.force, axis=1))
 
-    `displacement`, `force` (n, 2) [m], [N].
-    """
-    sizes = np.linalg.norm(displacement, axis=1)
-    if len(sizes) < 2 or not np.all(sizes > 0) or not np.all(np.isfinite(sizes)):
-        return None
-    unit = displacement / sizes[:, None]
-    singular = np.linalg.svd(unit, compute_uv=False)
-    if singular[-1] < _ONE_LINE * singular[0]:
-        return None
-    return np.asarray(np.linalg.lstsq(unit, force / sizes[:, None], rcond=None)[0].T)
+    def robust_stiffness(self) -> ComplexArray | None:
+        """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
+        tried = (self.stiffness(pair) for pair in combinations(range(min(len(self), _PAIRED)), 2))
+        found = [h for h in tried if h is not None]
+        if not found:
+            return None
+        medians = [float(np.median(self.misfits(h))) for h in found]
+        least = int(np.argmin(medians))
+        close = np.flatnonzero(self.misfits(found[least]) <= max(3 * medians[least], 1e-9))
+        refined = self.stiffness(close.tolist())
+        return found[least] if refined is None else refined
 
 
 def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
@@ -66,31 +88,32 @@ def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
     return float(np.real(own.conj() @ np.linalg.solve(fitted.T @ fitted.conj(), own)))
 
 
-def point_readings(
-    runs: Sequence[Observation], probes: ComplexArray, force: ComplexArray, centres: dict[str, float]
-) -> PointReadings | None:
-    """Phasors and means of all runs of a point, by channel; None where they have not the same two cells, or no means.
-
-    `probes` (n, 2) [m], `force` (n, 2) [N] of the film; `centres`: what probes read at the bearing's centre [m].
-    """
+def point_readings(runs: Sequence[Observation], mass: float, centres: dict[str, float]) -> PointReadings:
+    """Phasors and means of all runs of a point, by channel; `centres`: what probes read at the bearing's centre [m]."""
     first = runs[0]
-    places = [(run.pick("displacement"), run.pick("force")) for run in runs]
-    names = [[run.channels[i].name for i in cells] for run, (_, cells) in zip(runs, places)]
     lines = [run.lines for run in runs if run.lines is not None]
-    if len(names[0]) != 2 or len(lines) < len(runs) or any(other != names[0] for other in names):
-        return None
-    probe_channels, cell_channels = ([first.channels[i] for i in part] for part in places[0])
-    cell_plane = plane_of(cell_channels)
-    cells = np.stack([line.phasor[c] for line, (_, c) in zip(lines, places)])
+    probes, cells = ([run.pick(quantity) for run in runs] for quantity in ("displacement", "force"))
+    channels = tuple(first.channels[i] for i in probes[0])
+    plane = plane_of(channels)
+    force = np.array([oil_force(run, mass) for run in runs], dtype=complex)
+    names = {tuple(run.channels[i].name for i in places) for run, places in zip(runs, cells)}
+    phasors, means, cell_plane = force, np.zeros((len(runs), 2)), np.eye(2)
+    if len(names) == 1 and len(cells[0]) == 2:
+        channels += tuple(first.channels[i] for i in cells[0])
+        phasors = np.stack([line.phasor[c] for line, c in zip(lines, cells)])
+        means = np.stack([line.mean[c] for line, c in zip(lines, cells)])
+        cell_plane = plane_of(channels[2:])
     return PointReadings(
-        probes=probes,
-        cells=cells,
-        inertia=force - cells @ cell_plane.T,
-        probe_means=np.stack([line.mean[p] for line, (p, _) in zip(lines, places)]),
-        cell_means=np.stack([line.mean[c] for line, (_, c) in zip(lines, places)]),
-        probe_plane=plane_of(probe_channels),
+        probes=np.stack([line.phasor[p] for line, p in zip(lines, probes)]),
+        cells=phasors,
+        inertia=np.asarray(force - phasors @ cell_plane.T, dtype=complex),
+        probe_means=np.stack([line.mean[p] for line, p in zip(lines, probes)]),
+        cell_means=means,
+        probe_plane=plane,
         cell_plane=cell_plane,
-        centre=(centres.get(probe_channels[0].name), centres.get(probe_channels[1].name)),
+        centre=(centres.get(channels[0].name), centres.get(channels[1].name)),
+        seen=tuple(runs),
+        channels=channels,
     )
 
 

@@ -208,7 +208,7 @@ def _from_down(direction: float) -> float:
 
 
 def _read(run: Run) -> _Record:
-    time, force, place, good = slow_samples(run)
+    time, force, place, good, _ = slow_samples(run)
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
         raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))

@@ -265,15 +265,9 @@ def _extrapolated(push: float, curves: Sequence[PivotCurve] | None) -> tuple[Con
 
 
 def _mean_temperature(run: Run) -> float:
-    """Mean over time and over all temperature channels of a run [K]; NaN without any."""
-    means = []
-    for name, channel in run.channels.items():
-        if channel.quantity == "temperature":
-            values = np.asarray(run.record(name).values)
-            values = values[np.isfinite(values)]
-            if len(values):
-                means.append(float(np.mean(values)))
-    return float(np.mean(means)) if means else float("nan")
+    """Temperature of a run [K]; NaN where it is neither stated nor measured."""
+    temperature = run.mean_temperature()
+    return float("nan") if temperature is None else temperature
 
 
 def coldest_run(runs: Sequence[Run]) -> Run:

@@ -50,7 +50,7 @@ class ContactIntervals:
 
 def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
     """Read a run of kind ``clearance``; angles (n,) [rad] of the pads."""
-    time, load, position, good = slow_samples(run)
+    time, load, position, good, _ = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
     load, position, time = load[good], position[good], time[good]

@@ -248,7 +248,6 @@ def model_side(
     points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")})) if points is None else points
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
-    bearing = bearing.stated_for(campaign.rotation)
     names, remarks = possible_variants(settings.variants, static.curves, bearing)
     stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
     wanted = tuple(dict.fromkeys(points + stations))

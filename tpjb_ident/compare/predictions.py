@@ -11,6 +11,7 @@ import numpy as np
 
 from model.bearing import Bearing
 from model.effects import Effect
+from model.mirror import as_it_turns
 from model.options import Options
 from model.pivots import pivot_laws
 from model.predict import predict
@@ -98,6 +99,7 @@ def predict_points(
     """Predict every operating point."""
     settings = settings or ModelSettings()
     wanted = tuple(points)
+    bearing = as_it_turns(bearing, {point.rotation for point in wanted})
     groups: dict[OperatingPoint, list[float]] = {}
     for point in wanted:
         frequencies = groups.setdefault(_static(point), [])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -13,13 +12,16 @@ import numpy as np
 from model.bearing import Bearing
 from model.dynamics import bearing_impedance
 from model.effects import Effect, apply_effects
+from model.mirror import runs_backward, seen_by_shaft
 from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.vector import directions
 from rigdata.virtual_rig import Instruments, RigTruth
+from rigdata.virtual_rig.truth import load_vector
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.errors import TpjbError
 
@@ -92,21 +94,19 @@ class _SolvedSetup:
         return self.solve(replace(point, excitation=0.0))
 
     def stiffness(self, point: OperatingPoint) -> ComplexArray:
-        prediction = self._at(point)
-        return bearing_impedance(self.setup, prediction.equilibrium, np.array([point.excitation]))[0]
+        setup, equilibrium = seen_by_shaft(self.setup, point.spin), self._at(point).equilibrium
+        return bearing_impedance(setup, equilibrium, np.array([point.excitation]))[0]
 
     def position(self, point: OperatingPoint) -> FloatArray:
         # what stands in series with the bearing gives way under the static load too
-        load = point.static_load * np.array(
-            [math.cos(point.static_load_direction), math.sin(point.static_load_direction)]
-        )
-        return self._at(point).bearing_position + self.setup.structure @ load
+        return self._at(point).bearing_position + self.setup.structure @ load_vector(point)
 
     def temperature(self, point: OperatingPoint) -> FloatArray:
-        return self._at(point).pad_temperature(_SENSOR_POSITION)
+        backward = runs_backward(self.setup.bearing, point.spin)
+        return self._at(point).pad_temperature(1.0 - _SENSOR_POSITION if backward else _SENSOR_POSITION)
 
     def pivot_deflection(self, pad: int, load: Any) -> FloatArray:
         law, angle = self.setup.pivots[pad - 1], self.setup.bearing.pads[pad - 1].pivot_angle
-        towards = np.array([math.cos(angle), math.sin(angle)])
+        towards = directions(angle)
         structure = float(towards @ self.setup.structure @ towards)
         return np.array([law.deflection(float(w)) for w in load]) + structure * np.asarray(load)

@@ -93,8 +93,9 @@ def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, .
     best_deviations = [d for d in all_deviations if d.pivots == best and math.isfinite(d.median)]
     worst = max(best_deviations, key=lambda d: abs(d.median))
     if worth_a_diagnosis(all_deviations):
-        who = "No pivot model explains" if len(comparison.variants) > 1 else "The model does not explain"
-        return f"{name}: {who} {worst.coefficient}: it is off by {percent(worst.median)} even with {_in_words(best)}."
+        who = "No prediction agrees: the closest" if len(comparison.variants) > 1 else "The prediction"
+        off = f"is off by {percent(worst.median)} in {worst.coefficient} (median)"
+        return f"{name}: {who}, with {_in_words(best)}, {off}."
     largest = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
     agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
     inside = f"{sum(d.inside for d in best_deviations)} of {sum(d.n for d in best_deviations)}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from model.effects import Effect, apply_effects
 from model.instruments import Instruments
+from model.mirror import as_it_turns, rotation_of
 from model.pivots import NAMED_LAWS, pivot_laws
 from model.setup import Setup
 from rigdata.manifest.fields import MAINS_FREQUENCIES
@@ -140,9 +141,10 @@ def diagnose_campaign(
     pivot_flexibility
     """
     settings = settings or DiagnoseSettings()
-    bearing = bearing.stated_for(campaign.rotation)
+    rotations = {run.rotation for run in campaign.runs if run.point.shaft_speed}
+    bearing = as_it_turns(bearing, rotations, campaign.rotation)
     measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
-    return _diagnose_measured(measured, bearing, baseline, settings, progress)
+    return _diagnose_measured(measured, bearing, baseline or Baseline(), settings, progress)
 
 
 def measure_campaign(
@@ -177,12 +179,11 @@ def measure_campaign(
 def _diagnose_measured(
     measured: Measured,
     bearing: Bearing,
-    baseline: Baseline | None = None,
-    settings: DiagnoseSettings | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    baseline: Baseline,
+    settings: DiagnoseSettings,
+    progress: Callable[[str, int, int], None] | None,
 ) -> CampaignDiagnosis:
     """Find what the model of an identified campaign lacks."""
-    baseline, settings = baseline or Baseline(), settings or DiagnoseSettings()
     settings = replace(settings, tolerances=measured.tolerances)
     report = progress or (lambda text, done, total: None)
     identification, curves = measured.identification, measured.curves
@@ -220,6 +221,7 @@ def diagnose_table(
         raise BadInputError("--pivots measured: a table holds no dry tests. Give kirk, rigid or a pivots.toml.")
     settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
     observations = observe_table(path, reading_error, settings.tolerance)
+    bearing = as_it_turns(bearing, {rotation_of(test.speed) for test in observations.layout.dynamic})
     setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
     result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))
     return CampaignDiagnosis(result, None, setup)

@@ -16,6 +16,7 @@ from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Problem, loosened
 from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 
 #: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
 ACCURACY = 1e-5
-#: Other explanations that a confirming test is chosen against.
-_IMPOSTORS = 2
 #: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
 _DIRECTIONS = 10
 #: Names of the two models in the column ``pivots``, as pictures label them.
@@ -135,7 +134,7 @@ def _rivals(comparison: Comparison, model: Fit) -> list[Fit]:
     for fit in comparison.fits:
         if fit.faults and not fit.on_bound and not model.labels <= fit.labels:
             by_names.setdefault(fit.names, fit)
-    return list(by_names.values())[:_IMPOSTORS]
+    return list(by_names.values())[: Deciding.impostors]
 
 
 def _thinned(observations: Observations) -> Observations:

@@ -13,6 +13,7 @@ import numpy as np
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.effects import Effect
+from model.mirror import as_it_turns
 from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.near_names import unknown_name
@@ -128,8 +129,8 @@ def plan(
     >>> campaign.to_frame().columns[:3].tolist()
     ['effect', 'parameter', 'unit']
     """
-    drawn = as_bearing(bearing, "bearing")
     tests = points_of(points) if isinstance(points, Mapping) else points
+    drawn = as_it_turns(as_bearing(bearing, "bearing"), {point.rotation for point in tests})
     static = (locus, dry_tests, float(to_si(push, "force", "push")), temperatures)
     return work_out(Setup(drawn, pivot_laws(pivots, drawn)), planned_layout(drawn, tests, static))
 

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from model.effects import Effect, kind_of
-from model.mirror import rotation_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
@@ -174,14 +174,9 @@ def _other_rigs(setup: Setup, at: _OperatingRange) -> list[Design]:
     if reversible(setup):
         out.append(
             Design("the load sweep repeated with the shaft turning the other way, with pad temperatures",
-                   Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True, faster=-1.0)),
-                   change=functools.partial(_stated_for, rotation=rotation_of(at.speed)))
+                   Layout(at.tests([at.low, at.load, at.top], at.lines[:1], True, faster=-1.0)))
         )  # fmt: skip
     return out
-
-
-def _stated_for(setup: Setup, rotation: str) -> Setup:
-    return setup.change(bearing=setup.bearing.stated_for(rotation))
 
 
 def _hotter(setup: Setup, by: float) -> Setup:
@@ -226,13 +221,6 @@ def _dry(layout: Layout, pads: int) -> list[Design]:
 def reversible(setup: Setup) -> bool:
     """Whether every pad would carry with the shaft turning the other way."""
     return all(abs(pad.pivot_offset - 0.5) <= _CENTRAL for pad in setup.bearing.pads)
-
-
-#: Separation [standard deviations] from which a test tells at all, and from which one test is enough: with 5 the wrong
-#: explanation's chi-square exceeds the right one's by 9 in 95 of 100 cases.
-_TELLING, _ENOUGH = 3.0, 5.0
-#: Difference of chi-square from which one explanation counts as the right one.
-_MARGIN = 9.0
 
 
 @dataclass(frozen=True)
@@ -292,16 +280,16 @@ def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> fl
 
 
 def chance(separation: float) -> float:
-    """Probability that chi-square of the wrong explanation exceeds the right one's by `_MARGIN`.
+    """Probability that chi-square of the wrong explanation exceeds the right one's by `Deciding.margin`.
 
     The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
     """
-    return float(ndtr((separation**2 - _MARGIN) / (2.0 * separation))) if separation > 0.0 else 0.0
+    return float(ndtr((separation**2 - Deciding.margin) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:
     """Return the best test, or the best two together where the best alone would not settle the matter."""
-    if len(tests) < 2 or tests[0].expected >= _ENOUGH:
+    if len(tests) < 2 or tests[0].expected >= Deciding.enough:
         return tuple(tests[:1])
     return max(itertools.combinations(tests, 2), key=together)
 
@@ -315,7 +303,7 @@ def say(best: Sequence[Separation], one: str, *rivals: str) -> str:
     """In words: what `suggested` gives, and what it is expected to tell."""
     names = f"{', '.join(rivals[:-1])} and {rivals[-1]}" if len(rivals) > 1 else rivals[0]
     words, expected = " and ".join(t.design.words for t in best), together(best)
-    if expected < _TELLING:
+    if expected < Deciding.visible:
         return (
             f"nothing on the list separates {one} from {names} (best: {words}, {expected:.1f} standard deviations); "
             "a change of hardware would, such as another oil or another bearing on the same rig"

@@ -15,6 +15,7 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
@@ -26,10 +27,6 @@ from tpjb_ident.presentation import json_data
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-_SEEN = 6.0
-_CONFUSABLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -44,18 +41,14 @@ class CampaignPlan:
     def floor(self) -> FloatArray:
         """Smallest change of every parameter that would be seen (3 standard deviations), in its nearly linear form."""
         with np.errstate(divide="ignore"):  # what cannot be detected has an infinite floor
-            return 3.0 * np.array([c.step for c in self.candidates]) / self.detectable
+            return Deciding.visible * np.array([c.step for c in self.candidates]) / self.detectable
 
     @property
     def confusable(self) -> tuple[tuple[str, str], ...]:
         """Pairs that the campaign could not tell apart."""
-        n = len(self.candidates)
-        return tuple(
-            (self.candidates[i].label, self.candidates[j].label)
-            for i in range(n)
-            for j in range(i + 1, n)
-            if min(self.separation[i, j], self.separation[j, i]) < _CONFUSABLE
-        )
+        alike = np.minimum(self.separation, self.separation.T) < Deciding.visible
+        labels = [c.label for c in self.candidates]
+        return tuple((labels[i], labels[j]) for i, j in np.argwhere(np.triu(alike)))
 
     @property
     def pairs(self) -> int:
@@ -66,7 +59,7 @@ class CampaignPlan:
     @property
     def below_floor(self) -> tuple[str, ...]:
         """Effects that this campaign would not see at their typical size."""
-        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < 3.0)
+        return tuple(c.label for c, d in zip(self.candidates, self.detectable, strict=True) if d < Deciding.visible)
 
     def matrix(self) -> pd.DataFrame:
         """Isolability matrix: row A at d' = 6 against everything that column B can imitate, in standard deviations."""
@@ -93,7 +86,8 @@ class CampaignPlan:
 
         rows = []
         for i, c in enumerate(self.candidates):
-            like = [o.label for j, o in enumerate(self.candidates) if j != i and self.separation[i, j] < _CONFUSABLE]
+            apart = zip(self.candidates, self.separation[i], strict=True)
+            like = [other.label for other, distance in apart if distance < Deciding.visible]
             at = c.parameter.from_linear(c.neutral + self.floor[i]) if np.isfinite(self.floor[i]) else np.nan
             rows.append(
                 {
@@ -159,7 +153,7 @@ def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size
     cosine = np.clip(unit.T @ unit, -1.0, 1.0)
-    separation = _SEEN * np.sqrt(1.0 - cosine**2)
+    separation = Deciding.seen * np.sqrt(1.0 - cosine**2)
     np.fill_diagonal(separation, np.nan)
     return CampaignPlan(tuple(chosen), size, separation)
 

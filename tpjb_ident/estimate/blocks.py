@@ -6,12 +6,15 @@ a factor of one row, and a channel that is dead is a row that is missing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.conditions import Condition
 
 #: Quantities of the equation, in the order of its rows.
 QUANTITIES = ("displacement", "force", "acceleration")
@@ -39,6 +42,7 @@ class Rig:
     mass: float
     mass_uncertainty: float = 0.0
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
+    apart: tuple[Condition, ...] = ()  #: what gains said that are since taken as uncertain as they differ
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""
@@ -79,14 +83,28 @@ class Blocks:
 
     def part(self, places: slice | IntArray) -> Blocks:
         """Some of the blocks."""
-        arrays = {name: getattr(self, name)[places] for name in _STACKED}
-        return replace(self, **arrays)
+        stacked_names = [f.name for f in fields(self) if f.name not in ("points", "runs", "bent")]
+        return replace(self, **{name: getattr(self, name)[places] for name in stacked_names})
 
 
-_STACKED = (
-    "point", "run", "omega", "z", "present", "along", "calibration", "noise", "dof", "slope", "slope_noise",
-    "windows", "time", "temperature", "miss", "miss_error", "shaft",
-)  # fmt: skip
+def stacked(
+    points: Sequence[OperatingPoint],
+    runs: Sequence[str],
+    sensors: int,
+    rows: Sequence[Mapping[str, Any]],
+    bent: FloatArray | None = None,
+) -> Blocks:
+    """Blocks of rows, each what is known of it by name; one that is said nothing else of is a single still window."""
+    m = sensors
+    usual: dict[str, Any] = dict.fromkeys(("z", "slope"), np.zeros(m, complex)) | dict.fromkeys(("point", "run"), 0)
+    usual |= {"omega": 0.0, "present": np.zeros(m, dtype=bool), "along": np.zeros((m, 2)), "dof": 1.0, "windows": 1.0}
+    usual |= {"calibration": np.zeros(m, dtype=int), "noise": np.zeros((m, m), complex), "slope_noise": np.eye(m) + 0j}
+    usual |= {"time": 0.0, "temperature": np.nan, "miss": 0j, "miss_error": 0.0, "shaft": np.nan + 0j}
+    columns = {
+        name: np.array([row.get(name, value) for row in rows], np.asarray(value).dtype).reshape(-1, *np.shape(value))
+        for name, value in usual.items()
+    }
+    return Blocks(tuple(points), tuple(runs), bent=np.zeros(len(points)) if bent is None else bent, **columns)
 
 
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:

@@ -58,6 +58,7 @@ class Scatter:
     own_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
     judges: bool = True  #: whether blocks that stand apart lose their weight
     follows: bool = True  #: whether it is found in the solve
+    together: bool = False  #: whether blocks are judged all together: what they have in common is no point's
 
     @staticmethod
     def none(points: int, blocks: int) -> Scatter:
@@ -87,7 +88,9 @@ class Scatter:
         """
         if not self.follows:
             return self
-        weights = self._weights(group, fit, solvable) if count != 1 and self.judges else self.weights
+        weights = self.weights
+        if count != 1 and self.judges:
+            weights = self._weights(np.zeros_like(group) if self.together else group, fit, solvable[group])
         if count < 3:
             return replace(self, weights=weights)
         points = len(solvable)
@@ -108,7 +111,10 @@ class Scatter:
         excess = self.variance + (chi - spare) / gain
         variance[own] = np.maximum(excess[own], pooled)
         runs = totals(group, used, points)
-        return Scatter(variance, weights, pooled, freedom, own, np.maximum(runs - 2.0, 1.0), self.judges)
+        own_spare = np.maximum(runs - 2.0, 1.0)
+        return replace(
+            self, variance=variance, weights=weights, pooled=pooled, spare=freedom, own=own, own_spare=own_spare
+        )
 
     def _pooled(self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray) -> tuple[float, float]:
         """Variance that all points share, by moments, and its degrees of freedom; the usual one counts a little."""
@@ -120,12 +126,11 @@ class Scatter:
         usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + freedom) * _USUAL**2
         return moment + usual, freedom
 
-    def _weights(self, group: IntArray, fit: Residuals, solvable: BoolArray) -> FloatArray:
+    def _weights(self, group: IntArray, fit: Residuals, judged: BoolArray) -> FloatArray:
         freedom = fit.rows * (1 - np.minimum(fit.leverage, _MAX_LEVERAGE))
         distance = fit.chi_square / np.maximum(freedom, 1.0)
-        judged = solvable[group]
         usual = max(1.0, float(np.median(distance[judged]))) if judged.any() else 1.0
-        points = len(solvable)
+        points = int(group.max(initial=0)) + 1
         runs = totals(group, np.ones(len(group)), points)
         freedom_of_others = 2 * float(np.maximum(runs - 2, 0.0).sum())
         # few runs know little of what is usual among them: then only the improbable has no weight

@@ -75,6 +75,24 @@ def over_frequency(model: str, group: IntArray, omega: FloatArray, middle: Float
     return Shape(group, columns, len(middle))
 
 
+def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
+    """A force (4 numbers) of the film for every point by itself, and H to start from: the rig is told of no film.
+
+    `D`, `F` (P, 2): what the points' only runs show [m], [N]; NaN where they show nothing.
+    """
+    told = np.isfinite(np.concatenate([D, F], axis=1)).all(axis=1)
+    shown = np.where(told[:, None], D, 1.0)
+    size = np.maximum(np.linalg.norm(shown, axis=1), 1e-300)[:, None]
+    across = shown.conj() / size
+    start = np.where(told[:, None, None], F[:, :, None] * (across / size)[:, None, :], np.nan)
+    columns = np.zeros((len(D), NUMBERS, 4))
+    for k in range(NUMBERS // 2):
+        i, part = k // 2, across[:, k % 2]
+        columns[:, k, i], columns[:, k, 2 + i] = part.real, -part.imag
+        columns[:, 4 + k, i], columns[:, 4 + k, 2 + i] = part.imag, part.real
+    return Shape(np.arange(len(D)), columns), start
+
+
 def nearest(shape: Shape, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Numbers (G, k) of the model nearest to h (P, 2, 2), NaN where not known; `weight` (P,)."""
     assert shape.columns is not None

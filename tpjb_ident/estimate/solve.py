@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
 from tpjb_ident.estimate.equation import (
@@ -68,6 +69,10 @@ class Solution:
         """What the records tell of the terms' parameters."""
         return tuple(sentence for term in self.terms for sentence in term.words(self.fitted[term.name]))
 
+    def conditions(self) -> tuple[Condition, ...]:
+        """What the terms' tests say of the rig: it touches every point."""
+        return tuple(found for term in self.terms for found in term.conditions(self.fitted[term.name]))
+
 
 class Solver:
     """Gauss-Newton over all blocks, from a start of H; points share its numbers as the shape says."""
@@ -94,7 +99,8 @@ class Solver:
         self.always = np.array([t.always_estimated for t in self.terms for _ in t.parameters], dtype=bool)
         self.theta = self.mean.copy()
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
-        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & (runs > 1))
+        enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
+        self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
         self.answered = totals(self.shape.group, self.solvable, self.shape.groups) > 0
         self.unit = float(np.median(np.abs(start[self.solvable]))) if self.solvable.any() else 1.0
         self.h = np.where(self.solvable[:, None, None], start, self.unit * np.eye(2))
@@ -165,7 +171,7 @@ class Solver:
         if last is None:  # a point whose readings leave a number untold has no answer
             self.answered &= are_told(sums.A)
             self.solvable &= self.answered[self.shape.group]
-        sums.drop(~self.answered)
+        sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)))  # none of its blocks counts
         joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 

@@ -139,10 +139,14 @@ class Additive(Term):
 
 
 def beyond(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
-    """Places of estimated parameters more than `limit` prior deviations, and standard errors, from the mean."""
+    """Places of estimated parameters further from the mean than they scatter if the prior holds.
+
+    The value's variance is then the prior's less what the records leave; and it must stand above its own error.
+    """
     places = []
     for k, parameter in enumerate(parameters):
-        distance = abs(float(fitted.value[k]) - parameter.mean)
-        if fitted.estimated[k] and distance > limit * max(parameter.deviation, float(fitted.deviation[k])):
+        distance, error = abs(float(fitted.value[k]) - parameter.mean), float(fitted.deviation[k])
+        scatter = np.sqrt(max(parameter.deviation**2 - error**2, error**2))
+        if fitted.estimated[k] and distance > limit * scatter:
             places.append(k)
     return places

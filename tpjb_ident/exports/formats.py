@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
+from tpjb_ident.columns import in_us_units, place_of
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS
@@ -28,6 +29,7 @@ class ExportError(TpjbError):
 
 
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
+CROSS = ("kxy", "kyx", "cxy", "cyx")
 _ROTATION, _COUNTER_CLOCKWISE = "rotation", "counter-clockwise"
 
 
@@ -103,22 +105,18 @@ def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
     left_out = tuple(_place(row) for _, row in frame[~finite].iterrows())
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
-    usable = frame[finite]
-    reasons, doubtful = [], []
-    for _, row in usable.iterrows():
-        reasons.append(_distrust(row))
-        if reasons[-1]:
-            doubtful.append(f"{_place(row)}: {reasons[-1]}")
-    usable = usable.assign(_trusted=[not reason for reason in reasons], _reasons=reasons)
-    exported = usable if force else usable[usable["_trusted"]]
+    usable = frame[finite].assign(_reasons=[_distrust(row) for _, row in frame[finite].iterrows()])
+    trusted = usable["_reasons"] == ""
+    doubtful = tuple(f"{_place(row)}: {row['_reasons']}" for _, row in usable[~trusted].iterrows())
+    exported = usable if force else usable[trusted]
     if _ROTATION not in exported:
         exported = exported.assign(**{_ROTATION: _COUNTER_CLOCKWISE})
     points = [_point(keys, group) for keys, group in exported.groupby([*STATIC_COLUMNS, _ROTATION], sort=True)]
-    return Chosen(tuple(points), left_out, tuple(doubtful))
+    return Chosen(tuple(points), left_out, doubtful)
 
 
 def _place(row: pd.Series) -> str:
-    return f"{row['static_load_N']:g} N, {row['excitation_Hz']:g} Hz"
+    return place_of(row["static_load_N"], row["excitation_Hz"])
 
 
 def _point(keys: tuple[Any, ...], group: pd.DataFrame) -> StaticPoint:
@@ -131,7 +129,7 @@ def _point(keys: tuple[Any, ...], group: pd.DataFrame) -> StaticPoint:
     column = "quality" if "quality" in ordered else "status"
     texts = list(ordered[column]) if column in ordered else [""] * len(ordered)
     flags = tuple(_with_reasons(text, reason) for text, reason in zip(texts, ordered["_reasons"], strict=True))
-    trusted = ordered["_trusted"].to_numpy(bool)
+    trusted = (ordered["_reasons"] == "").to_numpy(bool)
     return StaticPoint(load, direction, speed, omega, values, low, high, flags, trusted, str(keys[3]))
 
 
@@ -139,14 +137,8 @@ def turning_counter_clockwise(point: StaticPoint) -> StaticPoint:
     """Give a point in a frame in which its shaft turns counter-clockwise: x to -x where it does not."""
     if point.rotation == _COUNTER_CLOCKWISE:
         return point
-    sign = {name: -1.0 if name[1] != name[2] else 1.0 for name in COLUMNS}
-    values, low, high = (
-        {name: sign[name] * column for name, column in part.items()}
-        for part in (point.coefficients, point.low, point.high)
-    )
-    for name in COLUMNS:
-        if sign[name] < 0:
-            low[name], high[name] = high[name], low[name]
+    ends = ((point.coefficients, point.coefficients), (point.low, point.high), (point.high, point.low))
+    values, low, high = (end | {name: -opposite[name] for name in CROSS} for end, opposite in ends)
     direction = (180.0 - point.direction + 180.0) % 360.0 - 180.0
     return replace(
         point, direction=direction, coefficients=values, low=low, high=high, rotation=_COUNTER_CLOCKWISE, mirrored=True
@@ -210,12 +202,15 @@ class Format:
         shafts turn counter-clockwise.
     note : str
         What its user must know.
+    only_si : bool
+        Whether its program takes numbers in SI alone, so that US units are refused.
     """
 
     module: str
     function: str
     of_rotors: bool = False
     note: str = ""
+    only_si: bool = False
 
     @property
     def writer(self) -> Writer:
@@ -229,7 +224,7 @@ _ROSS = "ROSS extrapolates outside the speeds and frequencies given; K holds Re 
 
 
 FORMATS: dict[str, Format] = {
-    "ross": Format("rotor_programs", "write_ross", True, _ROSS),
+    "ross": Format("rotor_programs", "write_ross", True, _ROSS, only_si=True),
     "csv": Format("table", "write_csv"),
     "parquet": Format("table", "write_parquet"),
     "excel": Format("table", "write_excel"),
@@ -241,9 +236,11 @@ FORMATS: dict[str, Format] = {
 
 
 def export_format(name: str) -> Format:
-    """Format of a name."""
+    """Format of a name, if it can be written in the units in use."""
     if name not in FORMATS:
         near = nearest_name(name, FORMATS)
         hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."
         raise ExportError(f"--to: {name!r} is not known. {hint}")
+    if FORMATS[name].only_si and in_us_units():
+        raise ExportError(f"--units us: --to {name} writes SI, all that its program reads. Leave --units us out.")
     return FORMATS[name]

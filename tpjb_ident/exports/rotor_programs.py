@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import functools
 import importlib.metadata
+import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.columns import amount, in_us_units
 from tpjb_ident.exports.formats import COLUMNS, ROSS_VERSIONS, StaticPoint
 from tpjb_ident.exports.table import INTERVALS
 from tpjb_ident.runtime.tables import printable, write_text
+from tpjb_ident.us_table import UNITS
 
 _HZ = 2.0 * math.pi
 #: Excitation frequencies that differ by less than this share are one.
@@ -50,7 +54,7 @@ class Grid:
     def remarks(self, source: str) -> list[str]:
         """The head: source, what it is, where intervals are, and what is not to be trusted."""
         parts = ["mirrored, x to -x"] if self.mirrored else []
-        parts.append(f"static load {self.load:g} N at {self.direction:g} deg")
+        parts.append(f"static load {amount(self.load, 'force')} at {self.direction:g} deg")
         if len(self.excitation) == 1:
             line = "the running speed" if self.line == "synchronous" else f"{self.excitation[0] / _HZ:g} Hz"
             parts.append(f"excitation at {line}")
@@ -62,7 +66,7 @@ class Grid:
             printable(source).replace("\n", " "),
             ", ".join(parts),
             *warning,
-            f"intervals and flags: {INTERVALS}",
+            f"intervals and flags: {INTERVALS}{'_us' if in_us_units() else ''}.csv",
         ]
         if self.mirrored:
             remarks.append("the rig's shaft turns clockwise: here, and in the intervals, it turns counter-clockwise")
@@ -78,15 +82,16 @@ class Grid:
 
 def grids(points: Sequence[StaticPoint], axes: str) -> list[Grid]:
     """Sort points by load and direction into files over ``"speed"``, ``"excitation"`` or ``"both"``."""
-    loads: dict[tuple[float, float, bool], list[StaticPoint]] = {}
-    for point in sorted(points, key=lambda point: (point.load, point.direction, point.speed)):
-        loads.setdefault((point.load, point.direction, point.mirrored), []).append(point)
+    static = attrgetter("load", "direction", "mirrored")
     made = []
-    for members in loads.values():
-        whole = [(point, np.arange(len(point.frequency))) for point in members]
+    for _, at_load in itertools.groupby(sorted(points, key=lambda point: (static(point), point.speed)), static):
+        members = list(at_load)
+        whole = [(point, np.s_[:]) for point in members]
         lines = [_lines(point) for point in members]
         if axes == "speed":
-            made += [_over_speed(members, lines, line) for line in sorted(set().union(*map(set, lines)))]
+            for line in sorted(set().union(*map(set, lines))):
+                rows = [(point, own == line) for point, own in zip(members, lines, strict=True) if line in own]
+                made.append(_grid(rows, np.array([math.nan if line == _SYNCHRONOUS else line])))
         elif axes == "both" and _all_alike([point.frequency for point in members]):
             made.append(_grid(whole, members[0].frequency))
         elif axes == "both" and _all_alike(lines) and lines[0].tolist() == [_SYNCHRONOUS]:
@@ -110,15 +115,7 @@ def _all_alike(axes: Sequence[FloatArray]) -> bool:
     return all(len(axis) == len(first) and np.allclose(axis, first, rtol=_SAME, atol=0.0) for axis in axes)
 
 
-def _over_speed(members: Sequence[StaticPoint], lines: Sequence[FloatArray], line: float) -> Grid:
-    rows = []
-    for point, of_point in zip(members, lines, strict=True):
-        if line in of_point:
-            rows.append((point, np.flatnonzero(of_point == line)))
-    return _grid(rows, np.array([math.nan if line == _SYNCHRONOUS else line]))
-
-
-def _grid(rows: Sequence[tuple[StaticPoint, np.ndarray]], excitation: FloatArray) -> Grid:
+def _grid(rows: Sequence[tuple[StaticPoint, slice | BoolArray]], excitation: FloatArray) -> Grid:
     """Grid of points, of each at some of its frequencies."""
     values = [np.array([point.coefficients[name][chosen] for name in COLUMNS]).T for point, chosen in rows]
     flags = []
@@ -173,19 +170,23 @@ def write_ross(folder: Path, points: tuple[StaticPoint, ...], source: str, versi
 
 def _xltrc(grid: Grid, remarks: list[str]) -> list[str]:
     """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
-    units = {"k": "N/m", "c": "N-s/m"}
+    per, force = ("in", "lbf") if in_us_units() else ("m", "N")
+    units = {"k": f"{force}/{per}", "c": f"{force}-s/{per}"}
     head = ["Speed (rpm)", *(f"{name.capitalize()} ({units[name[0]]})" for name in COLUMNS)]
     return [*(f"* {remark}" for remark in remarks), "\t".join(head), *grid.rows("\t")]
 
 
 def _dyrobes(grid: Grid, remarks: list[str]) -> list[str]:
-    """External bearing file of Dyrobes: points, unit system 4 (N, m, s), 8 coefficients, then one line per speed."""
-    return [f"{len(grid.speed)}, 4, 8, 0, 0, 0, 0   {'; '.join(remarks)}", *grid.rows(", ")]
+    """External bearing file of Dyrobes: points, unit system, 8 coefficients, then one line per speed.
+
+    Its systems are 1 and 2 with in and lbf, 3 with m and N, 4 with mm and N.
+    """
+    return [f"{len(grid.speed)}, {2 if in_us_units() else 3}, 8, 0, 0, 0, 0   {'; '.join(remarks)}", *grid.rows(", ")]
 
 
 def _ansys(grid: Grid, remarks: list[str]) -> list[str]:
-    """File that ANSYS reads for COMBI214: titles, count and unit keys (0: SI; 1: rpm to rad/s), K and C by speed."""
-    lines = [*(remark[:80] for remark in remarks[:3]), f"{len(grid.speed):10d}{0:10d}{1:10d}"]
+    """File that ANSYS reads for COMBI214: titles, count, keys (1: lbf and in; 1: rpm to rad/s), K and C by speed."""
+    lines = [*(remark[:80] for remark in remarks[:3]), f"{len(grid.speed):10d}{in_us_units():10d}{1:10d}"]
     for i, (speed, values) in enumerate(zip(grid.speed, grid.values[:, 0], strict=True), start=1):
         lines.append(f"{i:10d}{60.0 * speed:10.2f}")
         lines += ["".join(f"{value:15.7E}" for value in part) for part in (values[:4], values[4:])]
@@ -200,7 +201,9 @@ def _write_by_speed(
     source: str,
 ) -> None:
     """One file per load and excitation frequency."""
+    per_metre = UNITS["N_per_m"][1] if in_us_units() else 1.0
     for grid in grids(points, "speed"):
+        grid = replace(grid, values=grid.values / per_metre)
         write_text(folder / f"{program}_{grid.name(grid.line)}.txt", "\n".join(text(grid, grid.remarks(source))) + "\n")
 
 

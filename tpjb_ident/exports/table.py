@@ -13,15 +13,16 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from tpjb_ident.exports.formats import COLUMNS, ExportError, StaticPoint
 from tpjb_ident.runtime import tables
-from tpjb_ident.runtime.tables import printable, safe_for_spreadsheets, write_atomic
+from tpjb_ident.runtime.tables import printable, write_atomic
 from tpjb_ident.schema import ENTRIES
+from tpjb_ident.us_table import us_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 NAME = "bearing_coefficients"
 #: Beside files of a form that holds no intervals.
-INTERVALS = f"{NAME}_intervals.csv"
+INTERVALS = f"{NAME}_intervals"
 _TIME, _NO_TIME = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:.]+Z"), b"1980-01-01T00:00:00Z"
 #: Text at the start of a MATLAB file, in place of one with the time.
 _MAT_HEAD = b"MATLAB 5.0 MAT-file, written by tpjb-ident".ljust(116)
@@ -51,19 +52,14 @@ def _coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
-    """Write bearing_coefficients.csv into an existing folder."""
-    _write_csv(folder / f"{NAME}.csv", points)
+def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str, name: str = NAME) -> None:
+    """Write bearing_coefficients.csv into an existing folder, or the same table under another name."""
+    tables.write_csv(folder / f"{name}.csv", _coefficient_table(points))
 
 
-def write_intervals(folder: Path, points: tuple[StaticPoint, ...]) -> None:
-    """Write the same table beside files of a form that holds no intervals."""
-    _write_csv(folder / INTERVALS, points)
-
-
-def _write_csv(path: Path, points: tuple[StaticPoint, ...]) -> None:
-    frame = safe_for_spreadsheets(_coefficient_table(points))
-    write_atomic(path, lambda part: frame.to_csv(part, index=False, encoding="utf-8", lineterminator="\n"))
+def write_us(folder: Path, points: tuple[StaticPoint, ...], name: str) -> None:
+    """Write the same table in US units, beside what stays SI."""
+    tables.write_csv(folder / f"{name}_us.csv", us_table(_coefficient_table(points)))
 
 
 def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
@@ -153,11 +149,8 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
     content = {"bearing": array, "source": printable(source)}
     file = io.BytesIO()
     savemat(file, content, oned_as="column", appendmat=False)
-
-    def write(part: Path) -> None:
-        part.write_bytes(_MAT_HEAD + file.getvalue()[len(_MAT_HEAD) :])
-
-    write_atomic(folder / f"{NAME}.mat", write)
+    timeless = _MAT_HEAD + file.getvalue()[len(_MAT_HEAD) :]
+    write_atomic(folder / f"{NAME}.mat", lambda part: part.write_bytes(timeless))
 
 
 def _matrices(values: dict[str, FloatArray], kind: str) -> FloatArray:

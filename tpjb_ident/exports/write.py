@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.columns import in_us_units
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import (
     ROSS_VERSIONS,
@@ -16,7 +17,7 @@ from tpjb_ident.exports.formats import (
     turning_counter_clockwise,
 )
 from tpjb_ident.exports.ross_bearing import write_ross_bearing
-from tpjb_ident.exports.table import write_intervals
+from tpjb_ident.exports.table import INTERVALS, NAME, write_csv, write_us
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
 
@@ -108,7 +109,9 @@ def export(
     points = tuple(turning_counter_clockwise(point) if form.of_rotors else point for point in chosen.points)
     form.writer(target, points, f"tpjb-ident: coefficients of {name or origin}", **options)
     if form.of_rotors:
-        write_intervals(target, points)
+        write_csv(target, points, "", INTERVALS)
+    if in_us_units():
+        write_us(target, points, INTERVALS if form.of_rotors else NAME)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
     return Export(target, files, chosen)
 

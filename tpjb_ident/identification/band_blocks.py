@@ -13,20 +13,17 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
+from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import axes_of, calibration_numbers, no_blocks
+from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise.
 STRONG = 10.0
-#: A channel whose phasors are below this share of its quantity's is dead.
-_NOTHING = 1e-6
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
-#: What windows would tell of clocks: the transform has one, and its channels are on one clock by then.
-_STILL: dict[str, object] = {"windows": 1.0, "time": 0.0, "shaft": np.nan + 0j}
 #: Misses that no scatter of loads explains say nothing of how H changes with the load.
 _MAX_MISS = 0.05
 
@@ -69,9 +66,8 @@ def band_blocks(
     instruments: Sequence[str],
 ) -> BandBlocks:
     """Responses of all runs; `instruments` by band."""
-    columns: dict[str, list[object]] = {name: [] for name in no_blocks(len(sensors))}
+    rows: list[dict[str, object]] = []
     known: list[list[Hashable]] = [[] for _ in sensors]
-    stands: list[bool] = []
     lines: list[int] = []
     bands: list[int] = []
     runs: list[str] = []
@@ -93,19 +89,14 @@ def band_blocks(
             warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth[0], "miss_error": 0.0, "miss": _miss(miss, members)}
+            row |= {"run": len(runs), "temperature": warmth[0], "miss": _miss(miss, members)}
             for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
-                stands.append(bool(response.pop("stands")))
-                response |= row | {"point": first + place, "omega": omega[first + place]}
-                for name in columns:
-                    columns[name].append(response[name])
+                rows.append(response | row | {"point": first + place, "omega": omega[first + place]})
             runs.append(", ".join(s.phasors.run for s in spectra))
-    empty = no_blocks(len(sensors))
-    arrays = {name: np.array(values) if values else empty[name] for name, values in columns.items()}
-    blocks = Blocks(points=tuple(operating), runs=tuple(runs), bent=np.zeros(len(operating)), **arrays)
+    blocks = stacked(operating, runs, len(sensors), rows)
     of_point = np.array(lines, dtype=np.intp)
     driven = np.zeros(len(line_omega), dtype=bool)
-    np.logical_or.at(driven, of_point[blocks.point], np.array(stands, dtype=bool))
+    np.logical_or.at(driven, of_point[blocks.point], np.array([row["stands"] for row in rows], dtype=bool))
     return BandBlocks(
         blocks.part(np.flatnonzero(driven[of_point[blocks.point]])),
         np.array(omega),
@@ -131,15 +122,11 @@ def _miss(miss: LoadMiss, members: Sequence[int]) -> complex:
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
     """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
-    table = {channel.name: channel for channel in spectra.phasors.channels}
-    size = dict(zip(table, np.abs(spectra.phasors.z).max(axis=(0, 1))))
-    channels: list[Channel | None] = []
-    for sensor in sensors:
-        channel = table.get(sensor.name)
-        like = [size[name] for name, c in table.items() if c.quantity == sensor.quantity]
-        alive = channel is not None and channel.quantity == sensor.quantity and size[sensor.name] > _NOTHING * max(like)
-        channels.append(channel if alive else None)
-    return channels
+    largest = np.abs(spectra.phasors.z).max(axis=(0, 1))
+    table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.phasors.channels, largest)}
+    known = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
+    shown = alive(sensors, np.array([size for _, size in known]))
+    return [channel if own else None for (channel, _), own in zip(known, shown)]
 
 
 def _run_rows(
@@ -175,8 +162,8 @@ def _run_rows(
         if rig is not None:
             z = _without_rig(z, channels, rig[0])
         for values in z:
-            row: dict[str, object] = {"z": values, "present": present, "noise": covariance, "dof": freedom}
-            rows.append((place, row | {"stands": stands} | _STILL | {"slope": 0 * z[0], "slope_noise": np.eye(m) + 0j}))
+            row = {"z": values, "present": present, "noise": covariance, "dof": freedom, "stands": stands}
+            rows.append((place, row))
     return rows
 
 

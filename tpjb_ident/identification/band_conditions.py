@@ -29,9 +29,7 @@ def run_conditions(point: BandPoint, solution: BandSolution) -> tuple[Condition,
     if solution.run_scatter > _TOO_MUCH:
         text = f"runs differ by {100 * solution.run_scatter:.1f} % in force over displacement"
         found.append(Condition("runs-disagree", text))
-    for term in solution.lines.terms:
-        found += term.conditions(solution.lines.fitted[term.name])
-    return merged(tuple(found))
+    return merged(tuple(found), solution.lines.conditions())
 
 
 def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:

@@ -14,7 +14,8 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
-from tpjb_ident.dynamic.results.band_result import BandLine, BandModel, BandResult, supported
+from tpjb_ident.dynamic.results.band_result import BandLine, BandResult
+from tpjb_ident.dynamic.results.frequency_model import FrequencyModel, supported
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.quality import feeds_motion
 from tpjb_ident.dynamic.runs.point_data import pad_means
@@ -23,6 +24,7 @@ from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
+from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
 
 #: Degrees of freedom of the noise of a model: it averages over many lines.
 _MANY = 1e4
@@ -75,23 +77,10 @@ def band_result(
     return replace(result, points=tuple(_point(solved, q, result, miss, clearance) for q in solved.parts(b)))
 
 
-@dataclass(frozen=True)
-class Moved:
-    """What every source that points share does to their entries, as rows whose mean product is the covariance."""
-
-    changes: FloatArray  #: (q, 8 P), N/m
-    names: tuple[str, ...]  #: of the sources, term and parameter
-
-
-def moved(solved: SolvedBands) -> Moved:
+def shared_by_bands(solved: SolvedBands) -> SharedChanges:
     """The sources of the points of all bands."""
-    solution = solved.first.part
     parts = [q for b in range(len(solved.points)) for q in solved.parts(b)]
-    names = tuple(f"{term.name}: {parameter.name}" for term in solution.terms for parameter in term.parameters)
-    if not names:
-        return Moved(np.zeros((1, 8 * len(parts))), ())
-    factors = solution.factors[:, parts]
-    return Moved(np.asarray(factors.reshape(len(names), 8 * len(parts)) * np.sqrt(len(names))), names)
+    return shared_changes(solved.first.part, parts)
 
 
 def _freedom(solved: SolvedBands, solution: Solution, group: IntArray, g: int, noise_dof: float) -> FloatArray:
@@ -136,7 +125,7 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     return BandLine(omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
-def _model(solved: SolvedBands, name: str, b: int, quiet: bool) -> BandModel:
+def _model(solved: SolvedBands, name: str, b: int, quiet: bool) -> FrequencyModel:
     """One model over one band, held against h in its parts."""
     fits = [s.models[name] for s in solved.solutions]
     first, data = fits[0].solution, solved.data
@@ -149,7 +138,7 @@ def _model(solved: SolvedBands, name: str, b: int, quiet: bool) -> BandModel:
     chi_square, spare, probability, misfit = _held_against_parts(solved, name, b)
     unjudged = float("nan")  # without an instrument, the bias of either solve looks like a misfit
     omega = data.line_omega[lines]
-    return BandModel(
+    return FrequencyModel(
         name,
         (fits[0].numbers[b] + half) * scale,
         first.records[b] * outer,

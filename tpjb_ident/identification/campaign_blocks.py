@@ -13,50 +13,21 @@ from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.runs.point_source import PointSource
-from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Sensor, stacked
+from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
 
 #: Degrees of freedom below which the noise of a point is taken together with the other points'.
 _FREEDOM = 60.0
-#: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
-_FLOATS = 0.3
-#: Cells over set points between which the cells carry the static load.
-_CARRIED = (0.5, 2.0)
 #: Error of a run's mean load where its windows do not tell, relative.
 _LOAD_ERROR = 2e-4
 #: Misses that no scatter of loads explains say nothing of how H changes with the load.
 _MAX_MISS = 0.05
 
 
-def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
-    """Probes, cells and accelerometers of a campaign's dynamic runs."""
-    channels = dict(campaign.channels)
-    for run in campaign.of_kind("dynamic"):
-        channels = dict(run.channels) | channels
-    sensors = []
-    for quantity in QUANTITIES:
-        for channel in channels.values():
-            if channel.quantity != quantity or channel.axis is None:
-                continue
-            sensors.append(
-                Sensor(
-                    channel.name,
-                    quantity,
-                    channel.uncertainty,
-                    channel.axis_uncertainty,
-                    channel.delay_uncertainty,
-                    channel.clock,
-                    channel.plane,
-                    channel.temperature_coefficient_uncertainty,
-                )
-            )
-    return tuple(sensors)
-
-
 def unstated(campaign: Campaign) -> tuple[Condition, ...]:
     """Say which probes and cells have no uncertainty in the manifest."""
-    main = [c for c in campaign.channels.values() if c.quantity in {"displacement", "force"} and c.axis is not None]
-    names = [c.name for c in main if c.uncertainty is None]
+    names = [s.name for s in sensors_of(campaign) if s.quantity in QUANTITIES[:2] and s.uncertainty is None]
     if not names:
         return ()
     text = f"no uncertainty in the manifest for {', '.join(names)}: their systematic part is left out"
@@ -89,8 +60,7 @@ def campaign_blocks(
     noises, freedoms = _pooled_noise(means, [source.digests[0].window for source in sources])
     names: list[str] = []
     known: list[list[Hashable]] = []
-    nothing = no_blocks(len(means[0].channels[0]))
-    columns: dict[str, list[object]] = {name: [] for name in nothing}
+    rows: list[dict[str, object]] = []
     for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
         w = point.means
         for g, (digest, (_, line)) in enumerate(zip(source.digests, source.members)):
@@ -101,7 +71,7 @@ def campaign_blocks(
             load = max(source.point.static_load, 1e-9)
             usable = abs(miss.size[g]) < _MAX_MISS and abs(miss.sideways[g]) < _MAX_MISS
             present = np.array([channel is not None for channel in channels])
-            row = {
+            row: dict[str, object] = {
                 "point": p,
                 "run": len(names),
                 "omega": 2 * np.pi * digest.excitations[line],
@@ -121,17 +91,8 @@ def campaign_blocks(
                 "shaft": point.shaft[g],
             }
             names.append(digest.run)
-            for name in columns:
-                columns[name].append(row[name])
-    arrays = {name: np.array(values) if names else nothing[name] for name, values in columns.items()}
-    points = tuple(source.point for source in sources)
-    return Blocks(points=points, runs=tuple(names), bent=bent, **arrays)
-
-
-def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
-    """Unit vectors of the axes (m, 2); zero where a run has no such channel."""
-    rows = [(0.0, 0.0) if c is None else (np.cos(c.axis or 0.0), np.sin(c.axis or 0.0)) for c in channels]
-    return np.array(rows)
+            rows.append(row)
+    return stacked([source.point for source in sources], names, len(means[0].channels[0]), rows, bent)
 
 
 def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:
@@ -143,22 +104,6 @@ def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Has
             calibrations.append(calibration)
         numbers.append(0 if channel is None else calibrations.index(calibration))
     return numbers
-
-
-def no_blocks(m: int) -> dict[str, np.ndarray]:
-    """Columns of the blocks of m sensors where no run says anything."""
-    numbers = dict.fromkeys(("omega", "dof", "windows", "time", "temperature", "miss_error"), np.zeros(0))
-    places = dict.fromkeys(("point", "run"), np.zeros(0, dtype=int))
-    return {
-        **numbers,
-        **places,
-        **dict.fromkeys(("miss", "shaft"), np.zeros(0, complex)),
-        **dict.fromkeys(("z", "slope"), np.zeros((0, m), complex)),
-        **dict.fromkeys(("noise", "slope_noise"), np.zeros((0, m, m), complex)),
-        "present": np.zeros((0, m), dtype=bool),
-        "calibration": np.zeros((0, m), dtype=int),
-        "along": np.zeros((0, m, 2)),
-    }
 
 
 def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tuple[list[ComplexArray], FloatArray]:
@@ -191,25 +136,3 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
         noises.append(np.asarray(noise * max(freedom / max(freedom - m, 1.0), 1.0), complex))
         freedoms.append(freedom)
     return noises, np.array(freedoms)
-
-
-def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:
-    """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
-
-    Without accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the
-    housing stands on them. Cells of a floating stator show none; then it is "unknown".
-    """
-    if stated:
-        return stated
-    rig = Rig(tuple(sensors), 1.0)
-    carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
-    if len(rig.of("acceleration")) < 2:
-        return carried
-    a = vector(rig, blocks, "acceleration")
-    d = vector(rig, blocks, "displacement") * (blocks.omega**2)[:, None]
-    told = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1)
-    if not told.any():
-        return carried
-    power = np.sum(np.abs(d[told]) ** 2, axis=0)
-    quotient = np.sum(d[told].conj() * a[told], axis=0) / np.maximum(power, 1e-300)
-    return "floating" if np.abs(quotient - 1).max() < _FLOATS else "cells"

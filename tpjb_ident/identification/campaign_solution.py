@@ -9,21 +9,15 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_misses
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
 from tpjb_ident.dynamic.runs.finished_runs import RunDigest
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import Blocks, Rig, vector
+from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
-from tpjb_ident.identification.campaign_blocks import (
-    campaign_blocks,
-    found_mount,
-    run_temperatures,
-    sensors_of,
-    with_start,
-)
+from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
 from tpjb_ident.identification.unstated_clocks import with_found_devices
 from tpjb_ident.runtime.executors import Workers, map_ordered
@@ -75,11 +69,6 @@ class CampaignSolution:
             h[p] = h[p] + fit.change
         return h
 
-    def conditions(self) -> tuple[Condition, ...]:
-        """What the terms' tests say of the rig: it touches every point."""
-        tests = (term.conditions(self.solution.fitted[term.name]) for term in self.solution.terms)
-        return tuple(condition for found in tests for condition in found)
-
 
 def solve_campaign(
     campaign: Campaign,
@@ -113,19 +102,21 @@ def solve_campaign(
         offsets = {device: offsets.get(device, 0.0) + rate for device, rate in rates.items()}
         task = replace(task, sensors=sensors, rates=offsets)
     start = np.array([point.start for point in means])
-    used = [term for term in TERMS if correct or term is not LoadTurn]
-    terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
-    solution = Solver(rig, blocks, terms, start, correct).run()
+
+    def solved(rig: Rig, blocks: Blocks) -> Solution:
+        used = [term for term in TERMS if correct or term is not LoadTurn]
+        terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
+        return Solver(rig, blocks, terms, start, correct).run()
+
+    solution = solved(rig, blocks)
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        rig = learnt
-        terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
-        solution = Solver(rig, blocks, terms, start, correct).run()
+        rig, solution = learnt, solved(learnt, blocks)
     pickup, fits = _mains(sources, digests, rig, blocks, solution) if correct else (None, {})
     shift = np.zeros_like(blocks.z)
     if fits:
         shift = _mains_readings(rig, blocks, fits)
-        solution = Solver(rig, replace(blocks, z=blocks.z - shift), terms, start, correct).run()
+        solution = solved(rig, replace(blocks, z=blocks.z - shift))
     force = force_pickup([digest.mains_force for digest in digests])
     in_cells = _in_cells(sources, rig, blocks, force)
     size = float(np.linalg.norm(force))
@@ -157,11 +148,9 @@ def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
     spread = gain.spread(solution.fitted[gain.name])
     if not spread:
         return rig
-    sensors = []
-    for sensor in rig.sensors:
-        wide = spread.get(sensor.quantity, 0.0)
-        sensors.append(replace(sensor, uncertainty=wide) if wide > (sensor.uncertainty or 0.0) else sensor)
-    return replace(rig, sensors=tuple(sensors))
+    wide = {s.name: max(spread.get(s.quantity, 0.0), s.uncertainty or 0.0) or None for s in rig.sensors}
+    sensors = tuple(replace(s, uncertainty=wide[s.name]) for s in rig.sensors)
+    return replace(rig, sensors=sensors, apart=gain.conditions(solution.fitted[gain.name]))
 
 
 def _film(source: PointSource, point: PointMeans) -> FilmChange:
@@ -171,10 +160,9 @@ def _film(source: PointSource, point: PointMeans) -> FilmChange:
 
 def _clock_rates(rig: Rig, blocks: Blocks, means: Sequence[PointMeans]) -> dict[str, float]:
     """Rates of the devices' clocks that the blocks show, relative."""
-    terms = [term(rig, blocks) for term in (Gain, Clock, Housing)]
+    clock = Clock(rig, blocks)
     start = np.array([point.start for point in means])
-    fitted = Solver(rig, blocks, terms, start).run().fitted
-    clock = next(term for term in terms if isinstance(term, Clock))
+    fitted = Solver(rig, blocks, [Gain(rig, blocks), clock, Housing(rig, blocks)], start).run().fitted
     return clock.rates(fitted[clock.name].value)
 
 

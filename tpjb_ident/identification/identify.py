@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
 from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
@@ -23,14 +22,14 @@ from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.band_point import BandSettings
-from tpjb_ident.identification.band_tables import Moved
 from tpjb_ident.identification.campaign_blocks import unstated
-from tpjb_ident.identification.campaign_solution import CampaignSolution, solve_campaign
+from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import RUN_TERMS, PointTask, finished_point, point_share
+from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
-from tpjb_ident.runtime.executors import InProcessWorkers, Workers, map_ordered
+from tpjb_ident.runtime.executors import Workers, map_ordered
 
 
 def identify(
@@ -107,7 +106,7 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
 def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
     """The points of sines and those of bands together, sorted as ever."""
     points = [*result.points, *(p for band in bands.results for p in band.points)]
-    joint = _side_by_side(Moved(result.calibration_changes, result.calibration_names), bands.moved)
+    joint = SharedChanges(result.calibration_changes, result.calibration_names).beside(bands.shared)
     changes = joint.changes.reshape(len(joint.changes), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
     table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
@@ -119,20 +118,6 @@ def _with_bands(result: Identification, bands: IdentifiedBands) -> Identificatio
         bands=bands.results,
         calibration_names=joint.names,
     )
-
-
-def _side_by_side(first: Moved, second: Moved) -> Moved:
-    """What sources do to two groups of points together; those of one name are one source."""
-    names = tuple(dict.fromkeys((*first.names, *second.names)))
-    count = max(len(names), 1)
-    rows = np.zeros((count, first.changes.shape[1] + second.changes.shape[1]))
-    begin = 0
-    for group in (first, second):
-        end = begin + group.changes.shape[1]
-        for name, row in zip(group.names, group.changes):
-            rows[names.index(name), begin:end] = row * np.sqrt(count / len(group.names))
-        begin = end
-    return Moved(rows, names)
 
 
 def _band_settings(settings: IdentifySettings) -> BandSettings:
@@ -156,7 +141,7 @@ def assemble(
     workers: Workers | None = None,
 ) -> Identification:
     """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time."""
-    workers = workers or InProcessWorkers()
+    workers = workers or Workers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
@@ -173,26 +158,6 @@ def assemble(
     excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
     conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
     named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
-    changes, names = systematic_changes(solved)
+    shared = shared_changes(solved.solution, range(len(sources)), RUN_TERMS)
     remarks = unstated(campaign) + conditions
-    return Identification(campaign.id, settings.method, named, changes, remarks, calibration_names=names)
-
-
-def systematic_changes(solved: CampaignSolution) -> tuple[FloatArray, tuple[str, ...]]:
-    """What every source that points share does to the entries of all P points, (q, 8 P) [N/m], and the sources.
-
-    One row a parameter, scaled so that the mean of the rows' products is the covariance.
-    """
-    solution = solved.solution
-    rows, names, first = [], [], 0
-    for term in solution.terms:
-        last = first + len(term.parameters)
-        if term.name not in RUN_TERMS:
-            rows.append(solution.factors[first:last])
-            names += [f"{term.name}: {parameter.name}" for parameter in term.parameters]
-        first = last
-    points = len(solution.h)
-    if not rows or not sum(len(row) for row in rows):
-        return np.zeros((1, 8 * points)), ()
-    factors = np.concatenate(rows)
-    return np.asarray(factors.reshape(len(factors), -1) * np.sqrt(len(factors))), tuple(names)
+    return Identification(campaign.id, settings.method, named, shared.changes, remarks, calibration_names=shared.names)

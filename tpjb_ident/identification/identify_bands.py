@@ -11,7 +11,6 @@ from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.redundant_channels import widened
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
@@ -22,12 +21,14 @@ from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, points_without_runs, without_runs
 from tpjb_ident.estimate.blocks import Rig, Sensor
+from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
 from tpjb_ident.identification.band_point import BandPoint, BandSettings, band_groups, read_point
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
-from tpjb_ident.identification.band_tables import Moved, SolvedBands, band_result, moved
-from tpjb_ident.identification.campaign_blocks import found_mount, run_temperatures, sensors_of, unstated
+from tpjb_ident.identification.band_tables import SolvedBands, band_result, shared_by_bands
+from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
+from tpjb_ident.identification.shared_changes import SharedChanges
 from tpjb_ident.terms.clock import START
 
 Progress = Callable[[str, int, int], None]
@@ -42,7 +43,7 @@ class IdentifiedBands:
     """What a campaign's broadband runs give."""
 
     results: tuple[BandResult, ...]
-    moved: Moved = field(repr=False)
+    shared: SharedChanges = field(repr=False)
     conditions: tuple[Condition, ...] = ()
 
 
@@ -65,16 +66,15 @@ def identify_bands(
         raise remaining[0].error
     zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
-    stated = replace(campaign, channels=widened(campaign.channels, checked.gains))
-    solved = _solved(stated, points, (misses, common), settings)
+    solved = _solved(campaign, points, (misses, common), settings)
     results = []
     for b, point in enumerate(points):
         conditions = load_conditions(misses[b], common) + zero.conditions()
         conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
         conditions = merged(conditions, run_conditions(point, solved.first), band_conditions(point, solved, b))
         results.append(band_result(solved, b, misses[b], conditions, settings.clearance))
-    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + unstated(stated)
-    return IdentifiedBands(tuple(results), moved(solved), named)
+    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + unstated(campaign)
+    return IdentifiedBands(tuple(results), shared_by_bands(solved), named)
 
 
 def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation]:

@@ -10,7 +10,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, load_conditions
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, not_locked
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
@@ -35,10 +35,6 @@ from tpjb_ident.identification.point_means import (
 RUN_TERMS = ("load miss", "load direction")
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
-#: Condition number of the displacement directions beyond which entries cannot be told apart.
-_MAX_CONDITION = 30.0
-#: Share of windows without weight beyond which the answer needs a look.
-_MAX_REJECTED = 0.4
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,11 @@ def point_share(solved: CampaignSolution, source: PointSource, p: int) -> PointS
 
 
 def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
-    found = [*load_conditions(solved.misses[p], solved.common), *solved.zero.conditions(), *solved.conditions()]
+    found = [
+        *load_conditions(solved.misses[p], solved.common),
+        *solved.zero.conditions(),
+        *solved.solution.conditions(),
+    ]
     if p in solved.mains and solved.pickup is not None:
         found.append(solved.mains[p].condition(solved.pickup))
     found += solved.means[p].shaft_conditions
@@ -172,23 +172,9 @@ def _freedom(solved: CampaignSolution, p: int) -> FloatArray:
 
 
 def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans) -> tuple[Condition, ...]:
-    found = []
-    if condition > _MAX_CONDITION:
-        text = f"condition number {condition:.3g} of the displacement directions > 30"
-        found.append(Condition("ill-conditioned", text))
     counted = weights[means.usable] if len(weights) == len(means.usable) else weights
-    rejected = float((counted < REJECTED_WEIGHT).mean()) if len(counted) else 0.0
-    if rejected > _MAX_REJECTED:
-        text = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
-        found.append(Condition("many-windows-rejected", text))
-    if runs == 2:
-        text = "two directions only: the interval cannot see what runs differ by, only their repeats"
-        found.append(Condition("no-spare-direction", text))
     wandering = 0 if means.means is None else means.means.wandering
-    if wandering:
-        text = f"drive phase wanders in {wandering} of {runs} directions; their windows were turned to one phase"
-        found.append(Condition("drive-not-locked", text))
-    return tuple(found)
+    return (*fit_conditions(condition, counted, runs), *not_locked(wandering, runs))
 
 
 def finished_point(task: PointTask, source: PointSource, share: PointShare) -> PointResult:

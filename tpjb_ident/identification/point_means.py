@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_con
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
+from tpjb_ident.estimate.sensors import alive
 from tpjb_ident.estimate.window_means import WindowMeans, window_means
 from tpjb_ident.phasors.shaft import shaft_order
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
@@ -25,8 +26,6 @@ from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 _ACCEPTED = 0.2
 #: Share of the windows of a run's best channel in which a channel has a phasor, at least, to count as recorded.
 _LEAST_WINDOWS = 0.4
-#: A channel whose phasors are below this share of its quantity's is dead.
-_NOTHING = 1e-6
 #: A window whose phasors are below this share of its run's loud ones (nine in ten are less loud) has no drive.
 _RESTS, _LOUD = 0.1, 0.9
 #: Condition number of the displacement directions from which one direction is missing.
@@ -157,10 +156,7 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
 def _without_dead(z: ComplexArray, task: MeansTask) -> ComplexArray:
     """Phasors (n, m) without channels that show nothing of what others of their quantity do."""
     sizes = np.nanmax(np.abs(np.nan_to_num(z)), axis=0, initial=0.0)
-    for j, sensor in enumerate(task.sensors):
-        like = [sizes[k] for k, other in enumerate(task.sensors) if other.quantity == sensor.quantity]
-        if sizes[j] <= _NOTHING * max(like):
-            z[:, j] = np.nan
+    z[:, ~alive(task.sensors, sizes)] = np.nan
     return z
 
 

@@ -8,12 +8,11 @@ gives its own line, the others are fitted beside it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude
+from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude, noise_floor
 
 #: A line stands this many times above the noise floor around it,
 _PROMINENCE = 15.0
@@ -72,10 +71,9 @@ def lines_beside(frequencies: tuple[float, ...]) -> Condition:
 def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest: float) -> list[float]:
     """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
-    floor = median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest")
     step = 1 / record.duration
     frequency = np.arange(len(amplitude)) * step
-    least = np.maximum(_PROMINENCE * floor, smallest)
+    least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
     candidate = amplitude > least
     candidate[frequency < _LOBE * step] = False
     for f in known:

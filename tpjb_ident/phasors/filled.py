@@ -15,7 +15,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude
+from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude, noise_floor
 
 #: An image stands this many times above the noise of its channel,
 _CLEAR = 8.0
@@ -73,22 +73,25 @@ def filled_channels(records: tuple[WholeRecord, ...], result: RunPhasors) -> dic
         amplitude = hann_amplitude(record.spectrum)
         for column, place in enumerate(record.places):
             sizes = np.abs(np.nan_to_num(record.z[:, column]))
+            floor = noise_floor(amplitude[:, column])
             for strong in np.argsort(-sizes)[:2]:
                 line = record.lines.whole[strong].frequency, float(sizes[strong])
-                found = _images_of(line, amplitude[:, column], record)
+                found = _images_of(line, amplitude[:, column], floor, record)
                 if found is not None:
                     slower.setdefault(result.channels[place].name, found)
     return slower
 
 
-def _images_of(line: tuple[float, float], amplitude: FloatArray, record: WholeRecord) -> SlowerChannel | None:
+def _images_of(
+    line: tuple[float, float], amplitude: FloatArray, floor: FloatArray, record: WholeRecord
+) -> SlowerChannel | None:
     """Rate and order of filling by a pair of images of one line (frequency [Hz], size)."""
     frequency, size = line
-    least = max(_CLEAR * float(np.median(amplitude)), _SHARE * size)
-    if not np.isfinite(least) or size <= 0:
+    least = np.maximum(_CLEAR * floor, _SHARE * size)
+    if not np.isfinite(least).all() or size <= 0:
         return None
     inside = amplitude[1:-1]
-    top = (inside > least) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
+    top = (inside > least[1:-1]) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
     peaks = np.flatnonzero(top) + 1
     peaks = peaks[(peaks > 1.2 * frequency * record.duration) & _is_free(peaks, record)]
     for low in peaks[np.argsort(-amplitude[peaks])][:8]:
@@ -103,7 +106,7 @@ def _images_of(line: tuple[float, float], amplitude: FloatArray, record: WholeRe
             for k, sign in ((low, -1), (high, 1))
         ]
         order = min(_ORDERS, key=lambda n: abs(n - orders[0]))
-        if amplitude[high] > least and max(abs(n - order) for n in orders) < _AGREE:
+        if amplitude[high] > least[high] and max(abs(n - order) for n in orders) < _AGREE:
             offset = _peak_offset(amplitude, int(low))
             exact = (low + offset) / record.duration + frequency
             ratio = record.rate / exact

@@ -61,13 +61,12 @@ def _votes(runs: Sequence[Run], choice: float) -> int:
 
 def _stands_out(run: Run, choice: float) -> bool | None:
     try:
-        rate, length = run.sample_rate, min(run.length, _LOOK)
-        if rate < 3 * choice or length < rate:
-            return None
-        records = [run.vector(q, 0, length).values for q in ("displacement", "force")]
+        length = min(run.length, _LOOK)
+        records = [run.vector(q, 0, length) for q in ("displacement", "force")]
     except RigDataError:  # the run's own reading says so
         return None
-    return any(_line_in(values, rate, choice) for values in records)
+    usable = [record for record in records if record.rate >= 3 * choice and len(record) >= record.rate]
+    return any(_line_in(record.values, record.rate, choice) for record in usable) if usable else None
 
 
 def _line_in(values: FloatArray, rate: float, choice: float) -> bool:

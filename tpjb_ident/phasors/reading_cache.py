@@ -82,10 +82,12 @@ def with_kept_beginning(run: Run) -> Run:
         return run
     apart: frozenset[str] = getattr(run.reader, "apart", frozenset)()
     names = [name for name, c in run.channels.items() if c.quantity != "time" and name not in apart]
-    return replace(run, reader=_ReadingCache(run.reader, names))
+    cached: Any = _ReadingCache(run.reader, names)
+    return replace(run, reader=cached)
 
 
 def beginning_of(run: Run, samples: int | None = None) -> Run:
     """The first samples of a run whose readings are kept, as a run of its own; by default what the checks look at."""
     looked_at = max(_LOOK, round(SECONDS * run.sample_rate))
-    return replace(run, reader=_Beginning(run.reader, samples or looked_at))
+    beginning: Any = _Beginning(run.reader, samples or looked_at)
+    return replace(run, reader=beginning)

@@ -35,7 +35,7 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     z = result.z[:, :driven, live] / np.maximum(noise[live], np.finfo(float).tiny)
     quantity = np.array([c.quantity for c, is_live in zip(result.channels, live) if is_live])
     good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
-    if len(good) < 2 * _LEAST or len(set(quantity)) < 2:
+    if len(good) < _LEAST or len(set(quantity)) < 2:
         return result
     windows = z[good]
     groups = [windows[:, :, quantity == q].reshape(len(good), -1) for q in ("displacement", "force")]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
@@ -59,6 +60,11 @@ def hann_amplitude(spectrum: ComplexArray) -> FloatArray:
     amplitude = np.zeros(bins.shape)
     amplitude[1:-1] = np.abs(bins[1:-1] - 0.5 * (bins[:-2] + bins[2:]))
     return amplitude
+
+
+def noise_floor(amplitude: FloatArray) -> FloatArray:
+    """Noise around every bin of a spectrum (n_bins,): a filling-up by splines leaves none at high frequencies."""
+    return np.asarray(median_filter(amplitude, size=min(61, max(len(amplitude) // 10, 3)), mode="nearest"))
 
 
 def whole_records(run: Run, result: RunPhasors) -> tuple[WholeRecord, ...]:

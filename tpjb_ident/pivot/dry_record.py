@@ -84,13 +84,13 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
         what = f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}"
         raise _refusal(run, "pad", what, "Correct the manifest")
     angle = float(pad_angles[run.pad - 1])
-    time, load, displacement, good = slow_samples(run, settings.longest_glitch)
+    time, load, displacement, good, rate = slow_samples(run, settings.longest_glitch)
     good &= np.isfinite(time)
     lost = 1.0 - float(np.mean(good)) if len(good) else 1.0
     if len(good) < _FEWEST_SAMPLES or lost > _MOST_LOST:
         what = f"has {len(good)} samples, of which {100 * lost:.0f} % are missing or glitches"
         raise _refusal(run, "record", what, "Repeat the test")
-    pickup = _pickup(run, {"force": load, "displacement": displacement}, good)
+    pickup = _pickup(run, {"force": load, "displacement": displacement}, good, rate)
     order = np.flatnonzero(good)
     if np.any(np.diff(time[order]) <= 0.0):
         # a logger that repeats or shuffles time stamps: order is what averages need
@@ -131,13 +131,13 @@ def axial_channels(run: Run) -> dict[str, Channel]:
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
 
 
-def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray) -> PickupSignature | None:
+def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:
     """Mains line per channel. Two channels per vector: only then the vector holds each of them as it was."""
     channels = axial_channels(run)
     if any(sum(c.quantity == quantity for c in channels.values()) != 2 for quantity in vectors):
         return None
     values = {name: vectors[c.quantity] @ pad_axes(c.axis or 0.0)[0] for name, c in channels.items()}
-    return measure_pickup(values, good, run.sample_rate)
+    return measure_pickup(values, good, rate)
 
 
 def measure_pickup(values: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:

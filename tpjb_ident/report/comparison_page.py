@@ -16,7 +16,7 @@ from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
-from tpjb_ident.report.drawing.series import point_label
+from tpjb_ident.report.drawing.series import DIRECT, point_label
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
@@ -96,41 +96,34 @@ def write_report(
         picture=lead,
         then=then,
         sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
-        settings={name: _setting(value) for name, value in (settings or _own_settings(comparison)).items()},
-        inputs=dict(hashes if inputs is None else inputs),
+        settings=settings or _own_settings(comparison),
+        inputs=hashes if inputs is None else inputs,
     )
     return write_page(folder, page)
 
 
-def _setting(value: Any) -> str:
-    if value is None:
-        return "none"
-    return ", ".join(str(v) for v in value) if isinstance(value, (list, tuple)) else str(value)
-
-
-def _own_settings(comparison: Comparison) -> dict[str, str]:
+def _own_settings(comparison: Comparison) -> dict[str, Any]:
     chosen = comparison.settings
     return {
         "campaign": comparison.campaign.id,
-        "pivot models": ", ".join(v.name for v in comparison.variants),
+        "pivot models": [v.name for v in comparison.variants],
         "thermal": chosen.thermal,
-        "effects": ", ".join(str(e) for e in chosen.effects) or "none",
+        "effects": chosen.effects,
         "estimator": comparison.identification.method,
     }
 
 
 def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
-    names = ("kxx", "kyy", "cxx", "cyy")
     rows = []
     for variant in dict.fromkeys(d.pivots for d in all_deviations):
         by_name = {d.coefficient: d for d in all_deviations if d.pivots == variant}
-        compared = [by_name[name] for name in names]
+        compared = [by_name[name] for name in DIRECT]
         cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in compared]
         inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
         rows.append([VARIANT_LABEL.get(variant, variant), *cells, f"{inside} of {n}"])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
-        ["", *names, "inside"],
+        ["", *DIRECT, "inside"],
         rows,
     )
 
@@ -194,7 +187,6 @@ def _position_sections(comparison: Comparison) -> list[Section]:
 
 #: The picture of the first screen: the coefficient of the loaded direction.
 _LEAD = "kyy-over-"
-_DIRECT = ("kxx", "kyy", "cxx", "cyy")
 #: Loads at which pivot stiffness is tabled [N].
 _PIVOT_LOADS = (2000.0, 4000.0)
 
@@ -203,13 +195,9 @@ def measured_table(result: Identification) -> Table:
     """K and C of every point with intervals."""
     rows = []
     for p in result.points:
-        lo, hi = p.stiffness.interval()
-        omega = p.stiffness.omega
-        cells = [with_interval(p.stiffness.vector[i], lo[i], hi[i], 1e6) for i in range(4)]
-        cells += [with_interval(p.stiffness.vector[i] / omega, lo[i] / omega, hi[i] / omega, 1e3) for i in range(4, 8)]
         share = f"{100 * p.outlier_fraction:.0f} %"
         flags = ", ".join(str(c) for c in p.quality) or "ok"
-        rows.append([point_label(p), *cells, str(p.n_windows), share, flags])
+        rows.append([point_label(p), *p.stiffness.cells(), str(p.n_windows), share, flags])
     named = [f"{kind.symbol}{e}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING) for e in ENTRIES]
     columns = ["point", *named, "windows", "outliers", "flags"]
     return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
@@ -221,15 +209,15 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
     for _, row in ordered.iterrows():
         cells = []
-        for name in _DIRECT:
+        for name in DIRECT:
             column = coefficient_column(name)
             cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
         label = place_of(row["static_load_N"], row["excitation_Hz"])
-        rows.append([label, VARIANT_LABEL.get(row["pivots"], row["pivots"]), *cells, remark or ""])
+        rows.append([label, row["pivots"], *cells, remark or ""])
     columns = ["point", "pivots"]
-    for name in _DIRECT:
+    for name in DIRECT:
         columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]
     columns.append("remark")
     return Table("Predicted", columns, rows, frozenset({0, 1, len(columns) - 1}))
@@ -284,12 +272,13 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
 def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad beside the drawing's."""
     rows, unit = [], size("length")
+    digits = 2 if unit < 1e-5 else 4
     for k, drawing in enumerate(drawn):
         value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]
         rows.append([
             f"#{k + 1}", f"{drawing / unit:.4g}", with_interval(value, value - half, value + half, unit),
-            signed((value - drawing) / unit, 1 if unit < 1e-5 else 3),
-            f"{polygon.clearance_pushed[k] / unit:.4g}",
+            signed((value - drawing) / unit, digits),
+            fixed(polygon.clearance_pushed[k] / unit, digits),
         ])  # fmt: skip
     name = symbol("length")
     under = f"under {amount(polygon.push_load, 'force', '.3g')}, {name}"

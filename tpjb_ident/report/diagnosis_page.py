@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tpjb_ident.compare.effect_words import finding, label_in_words, shown_unit, words_of
+from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, shown_unit, words_of
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
+from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.figure import Panel, panel
@@ -18,14 +20,14 @@ from tpjb_ident.report.panels import coefficient_panels
 from tpjb_ident.report.plots.gap import gap
 from tpjb_ident.report.plots.residual_map import residual_map
 from tpjb_ident.report.plots.residual_series import residual_series
-from tpjb_ident.rounding import signed
+from tpjb_ident.rounding import fixed, signed
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Remainder, Verdict
 
 #: The gaps of a verdict in words; each is another question.
 _GAPS = {
@@ -71,8 +73,8 @@ def write_diagnosis_report(
         then=then,
         key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
         sections=_sections(result, [p for p in coefficients if p is not lead]),
-        settings={k: "none" if v is None else str(v) for k, v in settings.items()},
-        inputs=dict(inputs),
+        settings=settings,
+        inputs=inputs,
     )
     return write_page(folder, page)
 
@@ -85,10 +87,11 @@ def _effects_table(verdict: Verdict) -> Table:
 
 
 def _gap_table(verdict: Verdict) -> Table:
-    gaps = {name: verdict.gap[name] for name in _GAPS if math.isfinite(verdict.gap.get(name, math.nan))}
-    if not verdict.effects:  # nothing was added: before and after are the same
-        gaps = {name: value for name, value in gaps.items() if not name.endswith("after")}
-    rows = [[_GAPS[name], f"{value:.2f}"] for name, value in gaps.items()]
+    rows = [
+        [words, fixed(verdict.gap.get(name, math.nan), 2)]
+        for name, words in _GAPS.items()
+        if verdict.effects or not name.endswith("after")  # where nothing was added, both are the same
+    ]
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
 
 
@@ -109,11 +112,31 @@ def _other_explanations(verdict: Verdict) -> list[Section]:
     for group in verdict.indistinguishable:
         names = " or ".join(in_words(name) for name in group)
         notes.append(f"These data cannot tell apart: {names}.")
-    if not notes and verdict.effects:
-        notes.append("No other effect of the library, alone or in a pair, explains these data as well.")
+    if verdict.effects:
+        notes += _rivals(verdict)
     if verdict.next_test:
         notes.append(f"Next test: {in_words(verdict.next_test)}.")
     return [Section("What else could it be, and the test that tells", notes)] if notes else []
+
+
+def _rivals(verdict: Verdict) -> list[str]:
+    """Fitted explanations that the named one does not leave as far behind as a name asks for, with their sizes."""
+    names = {effect.name for effect in verdict.effects}
+    listed = verdict.candidates
+    named = [c for c in listed if {label.split()[0] for label in c.parameters} - set(TERMS) == names][:1]
+    own = named[0].probability if named else 0.0
+    odds = DiagnoseSettings.included / (1.0 - DiagnoseSettings.included)
+    notes = []
+    for rival in listed:
+        if rival not in named and rival.probability * odds > own:
+            sizes = [_found(label, parameters) for label, parameters in rival.parameters.items()]
+            share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
+            notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
+    return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
+
+
+def _found(label: str, parameters: Mapping[str, Any]) -> str:
+    return finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
 
 
 def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
@@ -127,7 +150,9 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
         [observable(d.observable), place(d.where), f"{d.size_sigma:.2f}", f"{100 * d.share:.1f} %"]
         for d in verdict.disagreement
     ]
-    tried = [[in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}"] for c in verdict.candidates]
+    tried = [
+        [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
+    ]
     sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
     sections.append(
         Section(
@@ -147,7 +172,7 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
     sections += _evidence_sections(verdict)
     if tried:
         text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
-        columns = ["explanation", "log evidence", "held-out gap"]
+        columns = ["explanation", "log evidence", "held-out gap", "probability"]
         sections.append(Section("Explanations that were fitted", [text], tables=[Table("Best first", columns, tried)]))
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))
@@ -171,31 +196,31 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
     """Sections of the report; those for which a diagnosis holds nothing are left out."""
-    out = [Section("What is left", _left_sentences(verdict))]
+    out = [Section("What is left", [_left_sentence(verdict.remainder)])]
     if verdict.assumptions:
         note = (
             "One standard deviation each. They are free within these in every fit and part of every interval; the last "
-            "column is what the fit made of them. That of the model is what the campaign turned out to need."
+            "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
+            "model is what the campaign turned out to need."
         )
-        columns = ["tolerance", "stated", "source", "fitted"]
+        far = [
+            f"The {label_in_words(a.name)} is {abs(a.deviation):.1f} standard deviations from what is stated: check it."
+            for a in verdict.assumptions if abs(a.deviation) > DiagnoseSettings.visible
+        ]  # fmt: skip
+        columns = ["tolerance", "stated", "source", "fitted", "deviations"]
         rows = [_row(a) for a in verdict.assumptions]
         table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
-        out.append(Section("What may be off", [note], tables=[table]))
+        out.append(Section("What may be off", [note, *far], tables=[table]))
     return out
 
 
-def _left_sentences(verdict: Verdict) -> list[str]:
-    """Say what is left on unseen points, what it behaves like, and what drifts."""
-    remainder = verdict.remainder
-    out = [
+def _left_sentence(remainder: Remainder) -> str:
+    """Say what is left on unseen points; what it behaves like, and what drifts, stands with the verdict."""
+    return (
         "On points that no fit has seen, with all that has a tolerance free within it, "
         f"{remainder.sigma:.2f} sigma are left: {100 * remainder.share:.1f} % of the squared gap above noise, most in "
         f"{in_words(remainder.where)}; against noise and stated tolerances p = {remainder.p:.2g}."
-    ]
-    out += [f"The rest behaves like {b.words} (within {100 * b.spread:.0f} %)." for b in verdict.behaves_like]
-    out += [f"{label_in_words(d.effect)}: its {label_in_words(d.parameter)} {d.words}, from {d.start:.3g} to "
-            f"{d.end:.3g}." for d in verdict.drift]  # fmt: skip
-    return out
+    )
 
 
 def _row(one: Assumption) -> list[str]:
@@ -203,4 +228,5 @@ def _row(one: Assumption) -> list[str]:
     values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
     unit, scale = shown_unit(one.unit)
     fitted = ", ".join(signed(v / scale) for v in values)
-    return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}"]
+    far = signed(one.deviation) if one.deviation else ""
+    return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}", far]

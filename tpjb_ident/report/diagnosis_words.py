@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import amount, finding, label_in_words, shown_unit, words_of
-from tpjb_ident.rounding import MINUS, percent
+from tpjb_ident.diagnosis.observations.gap import gap_at
+from tpjb_ident.report.drawing.series import DIRECT
+from tpjb_ident.rounding import MINUS, percent, significant
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -24,7 +26,6 @@ _OBSERVABLES = {
     "dry_compliance": "the dry pivot tests",
     "pad_temperature": "the pad temperatures",
 }
-_DIRECT = ("kxx", "kyy", "cxx", "cyy")
 
 
 def verdict_sentences(
@@ -33,8 +34,8 @@ def verdict_sentences(
     """Say what came out, the answer first."""
     sentences = [_answer(name, verdict, deviations)]
     if deviations and verdict.verdict != "consistent":
-        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in _DIRECT if c in deviations)
-        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in _DIRECT if c in deviations)
+        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
+        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
         with_effects = f"; with it {after}" if verdict.effects else ""
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
@@ -106,9 +107,14 @@ def _largest(deviations: Mapping[str, tuple[float, float]] | None) -> str:
 
 def _remainder_sentences(verdict: Verdict) -> list[str]:
     """What is left and what it behaves like, where a diagnosis says so."""
-    sentences = [f"What is left behaves like {in_words(term.words)}." for term in verdict.behaves_like]
+    sentences = [
+        f"What is left behaves like {in_words(term.words)} (within {100 * term.spread:.0f} %)."
+        for term in verdict.behaves_like
+    ]
     return sentences + [
-        f"The size of {label_in_words(drift.effect)} {in_words(drift.words)}." for drift in verdict.drift
+        f"The {label_in_words(drift.parameter)} of {label_in_words(drift.effect)} {in_words(drift.words)}, from "
+        f"{drift.start:.3g} to {drift.end:.3g}."
+        for drift in verdict.drift
     ]
 
 
@@ -141,12 +147,11 @@ def in_words(text: str) -> str:
 
 def _read(number: re.Match[str]) -> str:
     unit, scale = shown_unit(number[2])
-    return f"{float(number[1]) / scale:.4g} {unit}".replace("-", MINUS)
+    return f"{significant(float(number[1]) / scale)} {unit}".replace("-", MINUS)
 
 
 def _worse(gap: Mapping[str, float]) -> bool:
-    before, after = (next((v for k, v in gap.items() if k.endswith(end)), 0.0) for end in ("_before", "_after"))
-    return after > max(before + 0.3, 1.0)
+    return gap_at(gap, "_after") > max(gap_at(gap, "_before") + 0.3, 1.0)
 
 
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:

@@ -17,6 +17,7 @@ from tpjb_ident.report.drawing.colours import INK, LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures, shrink
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.page import Page, Section, Table, write_page
+from tpjb_ident.rounding import significant
 from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
@@ -40,8 +41,8 @@ def write_difference_report(
         more=more,
         then=then,
         sections=_sections(difference),
-        settings={name: str(value) for name, value in settings.items()},
-        inputs=dict(inputs),
+        settings=settings,
+        inputs=inputs,
     )
     return write_page(folder, page)
 
@@ -67,7 +68,7 @@ def _sections(difference: Difference) -> list[Section]:
         sections.append(Section("Coefficients", tables=tables))
     if not difference.pivots.empty:
         rows = [
-            _row(row, TANGENT, "stiffness", f"{row['force_N'] * per('load'):.3g}")
+            _row(row, TANGENT, "stiffness", significant(row["force_N"] * per("load"), ".3g"))
             for row in difference.pivots.to_dict("records")
         ]
         columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
@@ -86,7 +87,7 @@ def _columns(quantity: str) -> list[str]:
 
 
 def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[str]:
-    values = [f"{row[f'{name}_{side}'] * per(quantity):.4g}" for side in "ab"]
+    values = [significant(row[f"{name}_{side}"] * per(quantity)) for side in "ab"]
     difference = shown_difference(row, name, size(quantity))
     return [f"#{row['pad']:g}", *place, *values, difference, row[f"{name.partition('_')[0]}_changed"]]
 

@@ -25,6 +25,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.rounding import significant
 from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
@@ -212,7 +213,9 @@ def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: 
     xl, yl = printable(axes.get_xlabel()), printable(axes.get_ylabel())
     texts = []
     for k in range(len(x)):
-        spread = f" ± {half[k]:.2g}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
+        spread = (
+            f" ± {significant(half[k], '.2g')}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
+        )
         texts.append(f"{name}{_with_unit(yl, y[k], spread)} at {_with_unit(xl, x[k])}")
     return _HoverPoints(str(line.get_gid()), places, tuple(texts))
 
@@ -221,7 +224,7 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
     """``kxx 66 ± 0.5 MN/m`` of the axis label ``kxx, MN/m``."""
     name, _, unit = label.rpartition(", ")
     name, unit = (name, unit) if name else (unit, "")
-    return f"{name} {value:.4g}{spread} {unit}".strip()
+    return f"{name} {significant(value)}{spread} {unit}".strip()
 
 
 def _with_titles(svg: str, lines: tuple[_HoverPoints, ...]) -> str:

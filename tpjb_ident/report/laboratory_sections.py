@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.problem import RigDataError
-from tpjb_ident.columns import UNITS, amount, degrees, per, spinning, symbol
+from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
@@ -22,7 +22,7 @@ from tpjb_ident.report.plots.coherence_spectrum import coherence_spectrum
 from tpjb_ident.report.plots.frf import frf
 from tpjb_ident.report.plots.orbit import orbit
 from tpjb_ident.report.plots.spectra import spectra
-from tpjb_ident.rounding import fixed, with_interval
+from tpjb_ident.rounding import counted, fixed
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
 if TYPE_CHECKING:
@@ -34,13 +34,6 @@ if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
-#: Calibrated quantities whose unit changes with the system, and those that people read in one unit everywhere.
-_SHOWN = {"displacement": "length", "force": "force", "pressure": "pressure"}
-_SENSITIVITY = {
-    "acceleration": ("m/s²", 1.0),
-    "temperature": ("K", 1.0),
-    "speed": ("rad/s", 1.0),
-}
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip
 _EVIDENCE = "Raw evidence of one run"
@@ -85,13 +78,8 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
     if not solved:
         return None
     p = solved[len(solved) // 2]
-    half, rows = p.stiffness.half_width(), []
-    for i, entry in enumerate(ENTRIES):
-        cells = []
-        for kind, j, omega in ((STIFFNESS, i, 1.0), (DAMPING, 4 + i, p.stiffness.omega)):
-            value = p.stiffness.vector[j]
-            cells.append(with_interval(value, value - half[j], value + half[j], kind.display_scale * omega))
-        rows.append([entry, *cells])
+    cells = p.stiffness.cells()
+    rows = [[entry, cells[i], cells[4 + i]] for i, entry in enumerate(ENTRIES)]
     columns = ["", *(f"{kind.symbol.upper()}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING))]
     caption = (
         f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz, p.point.rotation)}; 95 % intervals"
@@ -108,7 +96,7 @@ def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) ->
         for (name, _), n in sorted(counts.items(), key=lambda c: order.index(c[0][1]))
     ]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
-    head = f"{bad} flags forbid trust" if bad else f"Flags on {points} points, none forbids trust"
+    head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
     return f"{head}: {', '.join(texts)}." if texts else "No flags: nothing about the records calls for caution."
 
 
@@ -131,10 +119,9 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
     """Channels with their calibration."""
     rows = []
     for channel in channels:
-        if channel.quantity not in (*_SENSITIVITY, *_SHOWN):
+        unit, scale = channel_unit(channel.quantity)
+        if not unit:
             continue
-        shown = _SHOWN.get(channel.quantity)
-        unit, scale = UNITS[shown] if shown else _SENSITIVITY[channel.quantity]
         axis = "" if channel.axis is None else f"{math.degrees(channel.axis):g}°"
         place = axis if channel.pad is None else f"pad #{channel.pad}"
         uncertainty = "not stated" if channel.uncertainty is None else f"{100 * channel.uncertainty:.2g} %"
@@ -175,7 +162,8 @@ def _bearing_tables(bearing: Any) -> list[Table]:
         ["pivots", bearing.pivot.kind],
         ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at {degrees(40.0)}, "
                 f"supplied at {degrees(oil.supply_temperature)}"],
-        ["oil, at 40 °C", f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
+        [f"oil, at {degrees(40.0)}",
+         f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
     ]  # fmt: skip
     return [Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))]
 
@@ -259,17 +247,13 @@ def budget_table(result: Identification) -> Table:
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
     for p in result.points:
-        half = p.stiffness.half_width()
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
-        for entry, name in enumerate(ENTRIES):
-            row = [point_label(p), name]
-            for kind, i, factor in ((STIFFNESS, entry, 1.0), (DAMPING, 4 + entry, 1 / p.stiffness.omega)):
-                scale = factor / kind.display_scale
-                value = float(p.stiffness.vector[i])
-                row.append(with_interval(value, value - half[i], value + half[i], 1 / scale))
-                row += [fixed(scale * float(deviations[n][i]), 3) if n in deviations else "–" for n in sources]
-            rows.append(row)
-    columns = ["point", "", *(text for kind in (STIFFNESS, DAMPING)
-                              for text in (f"{kind.symbol}, {kind.display_unit}", *sources))]  # fmt: skip
+        for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
+            kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
+            scale = kind.display_scale * factor
+            digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
+            parts = [fixed(float(deviations[n][i]) / scale, digits) if n in deviations else "–" for n in sources]
+            name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
+            rows.append([point_label(p), name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
-    return Table(caption, columns, rows, frozenset({0, 1}))
+    return Table(caption, ["point", "", "value", *sources], rows, frozenset({0, 1}))

@@ -8,6 +8,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import jinja2
 import markupsafe
@@ -52,7 +53,7 @@ class Page:
     picture: Panel | None = None
     then: str = ""
     sections: Sequence[Section] = ()
-    settings: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     refresh: int = 0
     beside: str = "Figures are beside this file as SVG and PNG, tables as CSV and Parquet."
@@ -139,4 +140,6 @@ def _element(svg: str, panel: Panel) -> markupsafe.Markup:
 
 
 def _printable_cell(value: object) -> object:
-    return readable(value) if isinstance(value, str) and not isinstance(value, markupsafe.Markup) else value
+    if isinstance(value, list | tuple):  # a setting with several values, or with none
+        value = ", ".join(map(str, value)) or None
+    return value if isinstance(value, markupsafe.Markup) else readable("none" if value is None else str(value))

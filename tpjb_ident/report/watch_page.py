@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -12,9 +12,10 @@ from tpjb_ident.columns import amount, per, size, spinning, symbol
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
+from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Page, Section, Table, panels_of, render_page
 from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
-from tpjb_ident.rounding import with_interval
+from tpjb_ident.rounding import significant, with_interval
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located
 
@@ -30,18 +31,26 @@ _KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "cleara
          "baseline": "baseline runs"}  # fmt: skip
 
 
-def write_watch_page(folder: Path, snapshot: Snapshot, refresh: int, settings: Mapping[str, str]) -> Path:
-    """Write ``watch.html``, whole or not at all, with its figures inside."""
+def write_watch_page(
+    folder: Path, snapshot: Snapshot, refresh: int, settings: Mapping[str, str], then: str = "", bearing: Any = None
+) -> Path:
+    """Write ``watch.html``, whole or not at all, with its figures inside; `then` comes after the last run."""
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
+    points, panels = [p for p in snapshot.measured.points if not lacking(p)], _panels(snapshot)
     page = Page(
         title=f"{snapshot.campaign.id}: while it is measured",
         subtitle=f"{landed} of {len(snapshot.states)} runs have landed, {snapshot.count('repeat')} to be repeated, "
         f"{snapshot.count('to run')} to run",
         answer=answer,
         more=more,
+        facts=tested_facts(snapshot.campaign, bearing, points),
         key_table=coverage_table(snapshot),
-        sections=_sections(snapshot),
+        values=values_table(points),
+        flags=flags_line([("", p.quality) for p in points], len(points)) if points else "",
+        picture=panels[0] if panels else None,
+        then="" if snapshot.count("to run", "being written") else then,
+        sections=_sections(snapshot, panels[1:]),
         settings=settings,
         inputs=snapshot.hashes,
         refresh=refresh,
@@ -75,17 +84,16 @@ def _group(status: RunStatus) -> str:
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
-def _sections(snapshot: Snapshot) -> list[Section]:
+def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
     notes = [*snapshot.lacks, *(str(p) for p in snapshot.problems)]
     sections = [Section("What the plan leaves out, and remarks", notes=notes)] if notes else []
     measured = snapshot.measured
     if measured.points or measured.refusals:
         note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
         tables = [_points_table(measured.points)] if measured.points else []
-        panels = _panels(snapshot)
         sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
     if measured.curves:
-        rows = [[f"#{c.pad}", f"{c.valid_to * per('load'):.3g}", _pivot(c)] for c in measured.curves]
+        rows = [[f"#{c.pad}", significant(c.valid_to * per("load"), ".3g"), _pivot(c)] for c in measured.curves]
         table = Table(
             "Tangent stiffness of the pivots at the highest load",
             ["pad", f"load, {symbol('load')}", symbol("stiffness")],
@@ -133,12 +141,8 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
     """K and C of every point so far, with intervals and flags."""
     rows = []
     for p in points:
-        half, omega = p.stiffness.half_width(), p.stiffness.omega
-        k, c = size("stiffness"), size("damping")
-        cells, why = [], lacking(p)
-        for i, scale in ((0, k), (3, k), (4, c * omega), (7, c * omega)):
-            value = p.stiffness.vector[i]
-            cells.append("–" if why else with_interval(value, value - half[i], value + half[i], scale))
+        why, solved = lacking(p), p.stiffness.cells()
+        cells = ["–" if why else solved[i] for i in (0, 3, 4, 7)]
         flags = why or ", ".join(q.sentence() for q in p.quality)
         place = [f"{p.point.static_load * per('load'):.6g}", f"{p.point.excitation_hz:g}", str(p.n_records)]
         rows.append([*place, *cells, flags])

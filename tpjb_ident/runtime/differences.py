@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Kinds of file whose numbers are compared; of others only the bytes are.
 _DOCUMENTS = {".json": json.loads, ".toml": tomllib.loads}
+#: What should be zero and is not, as 1e-19 m or 1e-13 deg, is measured by this.
+_LEAST_SCALE = 1e-6
 #: Of what a document holds, that tells of its making.
 _ASIDE = ("finished", "versions")
 
@@ -67,7 +69,7 @@ def _off(a: object, b: object, width: float) -> float:
         return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
     if a == b or (math.isnan(a) and math.isnan(b)):
         return 0.0
-    scale = max(abs(a), abs(b), width if math.isfinite(width) else 0.0)
+    scale = max(abs(a), abs(b), width if math.isfinite(width) else 0.0, _LEAST_SCALE)
     off = abs(a - b) / scale
     return off if math.isfinite(off) else math.inf
 

@@ -23,13 +23,12 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from multiprocessing.connection import wait as wait_for_end
-from typing import Any, Protocol
+from typing import Any
 
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.threads import limit_threads, one_thread_each
@@ -65,36 +64,27 @@ class Outcome:
         return self.value
 
 
-class Workers(Protocol):
-    """A place where jobs run."""
+class Workers:
+    """A place where jobs run; this one is the process itself, one job after the other."""
 
-    @property
-    def count(self) -> int:
-        """Jobs that run at a time."""
+    count = 1  #: jobs that run at a time
 
     def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
         """Run ``task(*job)`` for every job; yield (index of the job, outcome) as they end, in any order.
 
-        Parameters
-        ----------
-        task : callable
-            Of a module, so that other processes find it.
-        jobs : sequence of tuple
-        shared : object, optional
-            Given to every job as its first argument; a worker unpacks it once, so a task must not change it.
-
-        Raises
-        ------
-        LostJobsError
+        The task is one of a module, so that other processes find it. What is `shared` is every job's first argument; a
+        worker unpacks it once, so a task must not change it.
         """
+        first = () if shared is None else (shared,)
+        for index, job in enumerate(jobs):
+            try:
+                outcome = Outcome(task(*first, *job))
+            except Exception as error:  # whoever asked gets it from the outcome
+                outcome = Outcome(error=error)
+            yield index, outcome
 
 
-def map_ordered(
-    workers: Workers,
-    task: Task,
-    jobs: Sequence[Job],
-    shared: Any = None,
-) -> Iterator[Any]:
+def map_ordered(workers: Workers, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
     """Yield the values of all jobs in their order; raise the error of the first job, in order, that has one."""
     early: dict[int, Outcome] = {}
     due = 0
@@ -105,140 +95,75 @@ def map_ordered(
             due += 1
 
 
-def as_completed(
-    workers: Workers, task: Task, jobs: Sequence[Job], finished: Callable[[int, Any], None], shared: Any = None
-) -> None:
-    """Hand every value to ``finished(index, value)`` as its job ends; nothing is held back to be put in order.
-
-    When all jobs before the first one in order that has an error have ended, that error is raised.
-    """
-    ended = bytearray(len(jobs))
-    errors: dict[int, Outcome] = {}
-    due = 0
-    for index, outcome in workers.outcomes(task, jobs, shared):
-        ended[index] = 1
-        if outcome.error is not None:
-            errors[index] = outcome
-        else:
-            finished(index, outcome.get())
-        while due < len(jobs) and ended[due]:
-            if due in errors:
-                errors[due].get()
-            due += 1
-
-
-class InProcessWorkers:
-    """Every job in this process, one after the other."""
-
-    count = 1
-
-    def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
-        """See `Workers`."""
-        first = () if shared is None else (shared,)
-        for index, job in enumerate(jobs):
-            try:
-                outcome = Outcome(task(*first, *job))
-            except Exception as error:  # whoever asked gets it from the outcome
-                outcome = Outcome(error=error)
-            yield index, outcome
-
-
-class PoolWorkers:
+class PoolWorkers(Workers):
     """Jobs spread by any `concurrent.futures.Executor`; one that breaks is replaced and its jobs are run again."""
 
-    def __init__(self, opened: Callable[[], Executor], count: int, alive: Callable[[], bool] | None = None) -> None:
+    def __init__(self, opened: Callable[[], Executor], count: int, alive: Callable[[], bool] = lambda: True) -> None:
         self._opened, self.count, self._alive = opened, count, alive
         self._executor: Executor | None = None
 
-    def begin(self) -> None:
-        """Open the executor now: copies of a process are best made before it has threads, as a bar's."""
+    def submit(self, *call: Any) -> Future[Any]:
+        """Hand a call to the executor, which is opened for the first one."""
         if self._executor is None:
             self._executor = self._opened()
-            self._executor.submit(int).result()
+        return self._executor.submit(*call)
 
     def close(self, wait: bool = True, at_once: bool = False) -> None:
         """End the executor; with it the jobs that have not begun, and `at_once` those that have."""
-        if self._executor is not None:
-            if isinstance(self._executor, ProcessPoolExecutor):
-                processes = dict(self._executor._processes or {}) if at_once else {}
-                for process in processes.values():
-                    process.terminate()
-                self._executor.shutdown(wait=wait, cancel_futures=True)
-            else:  # others need not know that argument
-                self._executor.shutdown(wait=wait)
-        self._executor = None
+        executor, self._executor = self._executor, None
+        if isinstance(executor, ProcessPoolExecutor):
+            for process in list((executor._processes or {}).values()) if at_once else ():
+                process.terminate()
+            executor.shutdown(wait=wait, cancel_futures=True)
+        elif executor is not None and self._alive():  # others need not know that argument
+            executor.shutdown(wait=wait)
 
     def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
-        """See `Workers`."""
+        """See `Workers`; raises `LostJobsError`."""
         packed = None if shared is None else pickle.dumps(shared, protocol=5)
-        waiting = collections.deque(enumerate(jobs))
-        flying: dict[Future[Outcome], tuple[int, Job]] = {}
+        waiting = collections.deque(range(len(jobs)))
+        flying: dict[Future[Outcome], int] = {}
         losses = 0
         try:
             while waiting or flying:
-                lost, cause = self._launch(task, packed, waiting, flying)
-                done = self._ended(flying) if cause is None else set()
-                for future in done:
-                    entry = flying.pop(future)
-                    try:
+                try:
+                    while waiting and len(flying) < _AHEAD * self.count:
+                        flying[self.submit(_attempt, task, packed, jobs[waiting[0]])] = waiting[0]
+                        waiting.popleft()
+                    for future in self._ended(flying):
                         outcome = future.result()
-                    except Exception as error:  # every executor has its own way to say that a worker is gone
-                        lost.append(entry)
-                        cause = error
-                    else:
                         losses = 0
-                        yield entry[0], outcome
-                if cause is not None:
+                        yield flying.pop(future), outcome
+                except LostJobsError:
+                    raise
+                except Exception as error:  # every executor has its own way to say that a worker is gone
                     losses += 1
-                    self._recover(cause, losses, lost, flying)
-                    waiting.extendleft(sorted(lost, reverse=True, key=lambda entry: entry[0]))
+                    self._recover(error, losses, waiting, flying)
         finally:
-            for future in flying:
-                future.cancel()
+            if flying and self._alive():
+                for future in flying:
+                    future.cancel()
 
-    def _ended(self, flying: dict[Future[Outcome], tuple[int, Job]]) -> set[Future[Outcome]]:
+    def _ended(self, flying: Iterable[Future[Outcome]]) -> set[Future[Outcome]]:
         """Wait until a job ends."""
-        while True:
-            done = wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done
-            if done:
-                return done
-            if self._alive is not None and not self._alive():
+        while not (done := wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done):
+            if not self._alive():
                 raise LostJobsError(f"all workers are gone, and none came back within {_STALLED:g} s. Start some again")
-
-    def _launch(
-        self,
-        task: Task,
-        packed: bytes | None,
-        waiting: collections.deque[tuple[int, Job]],
-        flying: dict[Future[Outcome], tuple[int, Job]],
-    ) -> tuple[list[tuple[int, Job]], Exception | None]:
-        """Hand out jobs until every worker has enough; tell what was lost on the way, and why."""
-        while waiting and len(flying) < _AHEAD * self.count:
-            entry = waiting.popleft()
-            try:
-                if self._executor is None:
-                    self._executor = self._opened()
-                flying[self._executor.submit(_attempt, task, packed, entry[1])] = entry
-            except Exception as error:  # broken since the last look, or closed
-                return [entry], error
-        return [], None
+        return done
 
     def _recover(
-        self,
-        cause: Exception,
-        losses: int,
-        lost: list[tuple[int, Job]],
-        flying: dict[Future[Outcome], tuple[int, Job]],
+        self, cause: Exception, losses: int, waiting: collections.deque[int], flying: dict[Future[Outcome], int]
     ) -> None:
-        """Prepare another attempt: a broken pool takes all its jobs with it."""
+        """Have lost jobs wait for another attempt: a broken pool takes all its jobs with it."""
         if losses >= _MAX_LOSSES:
             raise LostJobsError(
                 f"workers were lost {losses} times in a row, last with {type(cause).__name__}: {cause}. "
                 "Is memory short? Use fewer workers, or look at the workers' own messages"
             ) from cause
-        if isinstance(cause, BrokenExecutor):
-            lost += flying.values()
-            flying.clear()
+        broken = isinstance(cause, BrokenExecutor)
+        lost = [future for future in flying if broken or future.cancelled() or (future.done() and future.exception())]
+        waiting.extendleft(sorted((flying.pop(future) for future in lost), reverse=True))
+        if broken:
             self.close(wait=False)
 
 
@@ -282,11 +207,11 @@ def _begin_worker() -> None:
     limit_threads()
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(sentinel: Any) -> None:
-    wait_for_end([sentinel])
+def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
+    parent.join()
     os._exit(1)  # nobody is left to hear of it
 
 
@@ -305,16 +230,19 @@ def cores() -> int:
 def local_workers(count: int, start: str | None = None, preload: Sequence[str] = ()) -> Iterator[Workers]:
     """Open processes on this machine; one alone is this process itself."""
     if count <= 1:
-        yield InProcessWorkers()
+        yield Workers()
         return
-    known = multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context(start or ("forkserver" if "forkserver" in known else "spawn"))
-    if context.get_start_method() == "forkserver":
+    methods = multiprocessing.get_all_start_methods()
+    method = start or ("forkserver" if "forkserver" in methods else "spawn")
+    context: Any = multiprocessing.get_context(method)
+    if method == "forkserver":
         context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
         _start_forkserver()
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
-    with one_thread_each(), _shared_memory(context.get_start_method() == "fork"):
+    with one_thread_each(), _shared_memory(method == "fork"):
         try:
+            if method == "fork":  # copies of a process are best made before it has threads, as a bar's
+                pool.submit(int).result()
             yield pool
         except BaseException:  # nobody waits for what its workers are still at
             pool.close(at_once=True)

@@ -33,12 +33,12 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
         staging = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
     except OSError as error:
         raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
-    lock = hold(staging)
-    _clear_abandoned(target)
     try:
-        yield staging
-        staging.chmod(0o755)
-        _bring(staging, target, command)
+        with locked(staging):
+            _clear_abandoned(target)
+            yield staging
+            staging.chmod(0o755)
+            _bring(staging, target, command)
     except OSError as error:
         if error.errno is None or error.errno not in _FULL:
             raise
@@ -47,7 +47,6 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
             f"--out {out}: {why}; nothing was written. Make room on the disk or give a folder on another one."
         ) from error
     finally:
-        _release(lock)
         if staging.exists():
             shutil.rmtree(staging)
 
@@ -66,8 +65,8 @@ def _bring(staging: Path, target: Path, command: str) -> None:
 
 def _clear_abandoned(target: Path) -> None:
     """Delete what killed runs into the same folder have left beside it."""
-    for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*"):
-        if _is_abandoned(abandoned):
+    for abandoned in target.parent.glob(f".{glob.escape(target.name)}.part-*") if fcntl is not None else ():
+        with contextlib.suppress(OSError), locked(abandoned, wait=False):  # held by a run that is alive, or gone by now
             shutil.rmtree(abandoned, ignore_errors=True)  # whoever else clears it at the same time may be quicker
 
 
@@ -205,47 +204,18 @@ except ImportError:  # Windows: no advisory locks on folders; two runs into one 
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of `folder` while the block runs; wait for whoever has it."""
-    handle = _open(folder, wait=True)
-    try:
+def locked(folder: Path, wait: bool = True) -> Iterator[None]:
+    """Hold the lock of `folder` while the block runs; wait for whoever has it, or raise OSError."""
+    if fcntl is None:
         yield
-    finally:
-        _release(handle)
-
-
-def hold(folder: Path) -> int | None:
-    """Take the lock of a folder that nobody else knows yet; give it to `_release`."""
-    return _open(folder, wait=False)
-
-
-def _release(handle: int | None) -> None:
-    """Drop a lock."""
-    if handle is not None:
-        os.close(handle)
-
-
-def _is_abandoned(folder: Path) -> bool:
-    """Whether the process that held the lock of `folder` is gone; False where that cannot be told."""
-    if fcntl is None:
-        return False
-    try:
-        handle = _open(folder, wait=False)
-    except OSError:  # held, or gone by now
-        return False
-    _release(handle)
-    return True
-
-
-def _open(folder: Path, wait: bool) -> int | None:
-    if fcntl is None:
-        return None
+        return
     handle = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BaseException as error:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except OSError:
+            if not wait:
+                raise  # else: a file system without locks, as some network shares
+        yield
+    finally:
         os.close(handle)
-        if isinstance(error, OSError) and wait:  # a file system without locks, as some network shares
-            return None
-        raise
-    return handle

@@ -98,22 +98,24 @@ def _header(
 ) -> _Header:
     """What each column is by the schema, by its name in SI."""
     place = f"{path.name}, line {line}"
-    si = [_in_si(name.strip()) for name in names]
-    for index, (name, _) in enumerate(si):
+    sizes: dict[str, float] = {}
+    for number, name in enumerate(names, start=1):
+        name, size = _in_si(name.strip())
         if not name:
-            raise BadInputError(f"{place}: column {index + 1} has no name. Delete the delimiter, or name the column.")
-        if any(name == before for before, _ in si[:index]):
+            raise BadInputError(f"{place}: column {number} has no name. Delete the delimiter, or name the column.")
+        if name in sizes:
             raise BadInputError(f"{place}: column {name!r} is there twice. Delete one of them.")
-    known_names = [name for name, _ in si]
+        sizes[name] = size
     for name in needed:
-        if name not in known_names:
-            near = nearest_name(name, known_names)
+        if name not in sizes:
+            near = nearest_name(name, list(sizes))
             hint = f"; {near!r} is not it" if near else ""
             raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
-    header = [(name, *column_of(name, path.stem), size) for name, size in si]
+    header = [(name, *column_of(name, path.stem), size) for name, size in sizes.items()]
     for name, known, _, _ in header:
         if known is None and misspelt is not None and misspelt.fullmatch(name):
-            near = nearest_name(name, _coefficient_names())
+            coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
+            near = nearest_name(name, coefficients)
             raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}?")
     return header
 
@@ -125,12 +127,6 @@ def _in_si(name: str) -> tuple[str, float]:
         return name, 1.0
     unit, size = _US[match[2]]
     return match[1] + unit + match[3], size
-
-
-@functools.cache
-def _coefficient_names() -> tuple[str, ...]:
-    """Names of K and C with their endings."""
-    return tuple(name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi"))
 
 
 @functools.lru_cache(maxsize=4096)

@@ -21,7 +21,7 @@ _SIGNS = {"um": "µm", "degC": "°C", "m/s^2": "m/s²"}
 _UNIT = re.compile(r"(?:(?<=\d )|(?<=nan )|\A)(um|degC|m/s\^2)(?![\w/^'\"])")
 
 
-def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomic(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then put it in place in one step."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
     os.close(handle)
@@ -48,10 +48,15 @@ def _write_utf8(path: Path, text: str) -> None:
 def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:
     """Write ``name.csv`` and ``name.parquet``."""
     csv, parquet = folder / f"{name}.csv", folder / f"{name}.parquet"
-    safe = safe_for_spreadsheets(frame)
-    write_atomic(csv, lambda path: safe.to_csv(path, index=False, encoding="utf-8", lineterminator="\n"))
+    write_csv(csv, frame)
     write_atomic(parquet, lambda path: write_parquet(path, frame))
     return csv, parquet
+
+
+def write_csv(path: Path, frame: pd.DataFrame) -> None:
+    """Write a CSV file that no spreadsheet takes for formulas, whole or not at all."""
+    safe = safe_for_spreadsheets(frame)
+    write_atomic(path, lambda part: safe.to_csv(part, index=False, lineterminator="\n"))
 
 
 def write_parquet(path: Path, frame: pd.DataFrame, **metadata: str) -> None:

@@ -6,7 +6,7 @@ import ctypes
 import functools
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -46,28 +46,18 @@ def limit_threads(count: int = 1) -> None:
 
 
 @contextmanager
-def limited_threads(count: int = 1) -> Iterator[None]:
-    """Do the same for a while."""
-    before = [asked() for asked, _ in _loaded()]
-    limit_threads(count)
-    try:
-        yield
-    finally:
-        for (_, limit), number in zip(_loaded(), before, strict=True):
-            limit(number)
-
-
-@contextmanager
 def one_thread_each() -> Iterator[None]:
     """Processes share the cores already: linear algebra with threads of its own would only be in the way, here too."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    numbers = [asked() for asked, _ in _loaded()]
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    limit_threads()
     try:
-        with limited_threads():
-            yield
+        yield
     finally:
+        for (_, limit), number in zip(_loaded(), numbers, strict=True):
+            limit(number)
         for name, value in before.items():
-            with suppress(KeyError):
-                del os.environ[name]
+            os.environ.pop(name, None)
             if value is not None:
                 os.environ[name] = value

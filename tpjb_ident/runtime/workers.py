@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from tpjb_ident.errors import TpjbError
@@ -12,22 +12,13 @@ from tpjb_ident.runtime.executors import PoolWorkers, Workers, cores, local_work
 from tpjb_ident.runtime.provenance import versions
 
 
-@contextmanager
 def open_workers(
-    count: int | None = None,
-    scheduler: str | None = None,
-    preload: Sequence[str] = (),
-    start: str | None = None,
-) -> Iterator[Workers]:
+    count: int | None = None, scheduler: str | None = None, preload: Sequence[str] = (), start: str | None = None
+) -> AbstractContextManager[Workers]:
     """Open the workers that were asked for."""
-    if scheduler is None:
-        with local_workers(cores() if count is None else count, start, preload) as workers:
-            if start == "fork" and isinstance(workers, PoolWorkers):
-                workers.begin()
-            yield workers
-        return
-    with dask_workers(scheduler) as workers:
-        yield workers
+    if scheduler is not None:
+        return dask_workers(scheduler)
+    return local_workers(cores() if count is None else count, start, preload)
 
 
 #: Seconds to wait for the scheduler, and for its first worker.
@@ -60,7 +51,8 @@ def dask_workers(address: str, patience: float = _PATIENCE) -> Iterator[Workers]
         count = _checked(client, address, patience)
         # pure: a job is known by a hash of all that it is given, which took longer here than the job did there
         opened = functools.partial(client.get_executor, pure=False)
-        pool = PoolWorkers(opened, count, alive=lambda: bool(client.scheduler_info()["workers"]))
+        # without a scheduler nobody knows of workers
+        pool = PoolWorkers(opened, count, lambda: bool(client.scheduler_info().get("workers")))
         try:
             yield pool
         finally:

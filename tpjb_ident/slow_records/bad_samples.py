@@ -19,7 +19,6 @@ from rigdata.problem import Problem, RigDataError
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
-    from rigdata.record import VectorRecord
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
 _SMALLEST = 1e-4  # of the range: in a computed record without noise rounding is no glitch
@@ -32,24 +31,16 @@ _NOISE_FREE = (
 )
 
 
-def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, float]:
     """Both vectors of a slow record at the times of the slower one, and which samples are good.
 
-    Gives time (n,) and force, displacement (n, 2) and good (n,).
+    Gives time (n,) and force, displacement (n, 2), good (n,) and the rate [Hz].
     """
     refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
-    time = force.time if len(force) < len(displacement) else displacement.time
-    load, place = _at_times(force, time), _at_times(displacement, time)
-    return time, load, place, good_samples(np.hstack([load, place]), longest)
-
-
-def _at_times(vector: VectorRecord, time: FloatArray) -> FloatArray:
-    """Values (n, 2) of a vector at times (n,) [s]: between its own samples where another device took those."""
-    if vector.time is time or (len(vector) == len(time) and np.array_equal(vector.time, time)):
-        return vector.values
-    columns = [np.interp(time, vector.time, column, np.nan, np.nan) for column in vector.values.T]
-    return np.stack(columns, axis=1)
+    slower = force if len(force) < len(displacement) else displacement
+    load, place = force.at(slower.time), displacement.at(slower.time)
+    return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
 
 
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:

@@ -9,6 +9,9 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
 
+#: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
+_NO_GAIN = 0.3
+
 
 class Gain(Factor):
     """Logarithm of a sensor's gain; two probes and two cells tell nothing of it, a third probe the differences."""
@@ -41,17 +44,21 @@ class Gain(Factor):
         outliers = {self.rig.sensors[self._places[k][0]].quantity for k in beyond(fitted, self.parameters)}
         table = {}
         for quantity in outliers:
-            values = [v for (j, _), v in zip(self._places, fitted.value) if self.rig.sensors[j].quantity == quantity]
+            values = self._values(fitted, quantity)
             table[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
         return table
+
+    def _values(self, fitted: Fitted, quantity: str) -> list[float]:
+        return [float(v) for (j, _), v in zip(self._places, fitted.value) if self.rig.sensors[j].quantity == quantity]
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Sensors that differ from the others beyond what is stated."""
         outliers = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
         if not outliers:
-            return ()
+            return self.rig.apart
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
-        return (Condition("probe-gains-differ", text),)
+        apart = max(np.ptp(self._values(fitted, quantity)) for quantity in self.spread(fitted))
+        return (Condition("records-contradicted" if apart > _NO_GAIN else "probe-gains-differ", text),)
 
     def words(self, fitted: Fitted) -> tuple[str, ...]:
         """Gains that the records tell."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.blocks import Blocks, Rig, vector
 from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.term import Fitted, Parameter, Term
 
@@ -30,6 +30,8 @@ _CLEAR = 5.0
 _LOSS = 0.04
 #: No housing stands on springs as stiff as this [nm/N]: a steel bar of 1 m^2 and 2 m has it.
 _STIFFEST = 0.01
+#: Ratio of the springs along X and Y that no rig has: a sensitivity is ten times off.
+_ALIKE = 1 / 6
 #: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05.
 _UNEXPLAINED = 0.2
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
@@ -63,12 +65,19 @@ class Housing(Term):
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Compliance or kappa of the state."""
         if self.rig.mount == "cells":
-            xx, yy, xy, loss = (float(v) for v in value)
-            state.compliance = np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
+            state.compliance = _compliance(value)
         elif self.rig.mount == "unknown":
             state.floating = complex(value[0])
         else:
             state.floating = complex(1 + value[0], -value[1])
+
+    def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
+        """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
+        square = (blocks.omega**2)[:, None]
+        if self.rig.mount == "cells":
+            return np.asarray(-square * vector(self.rig, blocks, "force") @ _compliance(fitted.value))
+        follows = complex(1 + fitted.value[0], -fitted.value[1])
+        return np.asarray(follows * square * vector(self.rig, blocks, "displacement"))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows."""
@@ -117,6 +126,10 @@ class Housing(Term):
             grave = max(self._inertia, missing) > HARMLESS
             name = "accelerometers-contradict-cells" if grave else "accelerometers-doubtful"
             return (Condition(name, text),)
+        weak, strong = sorted((abs(xx), abs(yy)))
+        if weak + _CLEAR * max(error[:2]) < _ALIKE * strong:
+            text = f"they differ {strong / weak:.0f} times per force: one sensitivity may be off; {share}"
+            return (Condition("accelerometers-doubtful", text),)
         return _out_of_step(loss, error[3], "cells", self._omega)
 
     def lag_of_cells(self, fitted: Fitted) -> float:
@@ -135,6 +148,12 @@ class Housing(Term):
             for k, p in enumerate(self.parameters)
             if fitted.estimated[k]
         )
+
+
+def _compliance(value: FloatArray) -> ComplexArray:
+    """Of the cells, (2, 2) [m/N]."""
+    xx, yy, xy, loss = (float(v) for v in value)
+    return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
 
 
 def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tuple[Condition, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigdata.problem import RigDataError
 from rigdata.survey.spectrum import amplitude_spectrum, strongest
+from tpjb_ident.columns import amount, channel_unit, per, symbol
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
@@ -25,14 +26,6 @@ _HARMONICS = 2
 _STRETCHES, _MOST_LINES = 12, 2048
 _INK, _BLUE, _RED = "#1c2024", "#0072b2", "#d55e01"
 _COLOURS = (_INK, _BLUE, "#d98c00", "#009e73", _RED, "#b9609a", "#7a828b")
-_UNITS = {
-    "displacement": ("µm", 1e6),
-    "force": ("N", 1.0),
-    "acceleration": ("m/s²", 1.0),
-    "temperature": ("K", 1.0),
-    "pressure": ("Pa", 1.0),
-    "speed": ("rad/s", 1.0),
-}
 
 
 def records_tab(campaign: Campaign) -> Any:
@@ -58,7 +51,8 @@ def records_tab(campaign: Campaign) -> Any:
         plot.add_layout(plot.legend[0], "below")  # covers nothing
         plot.legend.orientation = "horizontal"
     fall = _waterfall_plot(data["waterfall"])
-    orbit = _new_plot("shaft in the housing", "x, µm", "y, µm", match_aspect=True, height=420, name="orbit-plot")
+    x, y = (f"{axis}, {symbol('length')}" for axis in "xy")
+    orbit = _new_plot("shaft in the housing", x, y, match_aspect=True, height=420, name="orbit-plot")
     orbit.line("x", "y", source=data["orbit"], color=_BLUE, line_width=0.7, legend_label="as measured")
     orbit.line("x", "y", source=data["without"], color=_RED, line_width=0.7, legend_label="without running speed")
     orbit.add_layout(orbit.legend[0], "below")  # covers nothing
@@ -67,7 +61,8 @@ def records_tab(campaign: Campaign) -> Any:
     def update() -> None:
         run = runs[pick.value]
         p = run.point
-        text = f"{run.kind}, {p.static_load / 1e3:g} kN at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
+        load = amount(p.static_load, "load")
+        text = f"{run.kind}, {load} at {p.static_load_direction_deg:g} deg, {p.shaft_speed_hz:g} Hz"
         text += f", excitation {p.excitation_hz:g} Hz" if p.excitation else ""
         try:
             records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
@@ -96,12 +91,12 @@ def records_tab(campaign: Campaign) -> Any:
 def _show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
     """Draw channels of one quantity over time and frequency; what is to be said of them."""
     first = records[0]
-    unit, scale = _UNITS.get(first.quantity, ("", 1.0))
+    unit, scale = channel_unit(first.quantity)
     drawn = [r for r in records if r.quantity == first.quantity][: len(_COLOURS) - 1]
     label = first.name if len(drawn) == 1 else first.quantity
     plots[0].yaxis.axis_label, plots[1].yaxis.axis_label = f"{label}, {unit}", f"amplitude, {unit}"
-    paths = [_thinned(r.time, scale * r.values) for r in drawn]
-    spectra = [amplitude_spectrum(scale * r.values, r.rate) for r in drawn]
+    paths = [_thinned(r.time, r.values / scale) for r in drawn]
+    spectra = [amplitude_spectrum(r.values / scale, r.rate) for r in drawn]
     look = {"colour": _COLOURS[: len(drawn)], "name": [r.name for r in drawn]}
     data["time"].data = {"x": [x for x, _ in paths], "y": [y for _, y in paths], **look}
     data["spectrum"].data = {
@@ -144,12 +139,12 @@ def waterfall(record: Record) -> dict[str, Any]:
 
 
 def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Path of the shaft about its mean [µm], as measured and without what turns with the shaft (unbalance, runout)."""
+    """Path of the shaft about its mean, as measured and without what turns with the shaft (unbalance, runout)."""
     try:
         record = run.vector("displacement")
     except RigDataError:  # a run whose probes cannot be turned into X and Y has no orbit; its channels still show
         return {"x": [], "y": []}, {"x": [], "y": []}
-    path = 1e6 * (record.values - np.nanmean(record.values, axis=0))
+    path = per("length") * (record.values - np.nanmean(record.values, axis=0))
     good = np.isfinite(path).all(axis=1)
     omega, without_synchronous = run.point.shaft_speed, np.full((0, 2), np.nan)
     if omega > 0 and good.sum() > 2 * _HARMONICS + 1:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.columns import amount, per, size, symbol
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import measured_table
@@ -103,7 +104,7 @@ def _label(p: PointResult) -> str:
     """Name of a point that no other point has."""
     point = p.point
     return (
-        f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg, {point.speed_words}, "
+        f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg, {point.speed_words}, "
         f"excitation {point.excitation_hz:g} Hz"
     )
 
@@ -129,37 +130,36 @@ def model_tab(session: Session) -> Any:
 
     identification = session.identification
     assert identification is not None
-    loads = sorted({p.point.static_load / 1e3 for p in identification.points})
-    load = Slider(title="static load, kN", start=round(0.8 * loads[0], 2), end=round(1.15 * loads[-1], 2), step=0.05,
-                  value=loads[0], name="load", width=320)  # fmt: skip
+    loads = sorted({p.point.static_load * per("load") for p in identification.points})
+    step = 0.05 if size("load") > 100.0 else 10.0
+    load = Slider(title=f"static load, {symbol('load')}", start=step * round(0.8 * loads[0] / step), value=loads[0],
+                  end=step * round(1.15 * loads[-1] / step), step=step, name="load", width=320)  # fmt: skip
     curves = _text("curves")
     html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session))
 
     def update() -> None:
-        curves.text = html(round(load.value, 6))
+        curves.text = html(round(load.value * size("load"), 3))
 
     load.on_change("value_throttled", lambda attr, old, new: update())  # when a moving slider is let go
     update()
     return column(load, curves, _text("residuals", _residuals_html(session)), sizing_mode="stretch_width")
 
 
-def _curves_html(session: Session, kilonewtons: float) -> str:
+def _curves_html(session: Session, load: float) -> str:
     """Direct coefficients over excitation at one load, with every pivot model."""
     assert session.identification is not None
     first = session.identification.points[0].point
     measured = session.identification.to_frame()
-    measured = measured[(measured["static_load_N"] / (1e3 * kilonewtons) - 1.0).abs() < _NEAR]
-    measured = measured.assign(static_load_N=1e3 * kilonewtons)
+    measured = measured[(measured["static_load_N"] / load - 1.0).abs() < _NEAR]
+    measured = measured.assign(static_load_N=load)
     frequencies = sorted({*_LINES, *measured["excitation_Hz"]})
-    points = [
-        replace(first, static_load=1e3 * kilonewtons, excitation=2 * np.pi * frequency) for frequency in frequencies
-    ]
+    points = [replace(first, static_load=load, excitation=2 * np.pi * frequency) for frequency in frequencies]
     table = _compared(session, points, measured)
     panels = []
     for name in DIRECT:
         figure = coefficient(table, name, over="frequency")
-        panels.append(panel(f"model-{name}", f"{name} over excitation at {kilonewtons:g} kN", figure, ""))
-    note = f"{len(measured)} measured point{'' if len(measured) == 1 else 's'} at this load."
+        panels.append(panel(f"model-{name}", f"{name} over excitation at {amount(load, 'load')}", figure, ""))
+    note = f"{counted(len(measured), 'measured point')} at this load."
     return render_section(Section("Prediction and measurement", [note], panels))
 
 

@@ -138,7 +138,10 @@ def build(document: Any, session: Session) -> None:
         panels.append(TabPanel(child=records_tab(session.campaign), title="records"))
     if session.tables:
         panels.append(TabPanel(child=_tables_tab(session.tables), title="tables"))
-    tabs = Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width")
+    narrow = (
+        ":host(.bk-above) { grid-template-columns: minmax(0, 1fr); }"  # else as wide as the widest tab, on a phone too
+    )
+    tabs = Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width", stylesheets=[narrow])
     head = Div(text=f"<h1 style='font-size:1.3rem;margin:.3rem 0'>{html.escape(printable(session.name))}</h1>")
     document.add_root(column(head, tabs, sizing_mode="stretch_width"))
     if session.identify is not None:

@@ -121,11 +121,11 @@ def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
     if not candidates:
         return None
     trial = run_in_file(candidates[0], path, file, path.stem)
-    force, rate = trial.vector("force").values, trial.sample_rate
-    force = force[np.isfinite(force).all(axis=1)]
+    record = trial.vector("force")
+    force = record.values[np.isfinite(record.values).all(axis=1)]
     if len(force) < 16:
         return None
-    fitting = [run for run in candidates if _fits(run, force, rate)]
+    fitting = [run for run in candidates if _fits(run, force, record.rate)]
     tests = {(run.kind, run.point, run.excitation_direction) for run in fitting}
     return fitting[0] if len(tests) == 1 else None
 

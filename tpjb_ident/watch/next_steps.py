@@ -14,6 +14,7 @@ from rigdata.problem import Problem
 from rigdata.run import Run
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.columns import amount, place_of
 from tpjb_ident.dynamic.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
@@ -164,7 +165,7 @@ def _set_up(run: Run) -> tuple[float, float, float]:
 
 
 def _load(point: OperatingPoint) -> str:
-    return f"{point.static_load / 1e3:g} kN at {point.static_load_direction_deg:g} deg"
+    return f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg"
 
 
 def described(run: Run) -> str:
@@ -259,7 +260,7 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
         widest, name, random_alone = _widest(point)
         if not widest > within:
             continue
-        place = f"{point.point.static_load / 1e3:g} kN, {point.point.excitation_hz:g} Hz"
+        place = place_of(point.point.static_load, point.point.excitation_hz)
         share = f"{name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
         random_allowed = within**2 - max(0.0, widest**2 - random_alone**2)
         if random_allowed <= 0.25 * within**2:
@@ -308,7 +309,7 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
             directions_of.setdefault(run.point, set()).add(run.excitation_direction)
     lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
-        first = ", ".join(f"{p.static_load / 1e3:g} kN {p.excitation_hz:g} Hz" for p in lonely[:3])
+        first = "; ".join(place_of(p.static_load, p.excitation_hz) for p in lonely[:3])
         lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]

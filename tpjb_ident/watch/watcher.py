@@ -170,7 +170,7 @@ class Watcher:
     ) -> Snapshot:
         landed = tuple(run for run in runs if run.id in self._observed)
         records = [self._observed[run.id] for run in landed]
-        observations = judged(replace(campaign, runs=landed), [record.observation for record in records])
+        observations, _ = judged(replace(campaign, runs=landed), [record.observation for record in records])
         _name_cut_records(observations, [record.seconds for record in records])
         when = {run.id: record.landed for run, record in zip(landed, records, strict=True)}
         planned = frozenset(run.id for run in campaign.runs)

@@ -13,8 +13,6 @@ from rigdata.arrays import FloatArray
 #: `Case.thermal`: films as cold as their inlets, each for itself, all with pads, journal and grooves, and the same
 #: with temperatures across the films, which a step in Python finds.
 ISOTHERMAL, ALONE, COUPLED, ACROSS = range(4)
-#: `Case.rupture`
-MASS_CONSERVING, TURBULENT = range(2)
 
 
 class Case(NamedTuple):
@@ -25,7 +23,7 @@ class Case(NamedTuple):
     hold: HoldNumbers
     accuracy: float
     thermal: int
-    rupture: int | None  #: None: Swift and Stieber's laminar film.
+    rupture: int | None  #: One of `model.film.models.FILM_MODELS`.
     supply: float  #: Temperature of fresh oil [degC].
     kept: float  #: Share of the dissipation that stays in the films; in `running.heat` where films are alone.
     mixing: float  #: lambda

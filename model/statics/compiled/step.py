@@ -7,13 +7,11 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
-from model.film.reynolds import FilmForces, solve_film
-from model.film.turbulence import solve_turbulent_film
 from model.statics.compiled.bending import BodyStack, Shapes, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, TURBULENT, Case, along, rigid_approach
+from model.statics.compiled.case import ACROSS, Case, along, rigid_approach
 from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.heat import rest_films
@@ -22,24 +20,6 @@ from model.statics.compiled.place import let_idle, rescue
 from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadStack, PadState, grid_of, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
-
-
-@inner
-def _film(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    case: Case,
-    sharp: bool,
-    rupture: int | None,
-    supplied: float,
-) -> FilmForces:
-    """Pressure of one film; what is None when a search is compiled leaves the other films out of it."""
-    if rupture is None:
-        return solve_film(grid, work, wedge, case.running.speed, sharp)
-    if rupture == TURBULENT:
-        return solve_turbulent_film(grid, work, wedge, case.running.speed, sharp)
-    return solve_film_jfo(grid, work, wedge, case.running.speed, sharp, (1.0, supplied))
 
 
 @inner
@@ -58,7 +38,8 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
                 set_viscosity(work, case.running.oil)
             a = rigid_approach(pads, state, m) - state.deflection[m]
             b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
-            found = _film(grid, work, (pads.clearance[m], a, b), case, sharp, case.rupture, state.supplied[m])
+            wedge, speed = (pads.clearance[m], a, b), case.running.speed
+            found = solve_by(case.rupture, grid, work, wedge, speed, sharp, state.supplied[m])
             state.wedge[m, 0], state.wedge[m, 1], state.solved[m] = a, b, True
             state.least[m], state.steps[m] = found.min_film, found.steps
             for i in range(2):

@@ -85,8 +85,10 @@ def _load(path: Path) -> dict[str, Any]:
         import h5py
 
         with h5py.File(path, "r", locking="best-effort") as file:
-            refuse_claim(_claimed(file, 0), path.stat().st_size, path.name)
-            return _group(file, path, 0)
+            items = list(_datasets(file, path))
+            refuse_claim(sum(claimed_bytes(item) for _, item in items), path.stat().st_size, path.name)
+            values = {name: _value(item) for name, item in items}
+            return {name: value for name, value in values.items() if value is not None}
     from scipy.io import loadmat
 
     check_mat5(path)
@@ -96,24 +98,10 @@ def _load(path: Path) -> dict[str, Any]:
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
-def _claimed(group: Any, depth: int) -> int:
-    """Bytes that all datasets of a 7.3 file claim, links within the file counted every time."""
+def _datasets(group: Any, path: Path, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Datasets of a 7.3 file by their dotted names; MATLAB's own store of references is left alone."""
     import h5py
 
-    claimed = 0
-    for name in group:
-        if name.startswith("#") or depth > _DEEPEST or not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            continue
-        item = group[name]
-        claimed += _claimed(item, depth + 1) if isinstance(item, h5py.Group) else claimed_bytes(item)
-    return claimed
-
-
-def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
-    """Datasets and groups by name; links out of the file and MATLAB's own store of references are left alone."""
-    import h5py
-
-    members: dict[str, Any] = {}
     for name in group:
         if name.startswith("#") or depth > _DEEPEST:
             continue
@@ -121,14 +109,21 @@ def _group(group: Any, path: Path, depth: int) -> dict[str, Any]:
             raise refuse(path.name, f"dataset {name}", "is a link", "Store the data in this file")
         item = group[name]
         if isinstance(item, h5py.Group):
-            members[name] = _group(item, path, depth + 1)
-        elif item.dtype == h5py.ref_dtype:
-            texts = _cell_texts(item)
-            if texts:
-                members[name] = np.array(texts, dtype=object)
-        elif item.dtype.kind in "fiu" and _is_inside(item) and not _is_text(item):
-            members[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
-    return members
+            yield from _datasets(item, path, f"{prefix}{name}.", depth + 1)
+        else:
+            yield f"{prefix}{name}", item
+
+
+def _value(item: Any) -> np.ndarray | None:
+    """Numbers of a dataset, or the texts that it refers to; None of what is neither."""
+    import h5py
+
+    if item.dtype == h5py.ref_dtype:
+        texts = _cell_texts(item)
+        return np.array(texts, dtype=object) if texts else None
+    if item.dtype.kind in "fiu" and _is_inside(item) and not _is_text(item):
+        return np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
+    return None
 
 
 def _cell_texts(item: Any) -> list[str]:

@@ -15,9 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -43,51 +41,35 @@ def read_sandboxed(module: str, path: Path) -> list[Series]:
         # asammdf repairs a copy of a measurement that was cut short, and a child that dies cannot clear it away.
         with tempfile.TemporaryDirectory(prefix="tpjb-", ignore_cleanup_errors=True) as scratch:
             temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), scratch)
+            answer = Path(scratch) / "answer.npz"
             # What a library prints about a broken file is no message for people; its exception comes with the answer.
             child = subprocess.run(
-                command,
+                [*command, str(answer)],
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 timeout=PATIENCE * seconds,
                 env={**os.environ, "PYTHONPATH": search_path, **temporary},
                 check=False,
             )
+            if answer.exists() and child.returncode == 0:
+                return _answered(answer)
     except subprocess.TimeoutExpired as error:
         raise too_long from error
     if child.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
         raise too_long
-    head, _, body = child.stdout.partition(b"\n")
-    if child.returncode != 0 or not head:
-        fault = f"made its library crash (exit status {child.returncode}): it is damaged"
-        raise refuse("", "", fault, _AGAIN)
-    heads = json.loads(head)
-    if isinstance(heads, dict):
-        raise refuse("", "", str(heads["error"]), _AGAIN)
-    return _unpack(heads, body)
+    fault = f"made its library crash (exit status {child.returncode}): it is damaged"
+    raise refuse("", "", fault, _AGAIN)
 
 
-def _unpack(heads: list[Any], body: bytes) -> list[Series]:
-    """Undo `_send`."""
-    numbers, start = np.frombuffer(body, dtype=float), 0
-    series = []
-    for name, unit, group, length, is_timed in heads:
-        values, start = numbers[start : start + length], start + length
-        time = None
-        if is_timed:
-            time, start = numbers[start : start + length], start + length
-        series.append(Series(name, unit, values, time, group))
+def _answered(answer: Path) -> list[Series]:
+    """Series from the file that `main` wrote; its error, if that is what it holds."""
+    with np.load(answer, allow_pickle=False) as arrays:
+        if "error" in arrays:
+            raise refuse("", "", str(arrays["error"]), _AGAIN)
+        series = []
+        for i, (name, unit, group) in enumerate(json.loads(str(arrays["heads"]))):
+            series.append(Series(name, unit, arrays[f"values {i}"], arrays.get(f"time {i}"), group))
     return series
-
-
-def _send(series: Sequence[Series]) -> None:
-    heads = [[s.name, s.unit, s.group, len(s), s.time is not None] for s in series]
-    out = sys.stdout.buffer
-    out.write(json.dumps(heads).encode() + b"\n")
-    for channel in series:
-        for numbers in (channel.values, channel.time):
-            if numbers is not None:
-                out.write(np.ascontiguousarray(numbers, dtype=float).data)
-    out.flush()
 
 
 def _limit_memory(path: Path) -> None:
@@ -101,21 +83,21 @@ def _limit_memory(path: Path) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def main(module: str, path: Path) -> None:
-    """Read a file and write its channels to the standard output: one line of JSON, then the numbers."""
+def main(module: str, path: Path, answer: Path) -> None:
+    """Read a file and write its channels to `answer` (.npz): texts, and the numbers of each; or what is wrong."""
     reader = importlib.import_module(f"rigdata.readers.formats.{module}")
     _limit_memory(path)
     try:
-        with contextlib.redirect_stdout(sys.stderr):  # asammdf prints what it finds; the answer would begin with that
-            series = reader.read_in_sandbox(path)
+        series = reader.read_in_sandbox(path)
     except MemoryError:
-        error = "claims more data than its size can hold"
+        np.savez(answer, error="claims more data than its size can hold")
     except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here
-        error = f"cannot be read ({type(problem).__name__}: {str(problem)[:120]})"
+        np.savez(answer, error=f"cannot be read ({type(problem).__name__}: {str(problem)[:120]})")
     else:
-        _send(series)
-        return
-    print(json.dumps({"error": error}))
+        heads = [[channel.name, channel.unit, channel.group] for channel in series]
+        numbers = {f"values {i}": channel.values for i, channel in enumerate(series)}
+        times = {f"time {i}": channel.time for i, channel in enumerate(series) if channel.time is not None}
+        np.savez(answer, heads=json.dumps(heads), **numbers, **times)
 
 
 if __name__ == "__main__":
@@ -123,4 +105,4 @@ if __name__ == "__main__":
         import resource
 
         resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[3]), resource.getrlimit(resource.RLIMIT_CPU)[1]))
-    main(sys.argv[1], Path(sys.argv[2]))
+    main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[4]))

@@ -21,6 +21,8 @@ _SIGNATURE, _RESERVED = b"GCOL\x01", b"\0\0\0"
 _HEADER, _OBJECT = 16, 16
 #: Texts in attributes stand near the start or the end; the rest of a large file is samples [bytes].
 _SCANNED = 2**26
+#: Bytes that are looked at in one go, and of those behind them: a name and its reference.
+_PIECE, _NEXT = 2**20, 128
 _LARGEST_HEAP = 2**28
 _LONGEST_UNIT = 64
 #: A reference to a text: its length, the address of its heap, its number there; it follows its attribute's name, behind
@@ -42,7 +44,7 @@ def broken_heap(path: Path) -> int | None:
     """Find a global heap that cannot be walked."""
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
-        for start, block in _ends(stream, size):
+        for start, block in _pieces(stream, size):
             for at in _places(block, _SIGNATURE):
                 if not _is_sound(stream, start + at, size):
                     return start + at
@@ -57,7 +59,7 @@ def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
         heaps, followers = set[int](), list[tuple[str, bytes]]()
-        for start, block in _ends(stream, size):
+        for start, block in _pieces(stream, size):
             heaps.update(start + at - base for at in _places(block, _SIGNATURE))
             for name in names:
                 for at in _places(block, name.encode() + b"\0"):
@@ -71,12 +73,12 @@ def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None
     return None
 
 
-def _ends(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
-    """Start and bytes of a file's first and last part."""
-    starts = [0] if size <= 2 * _SCANNED else [0, size - _SCANNED]
-    for start in starts:
-        stream.seek(start)
-        yield start, stream.read(size if size <= 2 * _SCANNED else _SCANNED)
+def _pieces(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
+    """Start and bytes of the pieces of a file's first and last part, each with the beginning of the next."""
+    for start in range(0, size, _PIECE):
+        if not _SCANNED <= start < size - _SCANNED:
+            stream.seek(start)
+            yield start, stream.read(_PIECE + _NEXT)
 
 
 def _places(block: bytes, wanted: bytes) -> Iterator[int]:
@@ -110,33 +112,24 @@ def resolve(start: Any, path: str, file: str, run: str | None = None) -> Any:
     import h5py
 
     remedy = "Copy the data into this file"
-    place, remaining, steps = start.id, _parts(path), 0
-    is_soft = False
-    while remaining:
-        steps += 1
-        if steps > _MAX_STEPS:
-            raise refuse(file, path, "is a circle of links, or too deep", remedy, run)
-        name = remaining.pop(0).encode("utf-8", "surrogateescape")
-        kind = None
-        if isinstance(place, h5py.h5g.GroupID) and place.links.exists(name):
-            kind = place.links.get_info(name).type
-        if kind == h5py.h5l.TYPE_HARD:
-            place = h5py.h5o.open(place, name)
-        elif kind == h5py.h5l.TYPE_SOFT:
-            target, is_soft = place.links.get_val(name).decode("utf-8", "surrogateescape"), True
-            place = h5py.h5g.open(h5py.h5i.get_file_id(place), b"/") if target.startswith("/") else place
-            remaining = _parts(target) + remaining
-        elif kind == h5py.h5l.TYPE_EXTERNAL:
-            target = place.links.get_val(name)[0].decode("utf-8", "surrogateescape")
-            raise refuse(file, path, f"is a link out of the file (to {target[:80]!a})", remedy, run)
-        elif kind is not None:
-            raise refuse(file, path, "is a link of an unknown kind", remedy, run)
+    place, remaining, is_soft = start, _parts(path), False
+    for _ in range(_MAX_STEPS):
+        if not remaining:
+            return place
+        name = remaining.pop(0)
+        link = place.get(name, getlink=True) if isinstance(place, h5py.Group) else None
+        if isinstance(link, h5py.HardLink):
+            place = place[name]
+        elif isinstance(link, h5py.SoftLink):
+            place = place.file if link.path.startswith("/") else place
+            remaining, is_soft = _parts(link.path) + remaining, True
+        elif isinstance(link, h5py.ExternalLink):
+            raise refuse(file, path, f"is a link out of the file (to {link.filename[:80]!a})", remedy, run)
         elif is_soft:
             raise refuse(file, path, "is a soft link that leads nowhere", remedy, run)
         else:
             return None
-    members = {h5py.h5g.GroupID: h5py.Group, h5py.h5d.DatasetID: h5py.Dataset, h5py.h5t.TypeID: h5py.Datatype}
-    return next((member(place) for kind, member in members.items() if isinstance(place, kind)), start)
+    raise refuse(file, path, "is a circle of links, or too deep", remedy, run)
 
 
 def _parts(path: str) -> list[str]:
@@ -149,8 +142,11 @@ def claimed_bytes(member: Any) -> int:
 
     if not isinstance(member, h5py.Dataset) or member.shape is None:
         return 0
-    chunk = 0 if member.chunks is None else math.prod(member.chunks) * member.dtype.itemsize
-    return max(SAMPLE * math.prod(member.shape), chunk)
+    return max(SAMPLE * math.prod(member.shape), _chunk_bytes(member))
+
+
+def _chunk_bytes(dataset: Any) -> int:
+    return 0 if dataset.chunks is None else math.prod(dataset.chunks) * int(dataset.dtype.itemsize)
 
 
 def claimed_by_runs(handle: Any, runs: Sequence[str], names: Sequence[str]) -> int:
@@ -178,11 +174,8 @@ def chunk_bytes(group: Any, name: str) -> int:
     """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
     import h5py
 
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-        return 0
-    member = group[name]
-    chunk = member.chunks if isinstance(member, h5py.Dataset) else None
-    return 0 if chunk is None else math.prod(chunk) * member.dtype.itemsize
+    is_within = isinstance(group.get(name, getlink=True), h5py.HardLink)
+    return _chunk_bytes(group[name]) if is_within and isinstance(group[name], h5py.Dataset) else 0
 
 
 def is_plain(attribute: Any, most: int) -> bool:

@@ -1,11 +1,11 @@
-"""Runs in an HDF5 campaign: one group per run, one 1-D dataset per channel, read slice by slice."""
+"""An HDF5 campaign: the manifest's text, and a group per run with a 1-D dataset per channel, read slice by slice."""
 
 from __future__ import annotations
 
 import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -13,27 +13,29 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
 from rigdata.device import Grid, Timing, planned
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import (
     MAX_REQUEST,
     MAX_SAMPLES,
     MOST_RATE,
-    GridReader,
+    RunReader,
     rate_of_time,
-    undescribed,
+    refuse_claim,
 )
-from rigdata.readers.grids import serving
 from rigdata.readers.hdf5.guards import (
+    TEXT,
     UNIT,
+    broken_heap,
     chunk_bytes,
+    claimed_by_runs,
     foreign_filters,
     is_plain,
     is_text,
     resolve,
+    too_long_text,
 )
-from rigdata.stated_units import unit_problems
+from rigdata.readers.series import serving
 
 _MAX_CHUNK = 256 * 2**20
 _PIECE = 2**20
@@ -49,6 +51,7 @@ _GROUP, _FACTS = "/", ""
 _LOOK = 100_000
 #: Bytes of unpacked chunks that the library keeps per dataset.
 _LEAST_CACHE, _MOST_CACHE = 2**20, 2**25
+_MAX_TEXT = 8 * 2**20
 
 
 @contextmanager
@@ -94,40 +97,27 @@ class _Facts:
 
 
 @dataclass(frozen=True)
-class Hdf5Reader(GridReader):
+class Hdf5Reader(RunReader):
     """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
-    path: Path
-    run: str
-    base: str
-    stated_rate: float | None = None
-    channels: Mapping[str, Channel] = field(default_factory=dict, repr=False)
     cached_facts: dict[tuple[int, int], _Facts] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def file(self) -> str:
-        """Display name of file and group."""
-        return f"{self.base}:/runs/{self.run}"
-
-    def _refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
-        return refuse(self.file, place, fault, remedy, self.run)
 
     @contextmanager
     def _group(self, cache: int | None = None) -> Iterator[Any]:
         import h5py
 
         if _GROUP in self.opened_members:
-            with _translated_faults(self.base, self.run):
+            with _translated_faults(self.path.name, self.run):
                 yield self.opened_members[_GROUP]
             return
-        with open_readonly(self.path, self.base, self.run, cache) as handle:
-            group = resolve(handle, f"runs/{self.run}", self.base, self.run)
+        with open_readonly(self.path, self.path.name, self.run, cache) as handle:
+            group = resolve(handle, f"runs/{self.run}", self.path.name, self.run)
             if group is None:
                 remedy = "Delete the run from the manifest, or add the group"
-                raise self._refuse("", "the group is missing", remedy)
+                raise self.refuse("", "the group is missing", remedy)
             if not isinstance(group, h5py.Group):
-                raise self._refuse("", "is not a group", "Store one dataset per channel in a group")
+                raise self.refuse("", "is not a group", "Store one dataset per channel in a group")
             yield group
 
     @contextmanager
@@ -155,16 +145,12 @@ class Hdf5Reader(GridReader):
 
     def _cache_bytes(self) -> int:
         """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
+        facts = self._facts()
+        if facts.grids[0].length * 8 <= _LEAST_CACHE:
+            return _LEAST_CACHE
         with self._group() as group:
-            facts = self._facts(group)
-            if facts.grids[0].length * 8 <= _LEAST_CACHE:
-                return _LEAST_CACHE
             largest = max(chunk_bytes(group, name) for name in facts.members[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
-
-    def counted(self) -> bool:
-        """Whether times are counted from the rate, not read from the file."""
-        return not self._facts().grids[0].clock
 
     def _dataset(self, group: Any, name: str) -> Any:
         if name in self.opened_members:
@@ -182,44 +168,39 @@ class Hdf5Reader(GridReader):
         if dataset is None:
             names = ", ".join(str(member)[:40] for member in itertools.islice(group, 20))
             remedy = f"It holds: {names or 'nothing'}"
-            raise self._refuse(place, "channel is missing in the file", remedy)
+            raise self.refuse(place, "channel is missing in the file", remedy)
         if not isinstance(dataset, h5py.Dataset):
-            raise self._refuse(place, "is not a dataset", "Store one 1-D dataset per channel")
+            raise self.refuse(place, "is not a dataset", "Store one 1-D dataset per channel")
         if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
             fault = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
-            raise self._refuse(place, fault, "Store one 1-D dataset of numbers per channel")
+            raise self.refuse(place, fault, "Store one 1-D dataset of numbers per channel")
         if dataset.shape[0] > MAX_SAMPLES:
-            raise self._refuse(place, f"claims {dataset.shape[0]} samples", "Split the run")
+            raise self.refuse(place, f"claims {dataset.shape[0]} samples", "Split the run")
         self._check_storage(dataset, place)
         return dataset
 
     def _check_storage(self, dataset: Any, place: str) -> None:
         """Reject data that is outside the file, or needs foreign code or vast memory to unpack."""
         if dataset.is_virtual or dataset.external:
-            raise self._refuse(place, "holds its data in another file", "Copy the data into this file")
+            raise self.refuse(place, "holds its data in another file", "Copy the data into this file")
         for code in foreign_filters(dataset):
-            raise self._refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
+            raise self.refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
         chunk = dataset.chunks
         if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
-            raise self._refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
+            raise self.refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
 
-    def names(self) -> tuple[str, ...]:
-        """Names of all members of the group."""
-        with self._group() as group:
-            return tuple(group.keys())
-
-    def _facts(self, opened: Any = None) -> _Facts:
-        """The facts, from the group that the caller has `opened` if any must be read; once for a file kept open."""
+    def _facts(self) -> _Facts:
+        """The facts; they are looked for once where the file is kept open."""
         if _FACTS in self.opened_members:
             facts: _Facts = self.opened_members[_FACTS]
             return facts
         try:
             state = self.path.stat()
         except OSError as error:
-            raise self._refuse("", "the file is not there", "Check the path") from error
+            raise self.refuse("", "the file is not there", "Check the path") from error
         signature = (state.st_size, state.st_mtime_ns)
         if signature not in self.cached_facts:
-            with nullcontext(opened) if opened is not None else self._group() as group:
+            with self._group() as group:
                 rate = self._checked_rate(group.attrs)
                 members = tuple(itertools.islice(group, _MAX_MEMBERS))
                 facts = _Facts(members, *self._planned(group, rate))
@@ -243,7 +224,7 @@ class Hdf5Reader(GridReader):
             raise RigDataError(problems[:_LISTED])
         if not lengths:
             fault = "the group holds no dataset of numbers"
-            raise self._refuse("", fault, "Store one dataset per channel")
+            raise self.refuse("", fault, "Store one dataset per channel")
         return lengths
 
     def _planned(self, group: Any, attribute: float | None) -> tuple[tuple[Grid, ...], dict[str, RigDataError]]:
@@ -272,88 +253,58 @@ class Hdf5Reader(GridReader):
             timings, self.channels, run_rate, lambda clock: float(self._seconds(group, clock, 0, 1)[0])
         )
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        faults = {name: self._refuse(f"dataset {name}", text, remedy) for name, text in texts.items()}
+        faults = {name: self.refuse(f"dataset {name}", text, remedy) for name, text in texts.items()}
         return grids or (Grid(max(lengths.values()), "", run_rate or float("nan")),), faults
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]."""
-        return self.channels[clock].to_si(self._samples(self._dataset(group, clock), clock, start, stop))
+        return self.channels[clock].to_si(self._samples(group, clock, start, stop))
 
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
             return None
         place, remedy = f"attribute {_RATE}", "Store one positive number, in Hz"
         if not is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
-            raise self._refuse(place, "is not a number", remedy)
+            raise self.refuse(place, "is not a number", remedy)
         try:
             rate = float(np.asarray(attributes[_RATE]).reshape(()))
         except (ValueError, TypeError) as error:
-            raise self._refuse(place, "is not a number", remedy) from error
+            raise self.refuse(place, "is not a number", remedy) from error
         if not 0.0 < rate < MOST_RATE:
-            raise self._refuse(place, f"is {rate}", remedy)
-        return rate
-
-    def length(self) -> int:
-        """Count the samples per channel of the run's own device."""
-        return self._facts().grids[0].length
-
-    def rate(self) -> float:
-        """Give the sample rate [Hz]: the attribute, else of the time dataset, else the manifest's."""
-        rate = self._facts().grids[0].rate
-        if not rate > 0:
-            remedy = "Add the group attribute sample_rate_hz, or [acquisition] sample_rate"
-            raise self._refuse("attribute sample_rate_hz", "there is no sample rate", remedy)
+            raise self.refuse(place, f"is {rate}", remedy)
         return rate
 
     def _grids(self) -> Sequence[Grid]:
         return self._facts().grids
 
+    def _faults(self) -> Mapping[str, RigDataError]:
+        return self._facts().faults
+
+    def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
+        with self._group() as group:
+            return self._seconds(group, clock, start, stop)
+
     def read_device(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of channels of one device; only the chunks of the slice are read."""
-        with self._group() as group:
-            return [self._slice(group, name, start, stop) for name in names]
-
-    def _slice(self, group: Any, name: str, start: int, stop: int) -> FloatArray:
         if stop - start > MAX_REQUEST:
-            raise self._refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
-        return self._samples(self._dataset(group, name), name, start, stop)
-
-    def device_time(self, name: str, start: int, stop: int) -> FloatArray:
-        """Seconds of a channel's samples: its time dataset, else counted from its rate."""
-        grid = self._grid(name)
-        if not grid.clock:
-            return grid.begin + np.arange(start, stop) / grid.rate
+            raise self.refuse("", f"{stop - start} samples asked for at once", "Read the run in slices")
         with self._group() as group:
-            return self._seconds(group, grid.clock, start, stop)
+            return [self._samples(group, name, start, stop) for name in names]
 
-    def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
-        """Raw readings along the run's own times; only the chunks of the slice are read."""
-        with self._group() as group:
-            facts = self._facts(group)
-            apart = self.apart()
-            readings = []
-            for name in names:
-                if name in facts.faults:
-                    raise facts.faults[name]
-                if name in apart:
-                    readings.append(self._along(name, start, stop))
-                else:
-                    readings.append(self._slice(group, name, start, stop))
-            return readings
-
-    def _samples(self, dataset: Any, name: str, start: int, stop: int) -> FloatArray:
+    def _samples(self, group: Any, name: str, start: int, stop: int) -> FloatArray:
+        dataset = self._dataset(group, name)
         try:
             with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
                 return np.asarray(dataset[start:stop], dtype=np.float64)
         except (OSError, RuntimeError) as error:  # what a filter says of damaged bytes
             fault = f"the stored samples are damaged ({_first_line(error)})"
-            raise self._refuse(f"dataset {name}", fault, "Copy the file again from the rig") from error
+            raise self.refuse(f"dataset {name}", fault, "Copy the file again from the rig") from error
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""
         with self._group() as group:
             usable = {}
-            for name in self._facts(group).members:
+            for name in self._facts().members:
                 with suppress(RigDataError):  # raised when that channel is asked for; no result can come from it
                     usable[name] = self._dataset(group, name)
             digest = hashlib.sha256()
@@ -364,25 +315,15 @@ class Hdf5Reader(GridReader):
             digest.update(repr([(key, repr(group.attrs[key])) for key in plain]).encode())
         return digest.hexdigest()
 
-    def time(self, start: int, stop: int) -> FloatArray:
-        """Seconds: the time dataset where there is one, else counted from the rate."""
-        grid = self._facts().grids[0]
-        if not grid.clock:
-            return np.arange(start, stop) / self.rate()
-        with self._group() as group:
-            return self._seconds(group, grid.clock, start, stop)
-
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        extra = [n for n in self._facts().members if n not in self.channels]
-        units = unit_problems(self.channels, self._units(), self.file, self.run)
-        return (*units, *self._other_devices(), *undescribed(extra, "datasets", self.file, self.run))
+        return self._notes("datasets", self._facts().members, self._units())
 
     def _units(self) -> dict[str, str]:
         """Units that datasets state in an attribute."""
         units = {}
         with self._group() as group:
-            for name in filter(self._facts(group).members.__contains__, self.channels):
+            for name in filter(self._facts().members.__contains__, self.channels):
                 with suppress(RigDataError):  # raised when that channel is asked for
                     attributes = self._dataset(group, name).attrs
                     stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
@@ -416,3 +357,48 @@ def _hash_dataset(digest: Any, file: BinaryIO, name: str, dataset: Any) -> None:
         while size > 0 and (block := file.read(min(size, _PIECE))):
             digest.update(block)
             size -= len(block)
+
+
+def read_texts(path: Path, file: str) -> tuple[str, str]:
+    """Read the manifest and the bearing text from the root attributes."""
+    try:
+        heap = broken_heap(path)
+    except OSError as error:
+        raise refuse(file, "", f"cannot be read ({error.strerror or error})", "Check the path") from error
+    if heap is not None:
+        fault = "the file is damaged: its store of texts cannot be walked"
+        raise refuse(file, f"byte {heap}", fault, "Copy the file again from the rig")
+    with open_readonly(path, file) as handle:
+        if "manifest" not in handle.attrs:
+            raise refuse(file, "root attribute manifest", "is missing", "Store campaign.toml's text there")
+        damaged = too_long_text(path, ("manifest", "bearing", *UNIT), handle.userblock_size)
+        if damaged is not None:
+            fault = "claims a text longer than the file"
+            raise refuse(file, f"attribute {damaged}", fault, "Copy the file again from the rig")
+        manifest = _text_attribute(handle, "manifest", file)
+        bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
+    return manifest, bearing
+
+
+def refuse_claims(path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse a file whose runs claim more samples than it can hold."""
+    with open_readonly(path, path.name) as handle:
+        refuse_claim(claimed_by_runs(handle, runs, names), path.stat().st_size, path.name)
+
+
+def _text_attribute(handle: Any, name: str, file: str) -> str:
+    place, remedy = f"root attribute {name}", "Store it as one UTF-8 string"
+    no_text = refuse(file, place, "is not a text, or far too long", remedy)
+    stored = handle.attrs.get_id(name)
+    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != TEXT:
+        raise no_text
+    value = handle.attrs[name]
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    if isinstance(value, bytes):
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise refuse(file, place, "is not UTF-8 text", remedy) from error
+    if not isinstance(value, str) or len(value) > _MAX_TEXT:
+        raise no_text
+    return value

@@ -18,13 +18,13 @@ _STAMP = re.compile(rf"(?:{_ISO}|(\d{{1,2}})[./](\d{{1,2}})[./](\d{{4}})[T ]\s?)
 _DATE = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
 _DAY = 86400.0
 #: Ways in which loggers and spreadsheets write "no value".
-MISSING = (
-    "", "NaN", "nan", "NAN", "-NaN", "-nan", "-nan(ind)", "-", "--", "---", "----", "-----", "*", "***", "?",
-    "NA", "N/A", "n/a", "#N/A", "#NA", "#NV", "#VALUE!", "#WERT!", "#DIV/0!", "null", "NULL", "None", "none",
-    "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND", "1.#INF", "-1.#INF", "1,#QNAN", "-1,#QNAN", "1,#IND", "-1,#IND",
-    "1,#INF", "-1,#INF", "1.#R", "OVL", "+OVL", "-OVL", "OL", "+OL", "-OL", "OVER", "OVERLOAD", "OVERFLOW",
-    "Overflow", "INVALID", "Invalid", "ERR", "inf", "-inf", "+inf", "Inf", "-Inf", "INF", "-INF",
-)  # fmt: skip
+_MISSING_WORDS = """
+    NaN nan NAN -NaN -nan -nan(ind) - -- --- ---- ----- * *** ? NA N/A n/a #N/A #NA #NV #VALUE! #WERT! #DIV/0!
+    null NULL None none 1.#QNAN -1.#QNAN 1.#IND -1.#IND 1.#INF -1.#INF 1,#QNAN -1,#QNAN 1,#IND -1,#IND 1,#INF
+    -1,#INF 1.#R OVL +OVL -OVL OL +OL -OL OVER OVERLOAD OVERFLOW Overflow INVALID Invalid ERR inf -inf +inf Inf
+    -Inf INF -INF
+"""
+MISSING = ("", *_MISSING_WORDS.split())
 _MISSING = frozenset(MISSING)
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")

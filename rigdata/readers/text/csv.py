@@ -1,29 +1,23 @@
-"""Runs in CSV files: parsed by pyarrow in blocks, bad cells named by line and column, cached while memory allows."""
+"""Text files as columns of numbers: parsed by pyarrow in blocks, bad cells named by line and column."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
-from rigdata.manifest.manifest import CsvSpec
+from rigdata.calibration import OVERFLOW
 from rigdata.problem import Problem, RigDataError, Severity
-from rigdata.readers.base import MAX_SAMPLES, suffix_hint, undescribed
-from rigdata.readers.cached_reader import CachedReader
-from rigdata.readers.grids import Layout, arranged, table, time_columns
-from rigdata.readers.series import Columns, Series, seconds, to_temporary_file
+from rigdata.readers.base import MAX_SAMPLES, RecordFile
+from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, time_columns
 from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
 from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
-from rigdata.readers.text.head import Head, find_head, split_line
-from rigdata.stated_units import unit_problems
+from rigdata.readers.text.head import Head, find_head, plain_name, split_line
 
-#: A file above this size is parsed column by column, not all channels at once [bytes].
-_LARGE_FILE = 2**29
 #: Lines longer than this are rejected [bytes].
 _BLOCK = 2**22
 #: Faults that are listed, and odd lines that are counted.
@@ -31,209 +25,115 @@ _LISTED, _MOST_ODD = 5, 1000
 
 
 @dataclass(frozen=True)
-class CsvReader(CachedReader):
-    """One run's CSV file."""
-
-    spec: CsvSpec = field(default_factory=CsvSpec)
-
-    def _head(self) -> Head:
-        try:
-            return self.cache.get(
-                (*self._signature(), "head"),
-                lambda: find_head(self.path, self.file, self.run, self.spec, self.channels),
-            )
-        except RigDataError as error:
-            hint = suffix_hint(self.path)
-            if not hint:
-                raise
-            raise RigDataError([replace(p, cure=hint) for p in error.problems]) from error
-        except (OSError, UnicodeError) as error:
-            fault = f"cannot be read ({getattr(error, 'strerror', error)})"
-            raise self._refuse("", fault, "Check the file and its rights") from error
-
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns, "" where one has none."""
-        return self._head().names
-
-    def _columns(self, names: Sequence[str]) -> Columns:
-        signature = self._signature()
-        is_large = signature[1] > _LARGE_FILE
-        key = (*signature, *names) if is_large else signature
-        return self.cache.get(key, lambda: self._parsed(names if is_large else None))
-
-    def _used(self, names: Sequence[str]) -> list[str]:
-        """Those of the columns that are used."""
-        used = {name for name, channel in self.channels.items() if channel.quantity != "ignore"}
-        wanted = [name for name in names if name in used]
-        if not wanted:
-            fault = "holds none of the channels that are used"
-            raise self._refuse("", fault, "Check the channels' names")
-        return wanted
-
-    def _parsed(self, names: Sequence[str] | None) -> Columns:
-        """All channels that are used; of a large file one, for the number of samples, and `names`."""
-        head, clock = self._head(), self._clock()
-        clock_name = "" if clock is None else clock.name
-        wanted = self._used(head.names)
-        if clock_name in head.names and clock_name not in wanted:
-            wanted.append(clock_name)
-        if names is not None:
-            first = clock_name if clock_name in wanted else wanted[0]
-            wanted = [name for name in wanted if name == first or name in names]
-        return self._read_table(head, clock_name, wanted)
-
-    def _read_table(self, head: Head, clock_name: str, wanted: Sequence[str]) -> Columns:
-        try:
-            return read_table(Source(self.path, self.file, self.run, head, clock_name), wanted)
-        except OSError as error:
-            fault = f"cannot be read ({error})"
-            raise self._refuse("", fault, "Check the file and its rights") from error
-
-    def _time_columns(self) -> list[int]:
-        """Places of the columns of times; one that nobody describes counts where nothing else tells the times."""
-        head = self._head()
-        places = [i for i in time_columns(head.names, self.channels) if i not in head.dates]
-        is_needed = len(places) > 1 or self.stated_rate is None
-        return [i for i in places if is_needed or head.names[i] in self.channels]
-
-    def _clock(self) -> Channel | None:
-        """The one time column."""
-        head = self._head()
-        for i in self._time_columns():
-            name, unit = head.names[i], head.units[i]
-            return self.channels.get(name) or Channel(name, "time", unit, float(seconds(np.ones(1), unit)[0]))
-        return next((c for c in self.channels.values() if c.quantity == "time"), None)
-
-    def _layout(self) -> Layout | None:
-        """Columns at several times: several time columns, or channels with a clock's times or a rate of their own."""
-        return self.cache.get((*self._signature(), "layout"), self._arranged)
-
-    def _arranged(self) -> Layout | None:
-        head, clocks = self._head(), self._time_columns()
-        known = [channel for name, channel in self.channels.items() if name in head.names]
-        has_rates = any(c.sample_rate for c in known if c.quantity not in ("time", "ignore"))
-        has_letter = any(c.quantity == "time" and c.clock for c in known)
-        if len(clocks) < 2 and not has_rates and not has_letter:
-            return None
-        used = self._used(head.names)
-        places = [i for i, name in enumerate(head.names) if name in used or i in clocks]
-        labels = tuple(name if head.names.count(name) < 2 else f"{name} ({i + 1})" for i, name in enumerate(head.names))
-        wanted = [labels[i] for i in places]
-        is_large = self._signature()[1] > _LARGE_FILE
-        columns: dict[str, FloatArray] = {}
-        problems: tuple[Problem, ...] = ()
-        for names in [[label] for label in wanted] if is_large else [wanted]:
-            parsed = self._read_table(replace(head, names=labels), "", names)
-            columns.update({name: to_temporary_file(values) for name, values in parsed.values.items()})
-            problems = problems or parsed.problems
-        series = [Series(head.names[i], head.units[i], columns[labels[i]]) for i in places]
-        series = table(series, self.channels, self.stated_rate)
-        return replace(arranged(series, self.channels, self.stated_rate, self.file, self.run), problems=problems)
-
-    def _times(self) -> FloatArray | None:
-        clock = self._clock()
-        if clock is None:
-            return None
-        if self.stated_rate is not None and clock.name not in self._columns((clock.name,)).values:
-            return None
-        return self.cache.get((*self._signature(), "seconds"), lambda: self._usable_times(clock))
-
-    def _usable_times(self, clock: Channel) -> FloatArray:
-        """The time column, missing times filled in between."""
-        (raw,) = self.read([clock.name], 0, self.length())
-        times = clock.to_si(raw)
-        place = f"column {clock.name}"
-        usable = np.flatnonzero(np.isfinite(times))
-        if len(usable) < min(2, len(times)):
-            raise self._refuse(place, "holds no times", "Set its quantity to ignore")
-        if len(usable) < len(times):
-            times = np.interp(np.arange(len(times)), usable, times[usable])
-        back = np.flatnonzero(np.diff(times) < 0)
-        if len(back):
-            before, after = times[back[0]], times[back[0] + 1]
-            place = f"line {self._head().data_line + int(back[0]) + 1}, {place}"
-            fault = f"time runs backwards ({before:g} s, then {after:g} s)"
-            raise self._refuse(place, fault, "Sort or split the run")
-        return times
-
-    def problems(self) -> tuple[Problem, ...]:
-        """What was repaired while parsing, and which columns nobody describes."""
-        head, layout = self._head(), self._layout()
-        known = {*self.channels, *(head.names[i] for i in self._time_columns())}
-        extra = [name for name in head.names if name and name not in known]
-        repaired = self._columns(()).problems if layout is None else layout.problems
-        units = unit_problems(self.channels, dict(zip(head.names, head.units, strict=True)), self.file, self.run)
-        return (*repaired, *units, *self._other_devices(), *undescribed(extra, "columns", self.file, self.run))
-
-
-@dataclass(frozen=True)
 class Source:
-    """A CSV file and how to speak of it; `clock` names its time column, if any."""
+    """A text file and how it is written."""
 
-    path: Path
-    file: str
-    run: str | None
+    record: RecordFile
     head: Head = field(repr=False)
-    clock: str = ""
 
     def problem(self, severity: Severity, place: str, fault: str, remedy: str) -> Problem:
         """Something wrong with the file."""
-        return Problem(severity, self.file, place, fault, remedy, self.run)
-
-    def refuse(self, place: str, fault: str, remedy: str) -> RigDataError:
-        """The error that stops the reading of the file."""
-        return RigDataError(self.problem("error", place, fault, remedy))
+        return Problem(severity, self.record.file, place, fault, remedy, self.record.run)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Line number, from 1, and cells of every line of samples that is not blank."""
-        for number, line in enumerate(all_lines(self.path, self.head.encoding), start=1):
+        for number, line in enumerate(all_lines(self.record.path, self.head.encoding), start=1):
             cells = split_line(line, self.head.delimiter) if number >= self.head.data_line else []
             if cells:
                 yield number, cells
 
 
-def read_table(source: Source, names: Sequence[str]) -> Columns:
-    """Parse the columns `names`."""
-    import pyarrow as pa
-
-    try:
-        columns, odd_lines = _parse(source, names, numbers=True)
-    except pa.ArrowInvalid:
-        if not source.head.decimal_certain:
-            head = replace(source.head, decimal=",", decimal_certain=True)
-            return read_table(replace(source, head=head), names)
-        # Rare spellings of numbers, or text: as text once more, to repair the first and to locate the second.
-        columns, odd_lines = _parse(source, names, numbers=False)
-    length = _length_without_empty_tail(columns, source.clock)
-    problems = _judge_odd_lines(source, odd_lines) if odd_lines else ()
-    if not odd_lines and length and _is_cut_inside_last_cell(source):
-        length -= 1
-        fault = "the last line is cut off inside its last number; taken without that line"
-        problems = (_cut_off(source, "last line", fault),)
-    columns = {name: column[:length] for name, column in columns.items()}
-    for column in columns.values():
-        column.setflags(write=False)
-    return Columns(columns, problems=problems)
+def read_text(record: RecordFile) -> Contents:
+    """Read the columns of a text file that the manifest uses; without one, all that hold numbers."""
+    head = find_head(record)
+    if not record.channels:
+        head = replace(head, names=tuple(map(plain_name, head.names)))
+    source, names = Source(record, head), head.names
+    clocks = _clocks(source)
+    places = _used(source, clocks)
+    columns, problems = read_table(source, places)
+    length = _length_without_empty_tail(columns, clocks)
+    if len(clocks) == 1:
+        _check_times(source, clocks[0], columns[clocks[0]][:length])
+    series = [Series(names[i], head.units[i], columns[i][:length], None, f"column {i + 1}") for i in places]
+    if not record.channels:
+        series = [column for column in series if column.name and np.isfinite(column.values).any()]
+        if all(is_time(column.name) for column in series):
+            raise record.refuse("", "holds no column of numbers", "Export the run again")
+    described = {*record.channels, *(names[i] for i in clocks)}
+    unread = tuple(name for name in names if name and name not in described) if record.channels else ()
+    return Contents(series, names[clocks[0]] if clocks else "", unread, problems)
 
 
-def _length_without_empty_tail(columns: dict[str, FloatArray], clock: str) -> int:
-    """Leave out lines at the end that hold not even a time, as spreadsheets write them."""
+def _clocks(source: Source) -> list[int]:
+    """Places of the time columns; one that nobody describes counts where nothing else tells the times."""
+    names, record = source.head.names, source.record
+    places = [i for i in time_columns(names, record.channels) if i not in source.head.dates]
+    is_needed = len(places) > 1 or record.stated_rate is None
+    return [i for i in places if is_needed or names[i] in record.channels]
+
+
+def _used(source: Source, clocks: Sequence[int]) -> list[int]:
+    """Places of the columns that are used; without a manifest all but dates."""
+    record, head = source.record, source.head
+    if not record.channels:
+        return [i for i in range(len(head.names)) if i not in head.dates]
+    used = {name for name, channel in record.channels.items() if channel.quantity != "ignore"}
+    if not used.intersection(head.names):
+        raise record.refuse("", "holds none of the channels that are used", "Check the channels' names")
+    return [i for i, name in enumerate(head.names) if name in used or i in clocks]
+
+
+def _length_without_empty_tail(columns: dict[int, FloatArray], clocks: Sequence[int]) -> int:
+    """Samples without those at the end that hold not even a time, as spreadsheets write them."""
     whole = length = len(next(iter(columns.values())))
-    while length > 0 and clock in columns and all(np.isnan(c[length - 1]) for c in columns.values()):
+    while clocks and length > 0 and all(np.isnan(column[length - 1]) for column in columns.values()):
         length -= 1
     return length or whole
 
 
-def _options(source: Source, names: Sequence[str], numbers: bool, odd_lines: list[int]) -> dict[str, Any]:
+def _check_times(source: Source, clock: int, times: FloatArray) -> None:
+    """Refuse the only time column, by its line, where it holds no times or runs backwards."""
+    place = f"column {source.head.names[clock]}"
+    usable = np.flatnonzero(np.abs(times) < OVERFLOW)
+    if len(usable) < min(2, len(times)):
+        raise source.record.refuse(place, "holds no times", "Set its quantity to ignore")
+    back = np.flatnonzero(np.diff(times[usable]) < 0)
+    if len(back):
+        before, after = usable[back[0]], usable[back[0] + 1]
+        place = f"line {source.head.data_line + int(after)}, {place}"
+        fault = f"time runs backwards ({times[before]:g}, then {times[after]:g})"
+        raise source.record.refuse(place, fault, "Sort or split the run")
+
+
+def read_table(source: Source, places: Sequence[int]) -> tuple[dict[int, FloatArray], tuple[Problem, ...]]:
+    """Parse the columns at `places`; what was repaired is told."""
+    import pyarrow as pa
+
+    try:
+        columns, odd_lines = _parse(source, places, numbers=True)
+    except pa.ArrowInvalid:
+        if not source.head.decimal_certain:
+            head = replace(source.head, decimal=",", decimal_certain=True)
+            return read_table(replace(source, head=head), places)
+        # Rare spellings of numbers, or text: as text once more, to repair the first and to locate the second.
+        columns, odd_lines = _parse(source, places, numbers=False)
+    if odd_lines:
+        return columns, _judge_odd_lines(source, odd_lines)
+    if not len(columns[places[0]]) or not _is_cut_inside_last_cell(source):
+        return columns, ()
+    fault = "the last line is cut off inside its last number; taken without that line"
+    whole = {place: column[:-1] for place, column in columns.items()}
+    return whole, (_cut_off(source, "last line", fault),)
+
+
+def _options(source: Source, places: Sequence[int], numbers: bool, odd_lines: list[int]) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.csv as pv
 
     head = source.head
     labels = [f"c{i}" for i in range(len(head.names))]  # names of a file need not be unique or present
-    types = {}
-    for name in names:
-        index = head.names.index(name)
-        types[labels[index]] = pa.float64() if numbers and index not in head.stamps else pa.string()
+    types = {labels[i]: pa.float64() if numbers and i not in head.stamps else pa.string() for i in places}
 
     def note(row: Any) -> str:
         if row.text.strip() and len(odd_lines) < _MOST_ODD:
@@ -257,43 +157,44 @@ def _options(source: Source, names: Sequence[str], numbers: bool, odd_lines: lis
     }
 
 
-def _parse(source: Source, names: Sequence[str], numbers: bool) -> tuple[dict[str, FloatArray], list[int]]:
-    """Columns by name, and the number of cells of each line with a wrong one."""
+def _parse(source: Source, places: Sequence[int], numbers: bool) -> tuple[dict[int, FloatArray], list[int]]:
+    """Columns by place, and the number of cells of each line with a wrong one."""
     import pyarrow as pa
     import pyarrow.compute as pc
     import pyarrow.csv as pv
 
-    head = source.head
-    stamped = {n for n in names if head.names.index(n) in head.stamps}
+    head, record = source.head, source.record
     odd_lines: list[int] = []
-    parts: dict[str, list[Any]] = {n: [np.empty(0)] for n in names}
-    bad: set[str] = set()
+    stamps: dict[int, list[str | None]] = {i: [] for i in places if i in head.stamps}
+    bad: set[int] = set()
     length = 0
-    with open_numbers(source.path, head.encoding, head.delimiter) as stream:
+    with ExitStack() as files:
+        stream = files.enter_context(open_numbers(record.path, head.encoding, head.delimiter))
+        numeric = {i: files.enter_context(GrowingChannel()) for i in places if i not in head.stamps}
         try:
-            for batch in pv.open_csv(stream, **_options(source, names, numbers, odd_lines)):
+            for batch in pv.open_csv(stream, **_options(source, places, numbers, odd_lines)):
                 length += batch.num_rows
                 if length > MAX_SAMPLES:
-                    raise source.refuse("", "has too many lines", "Split the run")
-                for name, column in zip(names, batch.columns, strict=True):
-                    if name in stamped:
-                        column = pc.ascii_trim_whitespace(column)
-                    elif not numbers:
+                    raise record.refuse("", "has too many lines", "Split the run")
+                for i, column in zip(places, batch.columns, strict=True):
+                    if i in head.stamps:
+                        stamps[i] += pc.ascii_trim_whitespace(column).to_pylist()
+                        continue
+                    if not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
-                        bad |= set() if is_sound else {name}
-                    parts[name].append(np.array(column.to_pylist(), object) if name in stamped else _values(column))
+                        bad |= set() if is_sound else {i}
+                    numeric[i].write(_values(column).tobytes())
         except pa.ArrowInvalid as error:
             if numbers:
                 raise
             fault = f"cannot be parsed ({str(error).splitlines()[0][:160]})"
-            raise source.refuse("", fault, "Export the run again") from error
-    columns = {name: np.concatenate(column) for name, column in parts.items()}
-    for name in stamped:
-        cells = [None if cell is None or is_missing(cell) else cell for cell in columns[name]]
-        columns[name], count = stamp_seconds(cells)
-        bad |= {name} if count else set()
+            raise record.refuse("", fault, "Export the run again") from error
+        columns = {i: channel.values() for i, channel in numeric.items()}
+    for i, cells in stamps.items():
+        columns[i], count = stamp_seconds([None if cell is None or is_missing(cell) else cell for cell in cells])
+        bad |= {i} if count else set()
     if bad:
-        raise RigDataError(_locate_text(source, [name for name in names if name in bad]))
+        raise RigDataError(_locate_text(source, sorted(bad)))
     return columns, odd_lines
 
 
@@ -319,29 +220,26 @@ def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:
     return pc.if_else(good, text, None).cast(pa.float64()), is_sound
 
 
-def _locate_text(source: Source, names: Sequence[str]) -> list[Problem]:
-    """Name the first line on which each of the columns `names` holds text."""
+def _locate_text(source: Source, places: Sequence[int]) -> list[Problem]:
+    """Name the first line on which each of the columns at `places` holds text."""
     head = source.head
-    places: dict[str, tuple[int, str]] = {}
-    counts = dict.fromkeys(names, 0)
+    first: dict[int, tuple[int, str]] = {}
+    counts = dict.fromkeys(places, 0)
     for number, cells in source.rows():
         if len(cells) != len(head.names):
             continue
-        for name in names:
-            index = head.names.index(name)
-            cell = cells[index]
-            is_good = is_stamp(cell) if index in head.stamps else is_number(cell, head.decimal)
-            if not (is_good or is_missing(cell)):
-                counts[name] += 1
-                places.setdefault(name, (number, cell[:40]))
+        for i in places:
+            is_good = is_stamp(cells[i]) if i in head.stamps else is_number(cells[i], head.decimal)
+            if not (is_good or is_missing(cells[i])):
+                counts[i] += 1
+                first.setdefault(i, (number, cells[i][:40]))
     remedy = "Delete or repair these cells; an empty cell counts as missing"
     problems = []
-    for name in names:
-        index = head.names.index(name)
-        number, cell = places.get(name, (head.data_line, "?"))
-        more = f", and in {counts[name] - 1} more lines" if counts[name] > 1 else ""
-        kind = "time stamp" if index in head.stamps else "number"
-        place = f"line {number}, column {index + 1} ({name})"
+    for i in places:
+        number, cell = first.get(i, (head.data_line, "?"))
+        more = f", and in {counts[i] - 1} more lines" if counts[i] > 1 else ""
+        kind = "time stamp" if i in head.stamps else "number"
+        place = f"line {number}, column {i + 1} ({head.names[i]})"
         problems.append(source.problem("error", place, f"{cell!r} is not a {kind}{more}", remedy))
     return problems
 
@@ -367,7 +265,7 @@ def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...
         fault = f"has {count} cells, the names have {width}"
         problems.append(source.problem("error", f"line {number}", fault, remedy))
     if not problems:
-        raise source.refuse("", f"{len(odd_lines)} lines have a wrong number of cells", remedy)
+        raise source.record.refuse("", f"{len(odd_lines)} lines have a wrong number of cells", remedy)
     raise RigDataError(problems)
 
 
@@ -376,7 +274,7 @@ def _is_cut_inside_last_cell(source: Source) -> bool:
     head = source.head
     if not is_ascii_based(head.encoding.removesuffix("-sig")):
         return False
-    with source.path.open("rb") as stream:
+    with source.record.path.open("rb") as stream:
         size = stream.seek(0, 2)
         stream.seek(max(0, size - 65536))
         tail = stream.read()

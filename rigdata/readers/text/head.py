@@ -12,15 +12,16 @@ import itertools
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
-from rigdata.manifest.manifest import CsvSpec
-from rigdata.problem import RigDataError, refuse
+from rigdata.problem import RigDataError
+from rigdata.readers.base import RecordFile
+from rigdata.readers.series import is_time
 from rigdata.readers.text.byte_stream import HEAD, head_lines, text_encoding
 from rigdata.readers.text.cells import is_date, is_missing, is_number, is_stamp, looks_like
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
+_RATE_TEXT = re.compile(r"\s+(?:\d+\s*)?-.*$")  # "Time  1 - default sample rate"
 _BRACKETS = re.compile(r"\s*[\[(].*[\])]\s*$")
 #: Lines that are looked at to find the decimal mark and the columns of times of day.
 _SAMPLE = 200
@@ -53,28 +54,28 @@ class _NamesLine:
     matched: int = 0
 
 
-def find_head(
-    path: Path, file: str = "", run: str | None = None, spec: CsvSpec | None = None, channels: Iterable[str] = ()
-) -> Head:
+def find_head(record: RecordFile) -> Head:
     """Detect; a contradiction between manifest and file is an error that names both."""
-    return _HeadFinder(path, (file or path.name, run), spec or CsvSpec(), frozenset(channels)).find()
+    return _HeadFinder(record).find()
 
 
 class _HeadFinder:
-    def __init__(self, path: Path, source: tuple[str, str | None], spec: CsvSpec, channels: frozenset[str]) -> None:
-        self.file, self.run = source
-        self.spec = spec
-        self.channels = channels
-        self.encoding = text_encoding(path, spec.encoding)
-        self.lines = head_lines(path, self.encoding)
-        self.is_whole = path.stat().st_size < HEAD
+    def __init__(self, record: RecordFile) -> None:
+        self.record, self.spec = record, record.spec
+        self.channels = frozenset(record.channels)
+        self.encoding = text_encoding(record.path, record.spec.encoding)
+        self.lines = head_lines(record.path, self.encoding)
 
     def _refuse(self, line: int | None, fault: str, remedy: str) -> RigDataError:
-        return refuse(self.file, "" if line is None else f"line {line}", fault, remedy, self.run)
+        return self.record.refuse("" if line is None else f"line {line}", fault, remedy)
 
     def find(self) -> Head:
         if not any(line.strip() for line in self.lines):
-            fault = "the file is empty" if self.is_whole else f"no line ends within the first {HEAD >> 10} kB"
+            fault = (
+                "the file is empty"
+                if self.record.path.stat().st_size < HEAD
+                else f"no line ends within the first {HEAD >> 10} kB"
+            )
             raise self._refuse(None, fault, "Export the run again")
         if self.channels or self.spec.names:
             header = self._header_without_names() if self.spec.names else self._header_by_channels()
@@ -289,9 +290,10 @@ def _columns_of(kind: Callable[[str], bool], sample: list[list[str]]) -> frozens
     return frozenset(columns)
 
 
-def without_unit(name: str) -> str:
-    """A column's name without the unit in brackets behind it."""
-    return _UNIT.sub("", name)
+def plain_name(name: str) -> str:
+    """Name without its unit and without what catman says of its rate."""
+    bare = _UNIT.sub("", name).strip()
+    return _RATE_TEXT.sub("", bare) if is_time(bare) else bare
 
 
 def split_line(line: str, delimiter: str) -> list[str]:

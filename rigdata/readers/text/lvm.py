@@ -1,10 +1,11 @@
-"""LabVIEW measurement files (.lvm): a header, then segments of a header and a table each."""
+"""LabVIEW measurement files: a header of the file, then segments of a header and a table each."""
 
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,52 +17,73 @@ from rigdata.readers.text.byte_stream import all_lines, text_encoding
 from rigdata.readers.text.cells import stamp_seconds
 
 _MAGIC, _END = "LabVIEW Measurement", "***End_of_Header***"
-_X, _COMMENT = "X_Value", "Comment"
-#: Lines that are held as text at a time: as text a table takes several times the memory of its numbers.
-_BLOCK = 20_000
+_CHANNELS, _X, _COMMENT = "Channels", "X_Value", "Comment"
+#: Lines that are parsed at a time.
+_LINES = 5000
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Segment:
     """One table with its header."""
 
-    header: dict[str, list[str]] = field(default_factory=dict)  #: key -> one cell per channel
-    names: list[str] = field(default_factory=list)
-    rows: list[str] = field(default_factory=list)
-    blocks: list[FloatArray] = field(default_factory=list)  #: (rows, columns), NaN where blank
+    header: dict[str, list[str]]  #: key -> one cell per channel
+    names: list[str]
+    values: FloatArray  #: (n, columns), NaN where blank
+    decimal: str
 
     def entry(self, key: str, number: int) -> str:
         """What the header has under `key` for channel `number`, counted from 1."""
         return "".join(self.header.get(key, [])[number - 1 : number])
 
+    def number(self, key: str, number: int) -> float:
+        """The same as a number, NaN where it is none."""
+        try:
+            return float(self.entry(key, number).replace(self.decimal, "."))
+        except ValueError:
+            return float("nan")
+
+    def channels(self) -> Iterator[Series]:
+        """Channels over time; the group of each is date and time of day at which the segment began."""
+        x: FloatArray | None = None
+        number = 0
+        for i, name in enumerate(self.names):
+            if name == _X:
+                x = self.values[:, i] if np.isfinite(self.values[:, i]).any() else None
+            elif name and name != _COMMENT:
+                number += 1
+                if self.entry("X_Dimension", number).lower() in ("time", ""):
+                    yield self._series(number, name, self.values[:, i], x)
+
+    def _series(self, number: int, name: str, values: FloatArray, x: FloatArray | None) -> Series:
+        count, step, start = (self.number(key, number) for key in ("Samples", "Delta_X", "X0"))
+        length = int(count) if 0 < count <= len(values) else len(values)
+        time = None if x is None else x[:length]
+        if step > 0:  # X as written is rounded
+            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
+        began = f"{self.entry('Date', number)} {self.entry('Time', number)}".strip()
+        return Series(name, self.entry("Y_Unit_Label", number), values[:length], time, began)
+
 
 def read_series(path: Path) -> list[Series]:
     """Read every channel over time; segments of the same channels follow each other."""
-    return _LvmFile(path).read()
+    parts: dict[str, list[Series]] = {}
+    for segment in _LvmFile(path).segments():
+        for channel in segment.channels():
+            parts.setdefault(channel.name, []).append(channel)
+    if not parts:
+        raise refuse(path.name, "", "holds no channel over time", "Export the run again, with its samples")
+    return [_joined(segments) for segments in parts.values()]
 
 
 class _LvmFile:
     def __init__(self, path: Path) -> None:
+        """Read the file's own header, which tells separator and decimal mark."""
         self.file = path.name
         self.lines = all_lines(path, text_encoding(path, None))
         self.separator, self.decimal = "\t", "."
-
-    def read(self) -> list[Series]:
-        first = next(self.lines, "")
-        if not first.startswith(_MAGIC):
+        if not next(self.lines, "").startswith(_MAGIC):
             remedy = "Is it a LabVIEW measurement file?"
             raise refuse(self.file, "line 1", f"does not begin with {_MAGIC!r}", remedy)
-        self._read_spelling()
-        parts: dict[str, list[Series]] = {}
-        for segment in self._segments():
-            for channel in self._channels(segment):
-                parts.setdefault(channel.name, []).append(channel)
-        if not parts:
-            raise refuse(self.file, "", "holds no channel over time", "Export the run again, with its samples")
-        return [_joined(segments) for segments in parts.values()]
-
-    def _read_spelling(self) -> None:
-        """Separator and decimal mark by the file's own header, which ends with this."""
         for line in self.lines:
             if line.startswith("Separator"):  # it is behind its own key
                 self.separator = line[len("Separator") :][:1] or self.separator
@@ -69,6 +91,20 @@ class _LvmFile:
                 self.decimal = line[len("Decimal_Separator") + 1 :].strip()[:1] or self.decimal
             elif line.startswith(_END):
                 break
+
+    def segments(self) -> Iterator[_Segment]:
+        """Segments in order; without headings of their own all samples are one."""
+        while (line := next(self.lines, None)) is not None:  # a table puts the next heading back
+            first, *_ = self._cells(line)
+            if first == _CHANNELS:
+                header = self._heading()
+                line = next(self.lines, "")
+            elif first == _X:
+                header = {}
+            else:
+                continue
+            names = self._cells(line)
+            yield _Segment(header, names, self._table(names), self.decimal)
 
     def _cells(self, line: str) -> list[str]:
         return [cell.strip() for cell in line.split(self.separator)]
@@ -89,82 +125,46 @@ class _LvmFile:
                 entries[key] = cells
         return entries
 
-    def _segments(self) -> Iterator[_Segment]:
-        """Segments in order, their rows as numbers; without headings of their own all samples are one."""
-        segment: _Segment | None = None
-        blank = f"{self.separator} \t\r\n"
-        for line in self.lines:
-            first = line.partition(self.separator)[0].strip()
-            if first == "Channels":
-                if segment is not None:
-                    self._convert_rows(segment)
-                    yield segment
-                segment = _Segment(self._heading(), self._cells(next(self.lines, "")))
-            elif first == _X:
-                segment = segment or _Segment()
-                segment.names = self._cells(line)
-            elif segment is not None and line.strip(blank):
-                segment.rows.append(line)
-                if len(segment.rows) == _BLOCK:
-                    self._convert_rows(segment)
-        if segment is not None:
-            self._convert_rows(segment)
-            yield segment
-
-    def _convert_rows(self, segment: _Segment) -> None:
-        """Turn the rows that a segment holds as text into numbers; the column of comments is left out."""
+    def _table(self, names: Sequence[str]) -> FloatArray:
+        """Numbers (n, columns) of the table that begins here, NaN where blank; the column of comments is left out."""
         import pandas as pd
 
-        width = len(segment.names)
-        used = [i for i, name in enumerate(segment.names) if name and name != _COMMENT]
-        if not segment.rows:
-            segment.blocks.append(np.empty((0, width)))
-            return
-        # a blank comment at the end of every row may be left out altogether
-        first, *further = segment.rows
-        first += self.separator * max(0, width - 1 - first.count(self.separator))
-        text = io.StringIO("\n".join([first, *further]))
+        width = len(names)
+        used = [i for i, name in enumerate(names) if name and name != _COMMENT]
         try:
             frame = pd.read_csv(
-                text, sep=self.separator, decimal=self.decimal, header=None, names=range(width), usecols=used,
-                index_col=False, dtype=float, skip_blank_lines=False, quoting=3,
+                _Rows(self._rows(width)), sep=self.separator, decimal=self.decimal, header=None, names=range(width),
+                usecols=used, index_col=False, dtype=float, skip_blank_lines=False, quoting=3,
             )  # fmt: skip
+        except pd.errors.EmptyDataError:
+            return np.empty((0, width))
         except ValueError as error:
             fault = f"has text among its numbers ({error})"
             raise refuse(self.file, "", fault, "Export the run again") from error
         values = np.full((len(frame), width), np.nan)
         values[:, used] = frame.to_numpy(float)
-        segment.blocks.append(values)
-        segment.rows.clear()
+        return values
 
-    def _channels(self, segment: _Segment) -> Iterator[Series]:
-        values = np.concatenate(segment.blocks)
-        x: FloatArray | None = None
-        number = 0
-        for i, name in enumerate(segment.names):
-            if name == _X:
-                x = values[:, i] if np.isfinite(values[:, i]).any() else None
-            elif name and name != _COMMENT:
-                number += 1
-                if segment.entry("X_Dimension", number).lower() in ("time", ""):
-                    yield self._series(segment, number, name, values[:, i], x)
+    def _rows(self, width: int) -> Iterator[str]:
+        """Lines of a table up to the next heading, with all their cells: a blank comment at the end may be left out."""
+        blank = f"{self.separator} \t\r\n"
+        for line in self.lines:
+            if line.partition(self.separator)[0].strip() in (_CHANNELS, _X):
+                self.lines = itertools.chain([line], self.lines)
+                return
+            if line.strip(blank):
+                yield line + self.separator * max(0, width - 1 - line.count(self.separator)) + "\n"
 
-    def _series(self, segment: _Segment, number: int, name: str, values: FloatArray, x: FloatArray | None) -> Series:
-        """A channel; its group is date and time of day at which the segment began."""
 
-        def stated(key: str) -> float:
-            try:
-                return float(segment.entry(key, number).replace(self.decimal, "."))
-            except ValueError:
-                return float("nan")
+class _Rows(io.TextIOBase):
+    """Lines in place of a file: as text a table takes several times the memory of its numbers."""
 
-        count, step, start = stated("Samples"), stated("Delta_X"), stated("X0")
-        length = int(count) if 0 < count <= len(values) else len(values)
-        time = None if x is None else x[:length]
-        if step > 0:  # X as written is rounded
-            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
-        began = f"{segment.entry('Date', number)} {segment.entry('Time', number)}".strip()
-        return Series(name, segment.entry("Y_Unit_Label", number), values[:length], time, began)
+    def __init__(self, lines: Iterator[str]) -> None:
+        self._lines = lines
+
+    def read(self, size: int | None = -1) -> str:
+        """The next lines, however much is asked for."""
+        return "".join(itertools.islice(self._lines, _LINES))
 
 
 def _joined(parts: Sequence[Series]) -> Series:

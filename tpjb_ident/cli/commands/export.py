@@ -27,8 +27,6 @@ Source = Annotated[
 Force = Annotated[
     bool, typer.Option("--force", help="Also write points that are not to be trusted, marked; exit code 3 stays.")
 ]
-
-
 Ross = Annotated[int | None, typer.Option(metavar="2|3", help="Version of ROSS; default: the installed one, else 3.")]
 
 
@@ -50,6 +48,7 @@ def export(
     """Write coefficients as other programs read them.
 
     ROSS elements (TOML), tables (CSV, Parquet, Excel), a MATLAB file, or text over speed for XLTRC, Dyrobes and ANSYS.
+    With --units us the text is in lbf and in; tables stay SI, with one in US units beside them; ROSS takes SI alone.
     Where a form holds no intervals and flags, bearing_coefficients_intervals.csv beside it does. Points that are not
     to be trusted stay behind (exit code 3).
     """
@@ -61,7 +60,7 @@ def export(
         written = write_export(frame, to, folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
     c.print(str(written))
-    c.print(f"Results: {c.target}")
+    c.print(f"Results: {c.target}: {', '.join(written.files[:4])}{' ..' * (len(written.files) > 4)}")
     c.next("verify", c.target)
     if form.note:
         c.note(form.note)

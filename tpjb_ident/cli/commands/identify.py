@@ -51,7 +51,13 @@ Window = Annotated[str, typer.Option("--window", metavar="TIME", help="Window le
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
 #: What worker processes need, imported once for all of them.
-PRELOAD = ("tpjb_ident.dynamic.runs.run_jobs", "rigdata.readers.hdf5.reader", "rigdata.readers.text.csv", "h5py")
+PRELOAD = (
+    "tpjb_ident.dynamic.runs.run_jobs",
+    "rigdata.readers.hdf5.reader",
+    "rigdata.readers.file_reader",
+    "rigdata.readers.text.csv",
+    "h5py",
+)
 
 
 @command(f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm")

@@ -135,14 +135,13 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
     """Read all records of a folder; what is wrong with those that cannot be read."""
     from rigdata.problem import Problem
     from rigdata.survey.exports import read_exports, record_files
-    from rigdata.survey.update import renamed
 
     problems: list[Problem] = []
     exports: list[Export] = []
     with c.progress(f"looking at {folder.name}") as show:
         total = len(record_files(folder))
-        for export in read_exports(folder, problems):
-            exports.append(renamed(export, names) if names and export.nameless else export)
+        for export in read_exports(folder, problems, names):
+            exports.append(export)
             show(export.name, len(exports), total)
     if not exports:
         raise BadInputError("\n".join(str(p) for p in problems[:5]))

@@ -102,18 +102,11 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
     rows = []
     for run in campaign.runs[:MOST_RUNS]:
         p = run.point
-        pad = "" if run.pad is None else f"#{run.pad}"
+        pad = run.pad and f"#{run.pad}"
         place = [p.static_load or None, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or None]
-        rows.append([run.id, run.kind, *place, pad])
-    columns = [
-        *words("run", "kind"),
-        "load {load}",
-        "direction {angle}",
-        "speed {frequency}",
-        "exc. {frequency}",
-        "pad",
-    ]
-    c.show("runs", columns, rows)
+        rows.append([run.id, run.kind, *place, pad, p.rotation if p.shaft_speed else None])
+    quantities = ["load {load}", "direction {angle}", "speed {frequency}", "exc. {frequency}"]
+    c.show("runs", [*words("run", "kind"), *quantities, "pad", "rotation"], rows)
     if len(campaign.runs) > len(rows):
         c.print(f"... and {len(campaign.runs) - len(rows)} more runs")
 

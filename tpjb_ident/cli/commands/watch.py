@@ -11,11 +11,12 @@ import typer
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.options import BearingOption
 from tpjb_ident.cli.common.quantities import parse_amount
-from tpjb_ident.columns import Column, place_of
+from tpjb_ident.columns import Column, place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
+    from model.bearing import Bearing
     from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
@@ -57,7 +58,8 @@ def watch(
     """
     pause, patience = _amount(every, "time", "--every", "2 s"), _amount(settle, "time", "--settle", "5 s")
     width = None if within is None else _amount(within, "ratio", "--within", "3 %")
-    watcher = _open_watcher(c, folder, bearing, patience, width)
+    watcher, drawing = _open_watcher(c, folder, bearing, patience, width)
+    c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
     c.print(f"Watching {folder}; the page: {c.target / 'watch.html'}")
     latest: Snapshot | None = None
@@ -69,7 +71,7 @@ def watch(
             if snapshot is not None:
                 printed = _show_news(c, snapshot, printed)
                 try:
-                    _write_results(c, snapshot, 0 if once else max(2, round(pause)))
+                    _write_results(c, snapshot, drawing, 0 if once else max(2, round(pause)))
                 except (BadInputError, OSError) as error:
                     if latest is None or once:
                         raise
@@ -83,7 +85,6 @@ def watch(
         c.print("Stopped. The same command goes on from here.")
         return
     c.print(f"Results: {c.target}")
-    c.next("check", folder)
     urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
@@ -91,8 +92,10 @@ def watch(
         raise NotTrustedError(f"{counted(len(runs), 'run')} to be repeated: {names}")
 
 
-def _open_watcher(c: Command, folder: Path, bearing: Path | None, settle: float, within: float | None) -> Watcher:
-    """Make the watcher of a campaign folder."""
+def _open_watcher(
+    c: Command, folder: Path, bearing: Path | None, settle: float, within: float | None
+) -> tuple[Watcher, Bearing | None]:
+    """Make the watcher of a campaign folder, and load the bearing."""
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that the logger writes to, with campaign.toml.")
     if not (folder / "campaign.toml").is_file():
@@ -108,28 +111,29 @@ def _open_watcher(c: Command, folder: Path, bearing: Path | None, settle: float,
 
     campaign = c.open(folder)
     angles: tuple[float, ...] = ()
-    clearance = None
+    drawing = clearance = None
     if bearing is not None or campaign.bearing_text:
         from model.bearing import BearingError
 
         try:
-            pads = c.bearing_of(campaign, bearing).pads
+            drawing = c.bearing_of(campaign, bearing)
         except BearingError as error:
             c.warn(f"{error} Until then pivots and clearance wait.")
         else:
-            angles = tuple(pad.pivot_angle for pad in pads)
-            clearance = min(pad.assembled_clearance for pad in pads)
+            angles = tuple(pad.pivot_angle for pad in drawing.pads)
+            clearance = min(pad.assembled_clearance for pad in drawing.pads)
     settings = IdentifySettings(clearance=clearance, keep_weights=False)
-    return Watcher(folder, NewFiles(settle), Measuring(settings, angles, RunStore(c.target / KEPT)), within)
+    return Watcher(folder, NewFiles(settle), Measuring(settings, angles, RunStore(c.target / KEPT)), within), drawing
 
 
-def _write_results(c: Command, snapshot: Snapshot, refresh: int) -> None:
+def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refresh: int) -> None:
     """Write page, state and coefficients into the output folder, all of them or none."""
     from tpjb_ident.report.watch_page import write_watch_page
 
     c.inputs = dict(snapshot.hashes)
     with c.results() as staging:
-        write_watch_page(staging, snapshot, refresh, {name: str(value) for name, value in c.options.items()})
+        settings = {name: str(value) for name, value in c.options.items()}
+        write_watch_page(staging, snapshot, refresh, settings, c.following, drawing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
         c.json("watch.json", _state_document(snapshot))
@@ -187,16 +191,14 @@ def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> st
     point = next((p for p in snapshot.measured.points if status.run.id in p.runs), None)
     if point is None or not with_result:
         return line
-    from tpjb_ident.rounding import with_interval
     from tpjb_ident.watch.next_steps import lacking
 
     records = counted(point.n_records, "record")
     line += f"; {place_of(point.point.static_load, point.point.excitation_hz)}, {records}: "
     if reason := lacking(point):
         return line + reason
-    half, v = point.stiffness.half_width(), point.stiffness.vector
-    kxx, kyy = (with_interval(v[i], v[i] - half[i], v[i] + half[i], 1e6) for i in (0, 3))
-    return f"{line}kxx {kxx}, kyy {kyy} MN/m"
+    cells = point.stiffness.cells()
+    return f"{line}kxx {cells[0]}, kyy {cells[3]} {symbol('stiffness')}"
 
 
 def _amount(text: str, dimension: str, option: str, example: str) -> float:

@@ -27,12 +27,12 @@ import typer
 
 from rigdata.problem import RigError
 from tpjb_ident.cli.common.terminal import Terminal
-from tpjb_ident.columns import SYSTEMS, UNITS, use_units
+from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.documents import TABLE_SCHEMA
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import sha256, versions
-from tpjb_ident.runtime.tables import safe_for_spreadsheets, write_table, write_text
+from tpjb_ident.runtime.tables import write_csv, write_table, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,10 +141,10 @@ class Command(Terminal):
     def table(self, name: str, frame: pd.DataFrame) -> None:
         """Write a table of the results as CSV and Parquet."""
         write_table(self.folder, name, frame)
-        if SYSTEMS["us"] == UNITS:
+        if in_us_units():
             from tpjb_ident.us_table import us_table
 
-            write_text(self.folder / f"{name}_us.csv", safe_for_spreadsheets(us_table(frame)).to_csv(index=False))
+            write_csv(self.folder / f"{name}_us.csv", us_table(frame))
 
     def json(self, name: str, document: Mapping[str, Any]) -> None:
         """Write a JSON file of the results."""

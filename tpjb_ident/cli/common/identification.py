@@ -12,8 +12,11 @@ from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rigdata.arrays import FloatArray
     from rigdata.campaign import Campaign
+    from tpjb_ident.dynamic.results.frequency_model import FrequencyModel
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -35,7 +38,8 @@ def with_half(value: float, half: float) -> str:
 
 
 _LOAD = Column("load {load}")
-_POINT: tuple[Column | str, ...] = (_LOAD, "dir. {angle}", "speed {speed}", "exc. {frequency}")
+_SPEED = Column("speed {speed}", lambda speed, spin: f"{speed:g}{' cw' if spin < 0.0 else ''}")
+_POINT: tuple[Column | str, ...] = (_LOAD, "dir. {angle}", _SPEED, "exc. {frequency}")
 #: Entries of (kxx, kxy, kyx, kyy, cxx, .. cyy).
 _DIRECT, _CROSS = (0, 3, 4, 7), (1, 2, 5, 6)
 _COEFFICIENTS = [
@@ -44,6 +48,7 @@ _COEFFICIENTS = [
 ]
 _MASSES = [Column(f"m{entry} {{mass}}", with_half) for entry in ("xx", "yy")]
 _MODEL, _VERDICT = words("model", "verdict")
+_MODEL_TABLE = [_LOAD, _MODEL, *(_COEFFICIENTS[i] for i in _DIRECT), *_MASSES, _VERDICT]
 
 
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
@@ -155,7 +160,8 @@ def _show_coefficients(c: Command, result: Identification, letters: dict[str, st
         halves = p.stiffness.half_width() / np.repeat([1.0, p.stiffness.omega], 4)
         cells = list(zip(values, halves, strict=True))
         point = p.point
-        place = (point.static_load, point.static_load_direction_deg, point.shaft_speed_hz, point.excitation_hz)
+        speed = point.shaft_speed_hz, point.spin
+        place = point.static_load, point.static_load_direction_deg, speed, point.excitation_hz
         flags = "".join(letters[str(q)] for q in p.quality)
         direct.append([*place, *(cells[i] for i in _DIRECT), p.outlier_fraction, flags])
         if cross_coupling_matters(values, halves):
@@ -186,23 +192,28 @@ def _show_frequency_fits(c: Command, result: Identification) -> None:
         load = group.points[0].point.static_load
         if group.supported not in group.fits:
             rejecting.append(f"{load / size('load'):.6g}")
-        for name, fit in group.fits.items():
-            verdict = _verdict(name == group.supported, fit.refused)
-            rows.append([load, name, fit.chi_square, fit.dof, fit.probability, fit.misfit, verdict])
+        rows += _model_rows(load, group.fits, group.supported)
     if rows:
-        figures = [Column("chi-square", ".1f"), Column("dof", ".0f"), Column("probability", ".2g")]
-        columns = [_LOAD, _MODEL, *figures, Column("misfit {share}", ".1f"), _VERDICT]
-        c.show("over frequency", columns, rows, file="frequency_fits.csv")
-    if rejecting:
-        more = f" and {len(rejecting) - 6} more loads" if len(rejecting) > 6 else ""
-        c.print(
-            f"note: at {', '.join(rejecting[:6])} {symbol('load')}{more} the data refuse K-C and K-C-M; use the "
-            "coefficients of each excitation frequency"
-        )
+        c.show("models over frequency, 95 % intervals", _MODEL_TABLE, rows, file="frequency_fits.csv")
+    _print_rejecting(c, rejecting, "the coefficients of each excitation frequency")
 
 
-def _verdict(supported: bool, refused: bool) -> str:
-    return "supported" if supported else "refused" if refused else "not needed"
+def _print_rejecting(c: Command, loads: list[str], instead: str) -> None:
+    """Say at which loads no model over frequency holds, and what to use."""
+    if loads:
+        more = f" and {len(loads) - 6} more loads" if len(loads) > 6 else ""
+        at = f"{', '.join(loads[:6])} {symbol('load')}{more}"
+        c.print(f"note: at {at} the data refuse K-C and K-C-M; use {instead}")
+
+
+def _model_rows(load: float, models: Mapping[str, FrequencyModel], supported: str) -> list[list[object]]:
+    """Direct coefficients of every model of one static point, with what the data say of it."""
+    rows: list[list[object]] = []
+    for name, model in models.items():
+        pairs = [*zip(model.parameters, model.half_width(), strict=False), *4 * [None]]
+        verdict = "supported" if name == supported else "refused" if model.refused else "not needed"
+        rows.append([load, name, *(pairs[i] for i in (*_DIRECT, 8, 11)), verdict])
+    return rows
 
 
 def _show_bands(c: Command, result: Identification) -> None:
@@ -213,10 +224,7 @@ def _show_bands(c: Command, result: Identification) -> None:
     models, lines, rejecting = [], [], []
     for band in result.bands:
         load = band.point.static_load
-        for name, model in band.models.items():
-            pairs = [*zip(model.parameters, model.half_width(), strict=False), *4 * [None]]
-            cells = [pairs[i] for i in (*_DIRECT, 8, 11)]
-            models.append([load, name, *cells, _verdict(name == band.supported, model.refused)])
+        models += _model_rows(load, band.models, band.supported)
         if band.models and band.supported == "raw H":
             rejecting.append(f"{load / size('load'):.6g}")
         half = band.half_width()
@@ -226,16 +234,11 @@ def _show_bands(c: Command, result: Identification) -> None:
             cells = [(line.stiffness.vector[i], half[k, i]) for i in _DIRECT]
             lines.append([load, band.kind, line.frequency, *cells, min(line.coherence), line.method])
     if models:
-        columns = [_LOAD, _MODEL, *(_COEFFICIENTS[i] for i in _DIRECT), *_MASSES, _VERDICT]
-        c.show("models over the band, 95 % intervals", columns, models, file="frf_models.csv")
+        c.show("models over the band, 95 % intervals", _MODEL_TABLE, models, file="frf_models.csv")
     if lines:
         entries = ("Re hxx", "Re hyy", "Im hxx", "Im hyy")
         parts = [Column(entry, with_half, quantity="stiffness") for entry in entries]
         excitation, method = words("excitation", "method")
         columns = [_LOAD, excitation, Column("{frequency}", ".4g"), *parts, Column("coh.", ".3f"), method]
         c.show(f"dynamic stiffness over the band, {UNITS['stiffness'][0]}", columns, lines, file="frf.csv")
-    if rejecting:
-        c.print(
-            f"note: at {', '.join(rejecting[:6])} {symbol('load')} the lines refuse K-C and K-C-M; "
-            "use h over frequency (frf.csv)"
-        )
+    _print_rejecting(c, rejecting, "h over frequency (frf.csv)")

@@ -16,15 +16,15 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from rigdata.arrays import FloatArray
-
-#: Scales, factor 1.4 apart: programs that solve the same equations differ by 0.1, a floor and no finding.
-_SCALES: FloatArray = np.asarray(0.1 * 1.4 ** np.arange(17), float)
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 
 
 class ErrorModel:
     """S + s^2 M at every scale, decomposed once: its inverse is B' diag(shrink^2) B."""
 
-    def __init__(self, noise: FloatArray, model: FloatArray, scales: FloatArray = _SCALES) -> None:
+    def __init__(self, noise: FloatArray, model: FloatArray, at: FloatArray | None = None) -> None:
+        lowest, step, count = Deciding.scales
+        scales = np.asarray(lowest * step ** np.arange(count) if at is None else at, dtype=float)
         self.noise, self.model, self.scales = noise, model, scales
         weights = np.log(scales / (1.0 + scales**2))
         self.log_weights: FloatArray = weights - logsumexp(weights)  #: (scales,)

@@ -3,35 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance
 
-#: No tolerance goes beyond this, in stated deviations.
-REACH = 30.0
-
-
-@dataclass(frozen=True)
-class OwnNumber:
-    """How the size of a tolerance reads as the parameter of an effect, and back; both act alike."""
-
-    parameter: Callable[[float], float]
-    change: Callable[[float], float]
-
-
-_SAME = OwnNumber(lambda change: change, lambda value: value)
-_RATIO = OwnNumber(math.exp, lambda value: math.log(max(value, 1e-9)))
-_LOST = OwnNumber(lambda change: 1.0 - math.exp(change), lambda value: math.log(max(1.0 - value, 1e-9)))
-#: Effects that are a tolerance's own number: that tolerance has the wide prior then, and no twin beside it.
-_OWN_NUMBERS = {
-    "oil_viscosity": _RATIO, "viscosity_law": _RATIO, "supply_temperature": _SAME, "preload_error": _SAME,
-    "heat_loss": _LOST, "pad_offset": _SAME, "soft_pivot": _RATIO,
-}  # fmt: skip
 #: Pads that are all uneven are tolerances, one by one.
 _TOLERANCES_ALREADY = frozenset({"uneven_pads"})
 
@@ -71,7 +51,7 @@ class Fault:
         if self.own < 0:
             return self.candidate.values(amplitudes)
         parameter = self.candidate.free[0]
-        value = _OWN_NUMBERS[self.name].parameter(float(amplitudes[0]) * self.sigma)
+        value = OWN_NUMBERS[self.name].parameter(float(amplitudes[0]) * self.sigma)
         return {parameter.name: min(max(value, parameter.low), parameter.high), **self.candidate.fixed}
 
 
@@ -81,9 +61,8 @@ def faults_of(pool: Sequence[Candidate], nuisances: Sequence[Nuisance]) -> tuple
     for candidate in pool:
         if candidate.name in _TOLERANCES_ALREADY:
             continue
-        names = {candidate.name, candidate.label}
-        own = [i for i, nuisance in enumerate(nuisances) if names & nuisance.aliases]
-        if candidate.name in _OWN_NUMBERS and own:
+        own = [i for i, nuisance in enumerate(nuisances) if nuisance.effect == candidate.label]
+        if own:
             out.append(_on_tolerance(candidate, own[0], nuisances[own[0]]))
         else:
             label = candidate.name if "direction" in candidate.fixed else candidate.label
@@ -93,7 +72,7 @@ def faults_of(pool: Sequence[Candidate], nuisances: Sequence[Nuisance]) -> tuple
 
 def _on_tolerance(candidate: Candidate, index: int, nuisance: Nuisance) -> Fault:
     """The wide prior reaches where the effect's three typical sizes do; bounds are those that the effect has."""
-    number, parameter = _OWN_NUMBERS[candidate.name], candidate.free[0]
+    number, parameter = OWN_NUMBERS[candidate.name], candidate.free[0]
     ends = [number.change(parameter.from_linear(candidate.neutral + s * candidate.width[0])) for s in (-1.0, 1.0)]
     inside = [abs(end) for end in ends if end > -10.0]
     width = np.array([min(inside) / nuisance.sigma])

@@ -15,16 +15,15 @@ from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.problem import Problem
 from tpjb_ident.diagnosis.comparison.scores import Strain
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.workers import Map
 
 #: Steps on one set of derivatives, which every step corrects.
 _STEPS = 4
-#: Stated deviations of a tolerance while a coarse start passes the jumps of pads that empty.
-HELD = 0.2
+#: Parts of a step or of a start that are tried.
+_SHARES = (1.0, 0.4, 0.1)
 #: Share of its deviation within which a number has arrived.
 _ARRIVED = 0.1
-#: Of a tolerance of which the data say less than this share of its variance nothing is asked.
-_SILENT = 0.05
 #: Scatters whose mean is a tolerance of the whole bearing, with that tolerance where there is one.
 _MEANS = {"clearance_scatter": "assembled_clearance", "pivot_stiffness_scatter": ""}
 
@@ -129,7 +128,7 @@ class Fit:
         count = self.unknowns.amplitudes
         stated = np.sum(rows**2, axis=1)
         heard = stated - np.sum((rows @ self.posterior.covariance[count:, count:]) * rows, axis=1)
-        asked = heard > _SILENT * stated
+        asked = heard > Deciding.silent * stated
         whole = np.column_stack([np.zeros((len(rows), count)), rows])
         return Strain(whole[asked], np.sqrt(heard[asked]))
 
@@ -150,7 +149,7 @@ class Deviation:
     @property
     def significance(self) -> float:
         """A posterior mean of something with prior variance 1 and posterior variance v scatters with 1 - v."""
-        return self.size / float(np.sqrt(self.heard)) if self.heard > _SILENT else 0.0
+        return self.size / float(np.sqrt(self.heard)) if self.heard > Deciding.silent else 0.0
 
 
 def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], FloatArray]:
@@ -184,14 +183,17 @@ class Start:
 def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    theta = np.clip(start.theta, unknowns.low, unknowns.high)
-    (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
-    if predicted is None:
+    for share in _SHARES:  # nearer to what is stated, where there is no equilibrium
+        theta = share * np.clip(start.theta, unknowns.low, unknowns.high)
+        (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
+        if predicted is not None:
+            break
+    else:
         return None
     point = Point(theta, predicted, start.jacobian)
     if start.coarse:
         held = unknowns.width.copy()
-        held[unknowns.amplitudes :] = HELD
+        held[unknowns.amplitudes :] = Deciding.held
         coarse = problem.errors.coarse
         point = _renewed(run, problem, unknowns, point)  # those from before the jump say nothing behind it
         point = _stepped(run, problem, unknowns, point, coarse, held)
@@ -250,7 +252,7 @@ def _step(
 ) -> Point | None:  # fmt: skip
     """A step towards a target, shorter where it does not pay, with derivatives corrected by what it showed."""
     most = cost(point.theta, point.prediction)
-    for share in (1.0, 0.4, 0.1):
+    for share in _SHARES:
         theta = point.theta + share * (target - point.theta)
         (new,) = tuple(run(prediction, [(unknowns.faults, theta)]))
         if new is not None and cost(theta, new) < most:

@@ -10,14 +10,12 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.comparison.faults import Fault, faults_of
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.nuisance import Nuisance
 from tpjb_ident.diagnosis.observations.folds import held_out
 from tpjb_ident.diagnosis.observations.model_error import model_error
 from tpjb_ident.diagnosis.observations.observe import Observations, Tolerance
-
-#: Share of the static load below which a pad hardly carries: its attitude, and so its temperature, is not unique.
-_HARDLY = 0.10
 
 
 @dataclass(frozen=True)
@@ -63,6 +61,6 @@ class Problem:
 
 def loosened(observations: Observations, shares: FloatArray, tolerance: Tolerance) -> Observations:
     """Trust no temperature of a pad that hardly carries in the baseline; `shares` (n,)."""
-    idle = np.nan_to_num(shares, nan=1.0) < _HARDLY
+    idle = np.nan_to_num(shares, nan=1.0) < Deciding.idle
     noise = np.where(idle, tolerance.idle_temperature, 0.0)
     return replace(observations, covariance=observations.covariance + np.diag(noise**2))

@@ -17,24 +17,17 @@ from scipy.special import logsumexp
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.fit import HELD, Fit, Start, fitted, refined
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
 
 Progress = Callable[[str, float], None]
-#: Faults of an explanation at the most.
-_MOST_FAULTS = 3
-#: Nats that a fit rises above its score at the most, and so may its rivals: derivatives from elsewhere mistake that.
-_MISTAKEN = 25.0
-#: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.
-_SUSPECT, _COARSE = 0.4, 5
 #: Nats that put a coarse start before all others.
 _FIRST = 1e6
-#: Nats behind the leader within which a fit gets derivatives of its own.
-_WORTH_DERIVATIVES = 15.0
 
 
 @dataclass(frozen=True)
@@ -79,11 +72,11 @@ class Comparison:
 
     def probability(self, wanted: Fit) -> float:
         """Probability of a fit."""
-        return next(p for fit, p in zip(self.fits, self.probabilities, strict=True) if fit is wanted)
+        return self.probabilities[self.fits.index(wanted)]
 
     def is_tenable(self, wanted: Fit) -> bool:
         """Whether no tolerance and no bound speaks against a fit."""
-        return next(t for fit, t in zip(self.fits, self.tenable, strict=True) if fit is wanted)
+        return self.tenable[self.fits.index(wanted)]
 
 
 def compare(run: Map, problem: Problem, settings: DiagnoseSettings, progress: Progress | None = None) -> Comparison:
@@ -100,7 +93,7 @@ class _Search:
         self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Proposal] = {}
         self.paths: tuple[Path, ...] = ()
-        self.places: Counter[str] = Counter({name: len(labels) for name, labels in _labels(problem.faults).items()})
+        self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
@@ -131,7 +124,8 @@ class _Search:
         total = self._log_probability(leader)
         if leader.labels < proposal.labels or (leader.labels & proposal.labels and not plain):
             return proposal.estimate > total + math.log(1.0 - self.settings.included)
-        rise = _MISTAKEN if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, _MISTAKEN))
+        mistaken = self.settings.mistaken
+        rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         return proposal.estimate > total - self.settings.near - rise
 
     def _fit(self, proposal: Proposal) -> None:
@@ -140,16 +134,17 @@ class _Search:
             return
         leader = self._leader()
         right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
-        if self._near(fit, _WORTH_DERIVATIVES if right else 0.0):
+        # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
+        if self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
             again = refined(self.run, fit)
             fit = again if again.posterior.total > fit.posterior.total - 1.0 else fit
         self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
-        if fit.faults and self._near(fit, self.settings.near):
+        if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
 
-    def _near(self, fit: Fit, nats: float) -> bool:
+    def _near(self, fit: Fit, total: float, nats: float) -> bool:
         leader = self._leader()
-        return leader is None or self._log_probability(fit) > self._log_probability(leader) - nats
+        return leader is None or total + self._log_prior(fit.faults) > self._log_probability(leader) - nats
 
     def _leader(self) -> Fit | None:
         """The most probable tenable fit so far."""
@@ -176,19 +171,24 @@ class _Search:
         self.paths = lay_paths(self.run, problem)
         strain = self.fits[frozenset()].strain
         first = scores(problem.errors, linear, self.paths, strain)
+        suspect = self.settings.suspect
         rows = {id(score.path): score.amplitudes[0] for score in first}
         self.paths = lengthened(self.run, problem, self.paths, [float(rows[id(path)]) for path in self.paths])
         singles = scores(problem.errors, linear, self.paths, strain)
+        for end in (-1.0, 1.0) if singles and singles[0].scale > suspect else ():  # a jump hides what lies behind it
+            ends = [end * float(path.fault.width[0]) for path in self.paths]
+            self.paths = lengthened(self.run, problem, self.paths, ends)
+            singles = scores(problem.errors, linear, self.paths, strain)
         for score in singles:
             self._propose(score, (), nothing, columns)
-        if singles and singles[0].scale > _SUSPECT:
-            held = Linear(linear.residual, nothing, columns, np.full(len(nothing), HELD))
-            for score in scores(problem.errors.coarse, held, self.paths, strain)[:_COARSE]:
+        if singles and singles[0].scale > suspect:
+            held = Linear(linear.residual, nothing, columns, np.full(len(nothing), self.settings.held))
+            for score in scores(problem.errors.coarse, held, self.paths, strain)[: self.settings.coarse]:
                 self._propose(score, (), nothing, columns, coarse=True)
 
     def _propose_neighbours(self, fit: Fit) -> None:
         """One fault more, and one less."""
-        if len(fit.faults) < _MOST_FAULTS:
+        if len(fit.faults) < len(self.settings.prior) - 1:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
                 self._propose(score, fit.faults, fit.point.theta, fit.point.jacobian)
@@ -223,11 +223,11 @@ class _Search:
         columns = np.zeros((len(jacobian), len(start)))
         slopes = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
         columns[:, : slopes.shape[1]] = slopes
-        first = sum(len(f.width) for f in faults[:-1])
+        before = Unknowns(self.problem, faults[:-1])
+        first = before.amplitudes
         rest, kept = theta[first:], jacobian[:, first:]
         if fault.own >= 0:
-            taken = {f.own for f in faults[:-1]}
-            index = sum(i not in taken for i in range(fault.own))
+            index = before.tolerances.index(fault.own)
             start[0] += rest[index]
             rest, kept = np.delete(rest, index), np.delete(kept, index, axis=1)
         self.proposals[labels] = Proposal(
@@ -244,17 +244,13 @@ class _Search:
         point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
         theta, jacobian = np.delete(point.theta, at), np.delete(point.jacobian, at, axis=1)
         gone = point.jacobian[:, at] @ point.theta[at]
+        unknowns = Unknowns(self.problem, remaining)
         if fault.own >= 0:
-            taken = {f.own for f in remaining}
-            first = sum(len(f.width) for f in remaining)
-            index = first + sum(i not in taken for i in range(fault.own))
+            index = unknowns.amplitudes + unknowns.tolerances.index(fault.own)
             theta = np.insert(theta, index, 0.0)
             jacobian = np.insert(jacobian, index, point.jacobian[:, at.start], axis=1)
-        width = np.concatenate(
-            [*(f.width for f in remaining), np.ones(len(theta) - sum(len(f.width) for f in remaining))]
-        )
         residual = self.problem.measured - point.prediction + gone
-        total = posterior(self.problem.errors, Linear(residual, theta, jacobian, width)).total
+        total = posterior(self.problem.errors, Linear(residual, theta, jacobian, unknowns.width)).promised
         estimate = total + self._log_prior(remaining)
         if labels not in self.proposals or self.proposals[labels].estimate < estimate:
             self.proposals[labels] = Proposal(remaining, theta, jacobian, estimate=estimate)
@@ -275,10 +271,3 @@ class _Search:
 
 def _tenable(fit: Fit, settings: DiagnoseSettings) -> bool:
     return fit.p >= settings.untenable and not fit.on_bound
-
-
-def _labels(faults: Sequence[Fault]) -> dict[str, set[str]]:
-    out: dict[str, set[str]] = {}
-    for fault in faults:
-        out.setdefault(fault.name, set()).add(fault.label)
-    return out

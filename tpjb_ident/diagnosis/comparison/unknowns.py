@@ -13,8 +13,9 @@ import numpy as np
 
 from model.effects import Effect
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.comparison.faults import REACH, Fault
+from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.errors import TpjbError
@@ -33,8 +34,8 @@ class Unknowns:
         count = len(self.tolerances)
         self.origin = np.concatenate([*(fault.origin for fault in faults), np.zeros(count)])
         self.width = np.concatenate([*(fault.width for fault in faults), np.ones(count)])
-        self.low = np.concatenate([*(fault.low for fault in faults), np.full(count, -REACH)]) - self.origin
-        self.high = np.concatenate([*(fault.high for fault in faults), np.full(count, REACH)]) - self.origin
+        self.low = np.concatenate([*(fault.low for fault in faults), np.full(count, -Deciding.reach)]) - self.origin
+        self.high = np.concatenate([*(fault.high for fault in faults), np.full(count, Deciding.reach)]) - self.origin
         self.amplitudes = len(self.width) - count
 
     @property

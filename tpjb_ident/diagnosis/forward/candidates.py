@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -12,12 +11,7 @@ from model.bearing import Bearing
 from model.effects import Effect, Parameter, known_effects
 from model.effects.kind import EffectKind
 from rigdata.arrays import FloatArray
-
-#: Standard deviation of the prior of an amplitude, in the library's typical sizes: three of them are no surprise in a
-#: bearing that has the fault at all.
-_PRIOR_WIDTH = 3.0
-#: The same of a direction that is refined beside its grid [rad]: about half a step of the grid.
-_DIRECTION_WIDTH = math.pi / 8
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 
 
 @dataclass(frozen=True)
@@ -53,9 +47,9 @@ class Candidate:
     @property
     def width(self) -> FloatArray:
         """Standard deviations of the prior, (k,)."""
-        width = _PRIOR_WIDTH * self.steps
+        width = Deciding.width * self.steps
         if not self.basis:
-            width[[p.name in self.about for p in self.free]] = _DIRECTION_WIDTH
+            width[[p.name in self.about for p in self.free]] = Deciding.turn
         return width
 
     @property

@@ -11,7 +11,6 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,24 @@ _STEP = 0.3
 
 
 @dataclass(frozen=True)
+class OwnNumber:
+    """How the size of a tolerance reads as the parameter of an effect, and back."""
+
+    parameter: Callable[[float], float]
+    change: Callable[[float], float]
+
+
+_SAME = OwnNumber(lambda change: change, lambda value: value)
+_RATIO = OwnNumber(math.exp, lambda value: math.log(max(value, 1e-9)))
+_LOST = OwnNumber(lambda change: 1.0 - math.exp(change), lambda value: math.log(max(1.0 - value, 1e-9)))
+#: Effects that are a tolerance's own number: that tolerance has the wide prior then, and no twin beside it.
+OWN_NUMBERS = {
+    "oil_viscosity": _RATIO, "viscosity_law": _RATIO, "supply_temperature": _SAME, "preload_error": _SAME,
+    "heat_loss": _LOST, "pad_offset": _SAME, "soft_pivot": _RATIO,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Nuisance:
     """One thing that may be off."""
 
@@ -39,7 +56,7 @@ class Nuisance:
     change: Callable[[Setup, float], Setup] | None = None
     #: (n,): change of the observation vector per `sigma`
     column: FloatArray | None = field(default=None, repr=False, compare=False)
-    aliases: frozenset[str] = frozenset()
+    effect: str = ""  #: label of the effect whose own number it is
 
 
 @dataclass(frozen=True)
@@ -71,48 +88,33 @@ def nuisances(
     elements: Sequence[Element], setup: Setup, tolerances: Tolerances, by_pad: bool = True
 ) -> tuple[Nuisance, ...]:
     """List what may be off for an observation vector."""
-    pads = range(1, len(setup.bearing.pads) + 1) if by_pad else ()
+    own = functools.partial(_own, tolerances)
+    clearance = tolerances["assembled_clearance"]
     listed = [
-        _whole("viscosity", "1", _viscosity, tolerances, "oil_viscosity"),
-        _whole("viscosity_exponent", "1", _exponent, tolerances, "viscosity_law"),
-        _whole("supply_temperature", "K", _supply, tolerances, "supply_temperature"),
-        _whole("assembled_clearance", "m", _assembled, tolerances),
-        _whole("pad_clearance", "m", _pad_clearance, tolerances, "preload_error"),
-        _whole("film_heat", "1", _film_heat, tolerances, "heat_loss"),
+        own("viscosity", "1", "oil_viscosity"),
+        own("viscosity_exponent", "1", "viscosity_law"),
+        own("supply_temperature", "K", "supply_temperature"),
+        Nuisance("assembled_clearance", clearance, "m", change=_assembled),
+        own("pad_clearance", "m", "preload_error"),
+        own("film_heat", "1", "heat_loss"),
     ]
-    for pad in pads:
-        offset = functools.partial(_offset, pad=pad)
-        scatter = tolerances["clearance_scatter"], "m", f"pad {pad}", offset
-        listed.append(
-            Nuisance("clearance_scatter", *scatter, aliases=frozenset({f"pad_offset pad {pad}", "uneven_pads"}))
-        )
-        softer = functools.partial(_softer, pad=pad)
-        alias = frozenset({f"soft_pivot pad {pad}"})
-        listed.append(
-            Nuisance(
-                "pivot_stiffness_scatter",
-                tolerances["pivot_stiffness_scatter"],
-                "1",
-                f"pad {pad}",
-                softer,
-                aliases=alias,
-            )
-        )
+    for pad in range(1, len(setup.bearing.pads) + 1) if by_pad else ():
+        listed.append(own("clearance_scatter", "m", "pad_offset", pad))
+        listed.append(own("pivot_stiffness_scatter", "1", "soft_pivot", pad))
     for i in range(2):
         gain = functools.partial(_probe, axes=tolerances.probe_axes, index=i)
-        listed.append(Nuisance("probe_gain", tolerances["probe_gain"], "1", f"probe {i + 1}", gain,
-                              aliases=frozenset({"probe_gain"})))  # fmt: skip
+        listed.append(Nuisance("probe_gain", tolerances["probe_gain"], "1", f"probe {i + 1}", gain))
         cell = functools.partial(_cell, index=i)
-        listed.append(Nuisance("cell_gain", tolerances.cell_gain.value, "1", f"cell {'xy'[i]}", cell,
-                              aliases=frozenset({"loadcell_gain"})))  # fmt: skip
+        listed.append(Nuisance("cell_gain", tolerances.cell_gain.value, "1", f"cell {'xy'[i]}", cell))
     listed += _readings(elements, tolerances)
     return tuple(nuisance for nuisance in listed if nuisance.sigma > 0.0)
 
 
-def _whole(
-    name: str, unit: str, change: Callable[[Setup, float], Setup], known: Tolerances, *aliases: str
-) -> Nuisance:  # fmt: skip
-    return Nuisance(name, known[name], unit, "", change, aliases=frozenset(aliases))
+def _own(known: Tolerances, name: str, unit: str, effect: str, pad: int = 0) -> Nuisance:
+    """A tolerance that an effect of the library says, of a pad or of the whole bearing."""
+    place = f"pad {pad}" if pad else ""
+    change = functools.partial(_changed, effect=effect, pad=pad)
+    return Nuisance(name, known[name], unit, place, change, effect=f"{effect} {place}".strip())
 
 
 def _readings(elements: Sequence[Element], tolerances: Tolerances) -> list[Nuisance]:
@@ -161,42 +163,15 @@ def predict(
     return forward(effects, shift if np.any(size) else None) + shift.readings
 
 
-def _viscosity(setup: Setup, change: float) -> Setup:
-    return _oil(setup, viscosity_40=setup.bearing.oil.viscosity_40 * math.exp(change))
-
-
-def _exponent(setup: Setup, change: float) -> Setup:
-    return _oil(setup, viscosity_exponent=setup.bearing.oil.viscosity_exponent * math.exp(change))
-
-
-def _film_heat(setup: Setup, change: float) -> Setup:
-    # all heat goes into the oil: less of it is more capacity
-    return _oil(setup, specific_heat=setup.bearing.oil.specific_heat * math.exp(-change))
-
-
-def _oil(setup: Setup, **values: Any) -> Setup:
-    oil = replace(setup.bearing.oil, **values)
-    return setup.change(bearing=replace(setup.bearing, oil=oil))
-
-
-def _supply(setup: Setup, change: float) -> Setup:
-    return setup.change(supply_change=setup.supply_change + change)
+def _changed(setup: Setup, change: float, effect: str, pad: int) -> Setup:
+    """Apply an effect of the size that a tolerance's change is."""
+    kind = kind_of(effect)
+    place = {"pad": pad} if pad else {}
+    return kind.apply(setup, **place, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(change)})
 
 
 def _assembled(setup: Setup, change: float) -> Setup:
     return setup.change_pads(lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + change))
-
-
-def _pad_clearance(setup: Setup, change: float) -> Setup:
-    return setup.change_pads(lambda k, p: replace(p, pad_clearance=p.pad_clearance + change))
-
-
-def _offset(setup: Setup, change: float, pad: int) -> Setup:
-    return kind_of("pad_offset").apply(setup, pad=pad, radial_offset=change)
-
-
-def _softer(setup: Setup, change: float, pad: int) -> Setup:
-    return kind_of("soft_pivot").apply(setup, pad=pad, stiffness_factor=math.exp(change))
 
 
 def _probe(setup: Setup, change: float, axes: tuple[float, float], index: int) -> Setup:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 from tpjb_ident.diagnosis.forward.forward import ForwardModel
 from tpjb_ident.runtime.executors import Workers, cores, local_workers, map_ordered
@@ -25,9 +24,6 @@ def _run(number: int, task: Callable[..., Any], *arguments: Any) -> Any:
     return task(forward.fresh(), problem, *arguments)
 
 
-Answer = TypeVar("Answer")
-
-
 @dataclass(frozen=True)
 class Map:
     """Maps a task over jobs, in this process or in workers."""
@@ -38,13 +34,6 @@ class Map:
     def __call__(self, task: Callable[..., Any], jobs: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
         """Yield ``task(forward, problem, argument, ..)`` for every job, in order."""
         return map_ordered(self.opened, _run, [(self.number, task, *arguments) for arguments in jobs])
-
-    def together(self, tasks: Sequence[Callable[[], Answer]]) -> list[Answer]:
-        """Do several things that each wait for workers now and then: while one waits, they work for another."""
-        if self.opened.count == 1 or len(tasks) < 2:
-            return [task() for task in tasks]
-        with ThreadPoolExecutor(len(tasks)) as threads:
-            return list(threads.map(lambda task: task(), tasks))
 
 
 @contextmanager

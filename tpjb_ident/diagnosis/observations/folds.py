@@ -12,12 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import BoolArray, IntArray
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
-
-#: Frequencies at one load from which each is a block of its own.
-_SWEEP = 4
-#: Sectors of neighbouring load directions that a locus is split into.
-_SECTORS = 5
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,7 @@ def folds(observations: Observations) -> tuple[Fold, ...]:
         else:
             name = f"{'dry test' if e.family == 'dry' else 'clearance'} of pad {e.place('pad'):.0f}"
         rows.setdefault(name, []).append(i)
-    far = unassigned | {"locus, sector 3"}
+    far = unassigned | {f"locus, sector {Deciding.sector}"}
     return tuple(Fold(name, np.array(members), name in far) for name, members in rows.items())
 
 
@@ -76,7 +72,7 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
             continue
         swept = lines.get(key, set())
         name = f"load {key[0]:.0f} N at {np.degrees(key[1]):.0f} deg"
-        if len(swept) >= _SWEEP:
+        if len(swept) >= Deciding.sweep:
             line = e.place("excitation")
             outer = line in (min(swept), max(swept))
             name += ", temperatures" if e.family == "temperature" else f", {line / (2 * np.pi):g} Hz"
@@ -90,7 +86,7 @@ def _dynamic_names(elements: tuple[Element, ...]) -> tuple[dict[int, str], set[s
 def _sectors(elements: tuple[Element, ...]) -> dict[int, int]:
     """Sector of neighbouring directions that every element of a locus lies in."""
     around = sorted({e.place("direction") % (2 * np.pi) for e in elements if e.family in {"locus", "load"}})
-    place = {angle: _SECTORS * k // len(around) + 1 for k, angle in enumerate(around)}
+    place = {angle: Deciding.sectors * k // len(around) + 1 for k, angle in enumerate(around)}
     return {
         i: place[e.place("direction") % (2 * np.pi)] for i, e in enumerate(elements) if e.family in {"locus", "load"}
     }

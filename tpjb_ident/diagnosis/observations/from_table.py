@@ -7,11 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from tpjb_ident.compare.coefficient_table import read_coefficients
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Element, Layout, Observations, Tolerance
-
-#: A small coefficient is read off the same axis as the large ones: its error is no smaller than that of a value of this
-#: share of the direct ones.
-_AXIS = 0.1
 
 
 def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
@@ -29,7 +26,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
             part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
             direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
             scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))
-            least = _AXIS * scale * (reading_error or 0.0)
+            least = Deciding.axis * scale * (reading_error or 0.0)
             for name, (value, error) in part_coefficients.items():
                 sigma = max(factor * error, least)
                 rows.append((Element("h", name, where), factor * value, sigma, tolerance.stiffness * scale))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -43,14 +43,9 @@ def gap(observations: Observations, prediction: FloatArray, chosen: BoolArray | 
     return float(np.sqrt(np.mean(z**2))) if len(z) else float("nan")
 
 
-def noise_square(observations: Observations) -> float:
-    """Square of the gap that measurement noise alone would leave under a perfect model."""
-    return float(np.mean(np.diag(observations.covariance) / observations.total_sigma**2))
-
-
-def noise_floor(observations: Observations) -> float:
-    """Gap that measurement noise alone would leave under a perfect model."""
-    return math.sqrt(noise_square(observations))
+def noise_floor(observations: Observations, chosen: BoolArray) -> float:
+    """Gap that measurement noise alone would leave under a perfect model; `chosen` (n,)."""
+    return math.sqrt(np.mean((np.diag(observations.covariance) / observations.total_sigma**2)[chosen]))
 
 
 def gap_by_observable(
@@ -69,6 +64,11 @@ def gap_by_observable(
             f"{key}_after": gap(observations, after, part),
         }
     return out
+
+
+def gap_at(gaps: Mapping[str, float], end: str) -> float:
+    """An observable's gap ``_before`` or ``_after``, whether held-out points show it or not."""
+    return next((float(v) for k, v in gaps.items() if k.endswith(end)), 0.0)
 
 
 def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:

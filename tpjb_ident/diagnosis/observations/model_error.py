@@ -12,15 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import coordinate
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
-
-#: Parts of the variance: the same at all points, smooth over the range that was measured, each point by itself (a
-#: tenth of the standard deviation: programs that solve the same equations differ like that).
-_CONSTANT, _SMOOTH, _ROUGH = 0.5, 0.49, 0.01
-#: Share of the stated tolerance that campaigns turn out to need, for what is planned before any is there: with models
-#: that solve the same equations 0.1 to 0.2, see `docs/diagnosis.md`.
-_USUAL = 0.2
 
 
 def model_error(observations: Observations) -> FloatArray:
@@ -47,8 +41,9 @@ def _correlation(elements: Sequence[Element]) -> FloatArray:
     distance += 1.0 - np.cos(angle[:, None] - angle[None, :])
     around = elements[0].family in {"locus", "load"}
     # the constant part of a locus is its centre, which is free
-    constant, smooth = (0.0, _CONSTANT + _SMOOTH) if around else (_CONSTANT, _SMOOTH)
-    return equal * (constant + smooth * np.exp(-distance)) + _ROUGH * np.eye(len(elements))
+    constant, smooth, rough = Deciding.parts
+    constant, smooth = (0.0, constant + smooth) if around else (constant, smooth)
+    return equal * (constant + smooth * np.exp(-distance)) + rough * np.eye(len(elements))
 
 
 def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
@@ -59,5 +54,5 @@ def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
     scale = observations.total_sigma
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)
-    total += _USUAL**2 * model_error(observations) + 1e-6 * np.diag(share**2)
+    total += Deciding.usual**2 * model_error(observations) + 1e-6 * np.diag(share**2)
     return np.asarray(scale[:, None] * np.linalg.cholesky(total))

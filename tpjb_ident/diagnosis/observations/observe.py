@@ -15,8 +15,10 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rigdata.arrays import FloatArray
+from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import pad_means
@@ -82,15 +84,6 @@ class Layout:
 
 
 ENTRY_NAMES = ("xx", "xy", "yx", "yy")
-#: Loads at which dry curves are compared, as shares of the range in which contact is complete.
-_DRY_SHARES = (0.15, 0.5, 0.95)
-#: Error of a dry curve at each load by itself, as a share of its standard error: no law is quite the pivot's own. From
-#: 110 simulated curves: with less, pads that all were given the same wrong law raise false alarms.
-_DRY_SHAPE = 0.7
-#: Standard error of a mean pad temperature [K]: sensors drift and self-heat far more than their noise.
-_TEMPERATURE_SE = 0.05
-#: What runs in other directions would differ by where only two were excited, as a share of the direct coefficients.
-UNSEEN_DIFFERENCE = 0.005
 
 
 @dataclass(frozen=True)
@@ -159,7 +152,7 @@ def observe(
     locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
     dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
-    layout = Layout(dynamic, locus_tests, tuple(d for d in dry), push)
+    layout = Layout(dynamic, locus_tests, dry, push)
     return Observations(
         layout, np.array(builder.value), block_diag(*builder.covariance), np.array(builder.sigma),
         tuple(builder.elements),
@@ -181,7 +174,7 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
         temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
         names = [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in temperature]
         if temperature:
-            noise = np.eye(len(names)) * _TEMPERATURE_SE**2
+            noise = np.eye(len(names)) * Deciding.temperature**2
             value = np.array(list(temperature.values()))
             builder.add(names, value, noise, tolerance.temperature)
         out.append(
@@ -205,7 +198,7 @@ def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
-        covariance = covariance + np.diag((UNSEEN_DIFFERENCE * scale) ** 2)
+        covariance = covariance + np.diag((Deciding.unseen * scale) ** 2)
     builder.add(elements, value, covariance, tolerance.stiffness * scale)
 
 
@@ -238,11 +231,11 @@ def _usable(curve: PivotCurve) -> bool:
 
 
 def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
-    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in _DRY_SHARES])
+    load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in Deciding.dry_shares])
     value = -np.log(np.asarray(curve.stiffness(load), float))
     elements = [Element("dry", "dry_compliance", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
     covariance = curve.relative_stiffness_covariance(load)
-    covariance = covariance + np.diag(_DRY_SHAPE**2 * np.diag(covariance))
+    covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
     builder.add(elements, value, covariance, tolerance.dry)
     used_loads = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in used_loads))
@@ -270,8 +263,8 @@ def moved_by_miss(locus: Locus, identification: Identification) -> list[FloatArr
     """Change of every position with the load's size and direction, (2, 2)."""
     out = []
     for p in locus.points:
-        along = np.array([math.cos(p.point.static_load_direction), math.sin(p.point.static_load_direction)])
-        more = along * p.point.static_load / _stiffness(identification, p.point.static_load)
+        load = p.point.static_load
+        more = load * directions(p.point.static_load_direction) / _stiffness(identification, load)
         out.append(np.column_stack([more, _turned(p, locus)]))
     return out
 

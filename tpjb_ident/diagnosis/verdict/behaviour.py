@@ -15,20 +15,13 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.fit import Fit
+from tpjb_ident.diagnosis.deciding.constants import Deciding
 
-#: A smaller principal value below this share of the larger one makes a term one of one direction.
-_ONE_WAY = 0.2
 #: What a pad by itself may be off by: kind, effect and parameter that say it, unit.
 _PADS = {
     "clearance_scatter": ("clearance by pad", "pad_offset", "radial_offset", "m"),
     "pivot_stiffness_scatter": ("pivot law of a pad", "soft_pivot", "stiffness_factor", "1"),
 }
-#: What an amplitude could change over, with the number of levels it takes to tell.
-OVER = (("static_load", "load", 3), ("shaft_speed", "speed", 2), ("excitation", "excitation", 4))
-#: Deviations from which a pad by itself is more than its tolerance: a chance of 1 in 370 each.
-_BEYOND = 3.0
-#: Relative change over the range below which an amplitude is the same for all practical ends.
-_SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -59,12 +52,12 @@ def behaviours(fit: Fit) -> tuple[Behaviour, ...]:
 
 
 def _pads(fit: Fit) -> list[Behaviour]:
-    """Pads whose clearance or pivot is off by more than `_BEYOND` standard deviations of what is stated."""
+    """Pads whose clearance or pivot is off by more than `visible` standard deviations of what is stated."""
     nuisances = {f"{n.name} {n.place}".strip(): n for n in fit.problem.nuisances}
     out = []
     for deviation in fit.tolerances:
         nuisance = nuisances.get(deviation.name)
-        if nuisance is None or nuisance.name not in _PADS or abs(deviation.significance) < _BEYOND:
+        if nuisance is None or nuisance.name not in _PADS or abs(deviation.significance) < Deciding.visible:
             continue
         pad, change = int(nuisance.place.split()[-1]), deviation.size * nuisance.sigma
         spread = math.sqrt(max(1.0 - deviation.heard, 0.0)) / abs(deviation.size)
@@ -95,7 +88,7 @@ def _described(name: str, form: str, matrix: FloatArray, spread: float, values: 
         direction = (angle + 90.0) % 180.0 - 90.0
         second = float(sizes[1 - first])
         how = f"in one direction, {direction:.0f} deg"
-        if abs(second) > _ONE_WAY * abs(size):
+        if abs(second) > Deciding.one_way * abs(size):
             how = f"unequal: {direction:.0f} deg and, {second / size:.2f} times as much, across"
     if name == "series_compliance":
         size = 1.0 / size if size else math.inf
@@ -128,7 +121,7 @@ def drifts(fit: Fit, notable: float) -> tuple[Drift, ...]:
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
         if fault.is_term:
             continue
-        rows = [_over(fit, fault, at.start, row) for row in OVER]
+        rows = [_over(fit, fault, at.start, row) for row in Deciding.over]
         best = max((row for row in rows if row is not None), key=lambda row: row[0], default=None)
         if best is not None and best[0] > notable:
             out.append(best[1])
@@ -160,7 +153,7 @@ def _over(fit: Fit, fault: Fault, index: int, row: tuple[str, str, int]) -> tupl
         for v in finite_values[:: len(finite_values) - 1]
     ]
     size = abs(ends[1] - ends[0]) / max(abs(ends[0]), abs(ends[1]), 1e-300)
-    if size < _SAME:
+    if size < Deciding.same:
         return None
     parameter = fault.candidate.free[0]
     words = _words(ends, finite_values, name)

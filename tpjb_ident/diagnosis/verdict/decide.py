@@ -18,6 +18,7 @@ from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.gap import gap, gap_by_observable, noise_floor
+from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
 from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
 from tpjb_ident.diagnosis.verdict.plausibility import plausible
@@ -25,8 +26,6 @@ from tpjb_ident.diagnosis.verdict.remainder import localise
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
-#: Scale of the model's error that a campaign usually needs, for what it could have seen.
-_USUAL = 0.1
 #: Explanations that are listed.
 _MOST_LISTED = 10
 
@@ -43,17 +42,15 @@ class Decision:
 def decide(run: Map, problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> Decision:
     """Turn a comparison into a verdict."""
     observations, held = problem.observations, problem.held
-    before = gap(observations, problem.base, held)
-    judgement = judge(run, comparison, before, settings)
+    judgement = judge(run, comparison, settings)
     effects = _effects(comparison, judgement) if judgement.has_effects else ()
     after = unseen = problem.base
     if effects and judgement.held.stated is not None:
         (exact,) = tuple(run(_exact, [(effects,)]))
         unseen = judgement.held.stated
         after = unseen if exact is None else exact
-    model = judgement.model
+    model = judgement.held.fit
     worst = localise(observations, free_prediction(model))
-    floor = noise_floor(observations)
     remaining = judgement.held.free
     heldout_after = gap(observations, unseen, held)
     verdict = Verdict(
@@ -69,14 +66,14 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
             "before": gap(observations, problem.base),
             "after": gap(observations, after),
             "heldout_numbers": 0 if held.all() else int(held.sum()),
-            "heldout_before": before,
+            "heldout_before": judgement.held.before,
             "heldout_after": heldout_after,
             "within_tolerances": remaining,
-            "closed": _closed(before, heldout_after, floor) if effects else math.nan,
-            "noise_floor": floor,
+            "closed": 1.0 - judgement.held.remaining(heldout_after) if effects else math.nan,
+            "noise_floor": noise_floor(observations, held),
         },
         remainder=Remainder(
-            remaining, 1.0 - max(_closed(before, remaining, floor), 0.0) if before > floor else 0.0,
+            remaining, min(judgement.held.remaining(remaining), 1.0),
             f"{worst[0].observable} at {worst[0].where}" if worst else "", model.p,
         ),
         behaves_like=() if judgement.name in {"consistent", "named"} else behaviours(model),
@@ -95,15 +92,9 @@ def _exact(forward: Forward, problem: Problem, effects: tuple[FoundEffect, ...])
         return None
 
 
-def _closed(before: float, after: float, floor: float) -> float:
-    """Share of the squared gap above noise that is closed."""
-    room = before**2 - floor**2
-    return 1.0 - max(after**2 - floor**2, 0.0) / room if room > 0.0 else math.nan
-
-
 def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect, ...]:
     """The effects of the model, the largest change of the prediction first."""
-    fit, shares = judgement.model, comparison.shares
+    fit, shares = judgement.held.fit, comparison.shares
     pads = sum(n.name == "clearance_scatter" for n in fit.problem.nuisances)
     rows = []
     for index, (fault, at) in enumerate(zip(fit.faults, fit.unknowns.slices, strict=True)):
@@ -151,13 +142,11 @@ def _term_parameters(fault: Fault, amplitudes: FloatArray, errors: FloatArray) -
 
 def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:
     """Effects that this campaign could not have seen at a typical size."""
-    columns = problem.scaled(problem.columns)
-    scale = int(np.argmin(np.abs(problem.errors.scales - _USUAL)))
-    factor = np.linalg.cholesky(problem.errors.covariance(scale) + columns @ columns.T)
+    factor = usual_factor(problem.observations, problem.columns)
     sizes: dict[str, float] = {}
     for path in comparison.paths:
         if not path.fault.is_term:
-            typical = path.neutral_slope @ (path.fault.width / 3.0)
+            typical = problem.sigma * (path.neutral_slope @ path.fault.width) / settings.width
             size = float(np.linalg.norm(np.linalg.solve(factor, typical)))
             sizes[path.fault.name] = max(sizes.get(path.fault.name, 0.0), size)
     names = comparison.best.names

@@ -11,7 +11,7 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.observations.gap import gap
+from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,17 @@ class HeldOut:
     def free(self) -> float:
         """Gap with tolerances where the other points put them."""
         return free_gap(self.fit)
+
+    @property
+    def before(self) -> float:
+        """Gap of the baseline as stated."""
+        return _gap(self.fit, self.fit.problem.base)
+
+    def remaining(self, after: float) -> float:
+        """Share of the baseline's squared gap above noise that a gap leaves; none where it leaves noise alone."""
+        floor = noise_floor(self.fit.problem.observations, self.fit.problem.held)
+        rest, room = (max(value**2 - floor**2, 0.0) for value in (after, self.before))
+        return rest / max(room, 1e-300)
 
 
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:

@@ -18,9 +18,7 @@ class Judgement:
     """What the rules say of a comparison."""
 
     name: VerdictName
-    model: Fit = field(repr=False)  #: what the verdict is about
-    held: HeldOut = field(repr=False)
-    before: float  #: held-out gap of the baseline as stated
+    held: HeldOut = field(repr=False)  #: the explanation that the verdict is about
     reasons: tuple[str, ...]
     family: tuple[str, ...] = ()
     drift: tuple[Drift, ...] = ()
@@ -31,22 +29,21 @@ class Judgement:
         return self.name in {"named", "ambiguous", "partly-explained"}
 
 
-def judge(run: Map, comparison: Comparison, before: float, settings: DiagnoseSettings) -> Judgement:
+def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judgement:
     """Apply the rules in their order."""
     nothing = comparison.nothing
     chance = comparison.probability(nothing)
-    if before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
-        return _without_effects(run, nothing, before, settings)
+    held = held_out_gap(run, nothing)
+    if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
+        return _without_effects(held, settings)
     sure = _sure(comparison, settings)
     model = _exactly(comparison, sure) or comparison.best
     held = held_out_gap(run, model)
-    judgement = _of_model(comparison, model, held, before, settings)
+    judgement = _of_model(comparison, model, held, settings)
     return replace(judgement, drift=drifts(model, settings.drifting)) if model.faults else judgement
 
 
-def _of_model(
-    comparison: Comparison, model: Fit, held: HeldOut, before: float, settings: DiagnoseSettings
-) -> Judgement:
+def _of_model(comparison: Comparison, model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     sure = _sure(comparison, settings)
     if model.posterior.scale > settings.right:
@@ -54,24 +51,24 @@ def _of_model(
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.1f} times the "
             f"stated one; right ones need {settings.right:g} at the most"
         )
-        return Judgement("unexplained", model, held, before, (reason,))
+        return Judgement("unexplained", held, (reason,))
     if not comparison.is_tenable(model):
-        return Judgement("unexplained", model, held, before, (_untenable(model),))
+        return Judgement("unexplained", held, (_untenable(model),))
     if model.names != sure:
-        return _look_alikes(model, held, before, _family(comparison, sure, settings))
-    return _named(model, held, before, settings)
+        return _look_alikes(model, held, _family(comparison, sure, settings))
+    return _named(model, held, settings)
 
 
-def _without_effects(run: Map, nothing: Fit, before: float, settings: DiagnoseSettings) -> Judgement:
-    held = held_out_gap(run, nothing)
-    if before <= settings.quiet or nothing.posterior.scale <= settings.right:
+def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
+    nothing = held.fit
+    if held.before <= settings.quiet or nothing.posterior.scale <= settings.right:
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
-        return Judgement("consistent", nothing, held, before, (reason,))
+        return Judgement("consistent", held, (reason,))
     reason = (
         f"something is the matter (a model error of {nothing.posterior.scale:.1f} times the stated one), and no effect "
         "of the library explains it"
     )
-    return Judgement("unexplained", nothing, held, before, (reason,))
+    return Judgement("unexplained", held, (reason,))
 
 
 def _sure(comparison: Comparison, settings: DiagnoseSettings) -> frozenset[str]:
@@ -80,8 +77,7 @@ def _sure(comparison: Comparison, settings: DiagnoseSettings) -> frozenset[str]:
 
 def _exactly(comparison: Comparison, names: frozenset[str]) -> Fit | None:
     """The most probable tenable fit with exactly these names."""
-    fits = [fit for fit in comparison.fits if names and fit.names == names and comparison.is_tenable(fit)]
-    return fits[0] if fits else None
+    return next((f for f in comparison.fits if names and f.names == names and comparison.is_tenable(f)), None)
 
 
 def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> tuple[str, ...]:
@@ -94,32 +90,32 @@ def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSett
     return ()
 
 
-def _look_alikes(model: Fit, held: HeldOut, before: float, family: tuple[str, ...]) -> Judgement:
+def _look_alikes(model: Fit, held: HeldOut, family: tuple[str, ...]) -> Judgement:
     if not family or model.has_terms:
         reason = "no effect, and no group of three, reaches the probability that a name takes"
-        return Judgement("unexplained", model, held, before, (reason,))
-    return Judgement("ambiguous", model, held, before, (_shrunk(held, before),), family)
+        return Judgement("unexplained", held, (reason,))
+    return Judgement("ambiguous", held, (_shrunk(held),), family)
 
 
-def _named(model: Fit, held: HeldOut, before: float, settings: DiagnoseSettings) -> Judgement:
+def _named(model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     """Named where exactly these effects halve the held-out gap and keep their size over the operating range."""
     if model.has_terms and all(fault.is_term for fault in model.faults):
         reason = "what describes it is a term that no effect of the library stands for"
-        return Judgement("unexplained", model, held, before, (reason,))
+        return Judgement("unexplained", held, (reason,))
     drift = drifts(model, settings.drifting)
-    if held.as_stated <= settings.halved * before and not (drift or model.has_terms):
-        return Judgement("named", model, held, before, (_shrunk(held, before),))
-    reason = f"{_shrunk(held, before)}, more than the half of it that a name leaves at the most"
+    if held.remaining(held.as_stated) <= settings.halved**2 and not (drift or model.has_terms):
+        return Judgement("named", held, (_shrunk(held),))
+    reason = f"{_shrunk(held)}, more than the half above noise that a name leaves at the most"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if model.has_terms:
-        reason = f"{_shrunk(held, before)}; beside it stands a term that no effect of the library stands for"
-    partly = held.free**2 <= settings.rest * before**2
-    return Judgement("partly-explained" if partly else "unexplained", model, held, before, (reason,))
+        reason = f"{_shrunk(held)}; beside it stands a term that no effect of the library stands for"
+    partly = held.remaining(held.free) <= settings.rest
+    return Judgement("partly-explained" if partly else "unexplained", held, (reason,))
 
 
-def _shrunk(held: HeldOut, before: float) -> str:
-    return f"the held-out gap goes from {before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
+def _shrunk(held: HeldOut) -> str:
+    return f"the held-out gap goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
 
 
 def _untenable(model: Fit) -> str:

@@ -182,16 +182,8 @@ def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
         )
         return replace(plain, status=merged(plain.status, (missing,)))
     fit = eiv_fit(repeated, table.directions_differ)
-    conditions = start.conditions
-    if repeated.wandering:
-        conditions += (
-            Condition(
-                "drive-not-locked",
-                f"drive phase wanders in {repeated.wandering} of {table.n_directions} directions; "
-                "their windows were turned to one phase",
-            ),
-        )
     numbers = (fit.h, fit.covariance, fit.dof, fit.chi_square)
+    conditions = start.conditions + not_locked(repeated.wandering, table.n_directions)
     result = _result(table, omega, name, numbers, repeated.weights, conditions)
     return replace(result, attenuation=fit.attenuation)
 
@@ -230,8 +222,6 @@ def _result(
     all_weights = np.zeros((len(table.valid), 2))
     all_weights[table.valid] = per_axis
     used = len(np.unique(table.direction[joint > 0]))
-    checks = (_ill_conditioned(condition), _many_rejected(joint), _no_spare(used))
-    raised = [c for c in checks if c is not None]
     return DynamicStiffness(
         h * table.h_scale,
         omega,
@@ -239,32 +229,35 @@ def _result(
         dof,
         name,
         all_weights,
-        merged(conditions, tuple(raised)),
+        merged(conditions, tuple(fit_conditions(condition, joint, used))),
         condition,
         chi_square,
         4 * (used - 2),
     )
 
 
-def _ill_conditioned(condition: float) -> Condition | None:
-    if condition <= _MAX_CONDITION:
-        return None
-    return Condition("ill-conditioned", f"condition number {condition:.3g} of the displacement directions > 30")
+def fit_conditions(condition: float, weights: FloatArray, directions: int) -> list[Condition]:
+    """What the windows of a fit say of it: condition number of their displacements, weights, directions."""
+    found = []
+    if condition > _MAX_CONDITION:
+        text = f"condition number {condition:.3g} of the displacement directions > 30"
+        found.append(Condition("ill-conditioned", text))
+    rejected = float((weights < REJECTED_WEIGHT).mean()) if len(weights) else 0.0
+    if rejected > _MAX_REJECTED:
+        text = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
+        found.append(Condition("many-windows-rejected", text))
+    if directions == 2:
+        text = "two directions only: the interval cannot see what runs differ by, only their repeats"
+        found.append(Condition("no-spare-direction", text))
+    return found
 
 
-def _no_spare(directions: int) -> Condition | None:
-    if directions != 2:
-        return None
-    return Condition(
-        "no-spare-direction", "two directions only: the interval cannot see what runs differ by, only their repeats"
-    )
-
-
-def _many_rejected(weights: FloatArray) -> Condition | None:
-    share = float((weights < REJECTED_WEIGHT).mean())
-    if share <= _MAX_REJECTED:
-        return None
-    return Condition("many-windows-rejected", f"{100 * share:.0f} % of the windows got no weight (limit 40 %)")
+def not_locked(wandering: int, directions: int) -> tuple[Condition, ...]:
+    """Say in how many directions the drive's phase wanders."""
+    if not wandering:
+        return ()
+    text = f"drive phase wanders in {wandering} of {directions} directions; their windows were turned to one phase"
+    return (Condition("drive-not-locked", text),)
 
 
 #: What solves Eq. (15) by each method: a new estimator is a function here.

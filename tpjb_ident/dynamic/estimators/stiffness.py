@@ -143,13 +143,16 @@ class DynamicStiffness:
 
     def direct_coefficients(self) -> str:
         """Direct coefficients with half their 95 % intervals, in MN/m and kN s/m."""
-        half, named = self.half_width(), []
-        for j, entry in ((0, "xx"), (3, "yy")):
-            for name, i, omega, kind in (("k", j, 1.0, STIFFNESS), ("c", 4 + j, self.omega, DAMPING)):
-                low, high = (self.vector[i] - half[i]) / omega, (self.vector[i] + half[i]) / omega
-                value = with_interval(self.vector[i] / omega, low, high, kind.display_scale)
-                named.append(f"{name}{entry} {value} {kind.display_unit}")
-        return ", ".join(named)
+        cells, order = self.cells(), ((0, STIFFNESS), (4, DAMPING), (3, STIFFNESS), (7, DAMPING))
+        return ", ".join(f"{kind.symbol}{ENTRIES[i % 4]} {cells[i]} {kind.display_unit}" for i, kind in order)
+
+    def cells(self) -> list[str]:
+        """Write kxx .. cyy with half their 95 % intervals, in the units of tables that people read."""
+        cells = []
+        for i, (value, half) in enumerate(zip(self.vector, self.half_width(), strict=True)):
+            scale = STIFFNESS.display_scale if i < 4 else DAMPING.display_scale * self.omega
+            cells.append(with_interval(value, value - half, value + half, scale))
+        return cells
 
     def __repr__(self) -> str:
         at = f"at {self.omega / (2 * np.pi):.4g} Hz by {self.method}"

@@ -7,68 +7,19 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
+from tpjb_ident.dynamic.results.frequency_model import FrequencyModel
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.schema import KINDS, STATIC_KEY
+from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _KEY_COLUMNS = (*STATIC_KEY, "excitation")
-
-
-#: A model is refused below this probability of its chi-square.
-_REFUSED = 0.01
-
-
-@dataclass(frozen=True)
-class BandModel:
-    """One model over the lines of a band."""
-
-    model: str
-    parameters: FloatArray  #: (p,)
-    covariance: FloatArray = field(repr=False)  #: (p, p): random part
-    dof: FloatArray = field(repr=False)  #: (p,): degrees of freedom of its variances
-    systematic: FloatArray = field(repr=False)  #: (p, p): what all lines share
-    chi_square: float
-    spare: int
-    probability: float
-    misfit: float
-    band: tuple[float, float]
-    n_lines: int
-
-    @property
-    def refused(self) -> bool:
-        """Whether the lines refuse the model."""
-        return self.spare > 0 and self.probability < _REFUSED
-
-    @property
-    def standard_error(self) -> FloatArray:
-        """Random standard errors; inflated by the reduced chi-square where the lines refuse the model."""
-        inflation = max(self.chi_square / self.spare, 1.0) if self.refused else 1.0
-        return np.sqrt(inflation * np.diag(self.covariance))
-
-    def half_width(self, level: float = 0.95) -> FloatArray:
-        """Half the interval of every parameter: Student's t of the random part and normal of the shared one."""
-        quantile = 0.5 + 0.5 * level
-        random = stdtrit(self.dof, quantile) * self.standard_error
-        return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.diag(self.systematic)))
-
-    def h(self, omega: FloatArray) -> ComplexArray:
-        """Dynamic stiffness of the model, (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
-        K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
-        w = np.asarray(omega, dtype=float)[:, None, None]
-        return np.asarray(K - w**2 * M + 1j * w * C)
-
-
-def supported(models: dict[str, BandModel]) -> str:
-    """The simplest model that the lines do not refuse; ``"raw H"`` when they refuse all."""
-    return next((name for name, model in models.items() if not model.refused), "raw H")
 
 
 @dataclass(frozen=True)
@@ -94,7 +45,7 @@ class BandResult:
     point: OperatingPoint
     kind: str
     lines: tuple[BandLine, ...] = field(repr=False)
-    models: dict[str, BandModel] = field(repr=False)
+    models: dict[str, FrequencyModel] = field(repr=False)
     supported: str
     quality: tuple[Condition, ...]
     runs: tuple[str, ...]
@@ -169,31 +120,7 @@ def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
     return pd.DataFrame([_model_row(result, model) for result in results for model in result.models.values()])
 
 
-def _model_row(result: BandResult, model: BandModel) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        **result.key(),
-        "model": model.model,
-        "supported": result.supported,
-        "method": result.method,
-        "n_frequencies": model.n_lines,
-        "excitation_lowest_Hz": model.band[0],
-        "excitation_highest_Hz": model.band[1],
-        "chi_square": model.chi_square,
-        "dof": model.spare,
-        "probability": model.probability,
-        "largest_misfit": model.misfit,
-    }
-    names = [column for kind in KINDS.values() for column in kind.columns]
-    half, se = model.half_width(), model.standard_error
-    for i, name in enumerate(names):
-        fitted = i < len(model.parameters)
-        value = model.parameters[i] if fitted else 0.0
-        row |= {
-            name: value,
-            f"{name}_lo": value - half[i] if fitted else 0.0,
-            f"{name}_hi": value + half[i] if fitted else 0.0,
-            f"{name}_se": se[i] if fitted else 0.0,
-            f"{name}_dof": model.dof[i] if fitted else np.inf,
-        }
-    row["quality"] = "; ".join(str(c) for c in result.quality) or "ok"
-    return row
+def _model_row(result: BandResult, model: FrequencyModel) -> dict[str, Any]:
+    row = {**result.key(), "model": model.model, "supported": result.supported, "method": result.method}
+    quality = "; ".join(str(c) for c in result.quality) or "ok"
+    return {**row, **model.columns(), "quality": quality}

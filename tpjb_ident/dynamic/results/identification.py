@@ -12,29 +12,16 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES, DynamicStiffness
-from tpjb_ident.dynamic.results.frequency_fit import FrequencyFit, LoadFits, fits_per_load
+from tpjb_ident.dynamic.results.frequency_model import MODEL_COLUMNS, StaticFits, fits_over_frequency
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.presentation import Presented
-from tpjb_ident.schema import DAMPING, KINDS, POINT_KEY, STATIC_KEY, STIFFNESS
+from tpjb_ident.schema import DAMPING, POINT_KEY, STATIC_KEY, STIFFNESS
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.dynamic.results.band_result import BandResult
 
-_FIT_FIGURES = (
-    "model",
-    "supported",
-    "n_frequencies",
-    "excitation_lowest_Hz",
-    "excitation_highest_Hz",
-    "chi_square",
-    "dof",
-    "probability",
-    "largest_misfit",
-)
-_FIT_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
-_FIT_COLUMNS = (*STATIC_KEY, *_FIT_FIGURES, *(c for name in _FIT_VALUES for c in (name, f"{name}_se")))
 _WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
 #: Sources that scatter from run to run; all others are common to the runs.
 _RANDOM = ("random", "load miss", "mains")
@@ -139,16 +126,20 @@ class Identification(Presented):
         rows = [row for p in self.points for row in _budget_rows(point_columns(p), p.stiffness, p.budget)]
         return pd.DataFrame(rows, columns=[*POINT_KEY, *_BUDGET_COLUMNS])
 
-    def frequency_fits(self) -> list[LoadFits]:
+    def frequency_fits(self) -> list[StaticFits]:
         """K-C and K-C-M over the excitation frequencies, for every load that was run at several."""
-        return fits_per_load(self.points)
+        return fits_over_frequency(self.points, self.calibration_changes)
 
     def frequency_frame(self) -> pd.DataFrame:
         """One row per load and model: ``frequency_fits.csv``."""
         import pandas as pd
 
-        rows = [_fit_row(group, fit) for group in self.frequency_fits() for fit in group.fits.values()]
-        return pd.DataFrame(rows, columns=list(_FIT_COLUMNS))
+        rows = []
+        for group in self.frequency_fits():
+            key = dict(zip(STATIC_KEY, group.points[0].point.static_key))
+            for name, fit in group.fits.items():
+                rows.append({**key, "model": name, "supported": group.supported, **fit.columns()})
+        return pd.DataFrame(rows, columns=[*STATIC_KEY, "model", "supported", *MODEL_COLUMNS])
 
     def remarks(self) -> tuple[str, ...]:
         """What somebody should read beside the numbers: each condition once, with the places where it was found."""
@@ -168,7 +159,7 @@ class Identification(Presented):
             remarks.append(f"{name} at {sentences[0]}{more}")
         return tuple(remarks)
 
-    def _groups(self) -> dict[int, LoadFits]:
+    def _groups(self) -> dict[int, StaticFits]:
         """Models over frequency by the index of the points that they belong to."""
         index = {id(p): i for i, p in enumerate(self.points)}
         return {index[id(p)]: group for group in self.frequency_fits() for p in group.points}
@@ -179,7 +170,7 @@ def point_columns(p: PointResult) -> dict[str, object]:
     return dict(zip(POINT_KEY, p.point.key))
 
 
-def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None) -> dict[str, Any]:
+def _estimate_row(p: PointResult, est: DynamicStiffness, group: StaticFits | None) -> dict[str, Any]:
     """One method's answer at one point, with everything needed to believe it or not."""
     row: dict[str, Any] = dict(point_columns(p))
     row["static_load_measured_N"] = p.static_load_measured
@@ -211,27 +202,6 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, group: LoadFits | None)
         y_m_se=p.position_se[1],
     )
     row.update({f"temperature_{pad}_K": value for pad, value in p.temperatures.items()})
-    return row
-
-
-def _fit_row(group: LoadFits, fit: FrequencyFit) -> dict[str, Any]:
-    """One model over frequency of one load."""
-    row: dict[str, Any] = dict(zip(STATIC_KEY, group.points[0].point.static_key))
-    row.update(
-        model=fit.model,
-        supported=group.supported,
-        n_frequencies=fit.n_frequencies,
-        excitation_lowest_Hz=fit.omega_range[0] / (2 * np.pi),
-        excitation_highest_Hz=fit.omega_range[1] / (2 * np.pi),
-        chi_square=fit.chi_square,
-        dof=fit.dof,
-        probability=fit.probability,
-        largest_misfit=fit.misfit,
-    )
-    errors = np.concatenate([fit.standard_error, np.zeros(12 - len(fit.standard_error))])
-    values = np.concatenate([fit.K.ravel(), fit.C.ravel(), fit.M.ravel()])
-    for name, value, error in zip(_FIT_VALUES, values, errors):
-        row[name], row[f"{name}_se"] = value, error
     return row
 
 

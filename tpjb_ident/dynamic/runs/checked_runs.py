@@ -34,7 +34,7 @@ def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:
     """What the checks say of dynamic runs, by run; static runs say what they show of the channels."""
     static = [observe(run) for run in campaign.runs if run.kind in _STATIC]
-    reports = [observation.report for observation in judged(campaign, [*observations, *static])]
+    reports = [observation.report for observation in judged(campaign, [*observations, *static])[0]]
     reach(reports)
     result = verdicts([report for report in reports if report.run.kind == "dynamic"])
     for observation in static:

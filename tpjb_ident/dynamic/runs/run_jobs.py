@@ -27,7 +27,7 @@ from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
 from tpjb_ident.phasors.shaft import shaft_phases
 from tpjb_ident.phasors.windows import RecordTooShortError
-from tpjb_ident.runtime.executors import InProcessWorkers, Workers, as_completed
+from tpjb_ident.runtime.executors import Workers
 
 Progress = Callable[[str, int, int], None]
 #: A channel whose lines are below this share of the vector's may be dead.
@@ -51,23 +51,18 @@ def all_runs(
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
     finished_runs = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
-    done = 0
-
-    def finished(index: int, answer: tuple[str, RunResult | ExcludedRun | None]) -> None:
-        nonlocal done
-        mark, result = answer
-        if isinstance(result, ExcludedRun):
-            finished_runs.leave_out(index, result)
-        else:
-            if store is not None and result is not None and mark:
-                store.keep(mark, result)
-            finished_runs.put(index, result, mark)
-        done += 1
-        progress(runs[index].id, done, len(runs))
-
-    jobs = ((_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs)
+    jobs = [(_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs]
+    outcomes = (workers or Workers()).outcomes(process_run, jobs)
     try:
-        as_completed(workers or InProcessWorkers(), process_run, list(jobs), finished)
+        for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
+            mark, result = outcome.get()
+            if isinstance(result, ExcludedRun):
+                finished_runs.leave_out(index, result)
+            else:
+                if store is not None and result is not None and mark:
+                    store.keep(mark, result)
+                finished_runs.put(index, result, mark)
+            progress(runs[index].id, done, len(runs))
         finished_runs.leave_out_dead_accelerometers()
         if runs and not finished_runs.places:
             raise finished_runs.left_out[0].error

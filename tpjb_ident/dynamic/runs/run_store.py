@@ -37,7 +37,7 @@ from tpjb_ident.runtime.tables import write_atomic
 _ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase", "record")
 _LINES = ("excitation", "nuisance", "faint")
 #: What reading says of an entry that is cut off, or that somebody else wrote.
-_NOT_OURS = (OSError, ValueError, LookupError, TypeError, EOFError, MemoryError, RecursionError, zipfile.BadZipFile)
+_NOT_OURS = (OSError, ValueError, LookupError, TypeError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.ticker import ScalarFormatter
 
 from tpjb_ident.report.drawing.colours import GREY, INK, RULE
 
@@ -71,10 +72,18 @@ def new_pictures(
     return figure, grid
 
 
+class _Millions(ScalarFormatter):
+    """Ticks of a hundred thousand and more as 0.4M: lbf/in would push the axis' label off the picture."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return self.fix_minus(f"{x / 1e6:g}M") if abs(x) >= 1e5 else super().__call__(x, pos)
+
+
 def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Empty axes at a box in inches, in the house look."""
     axes = figure.add_axes(_fractions(figure, box))
     axes.patch.set_alpha(0.0)
+    axes.yaxis.set_major_formatter(_Millions())
     axes.ticklabel_format(style="plain", useOffset=False)
     axes.tick_params(colors=INK, labelsize=FONT_SIZE, color=RULE, labelcolor=INK)
     axes.grid(True, color=RULE, linewidth=0.6, linestyle="-", alpha=1.0)
@@ -97,6 +106,14 @@ def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) ->
     if heading:
         shrink(axes, top=1.2 * _LINE)
         axes.set_title(heading, fontsize=FONT_SIZE, color=INK, pad=4.0)
+
+
+def from_zero(axes: Axes) -> None:
+    """Begin the vertical axis at zero, unless a value is below it, with room for the highest mark."""
+    bottom, top = axes.dataLim.intervaly
+    low, high = min(0.0, 1.1 * bottom), max(0.0, 1.1 * top)
+    if low < high:
+        axes.set_ylim(low, high)
 
 
 def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:

@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
+from tpjb_ident.compare.comparison import Comparison, comparison_frame
+from tpjb_ident.diagnosis.observations.gap import residuals
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
 
-_ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
+#: Names of the eight coefficients of a residual: kxx to cyy.
+COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 
 _COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
 
@@ -26,24 +27,14 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
 
     A table of comparison.csv does as well as a `Comparison` or a `Diagnosis`.
     """
-    import pandas as pd
-
     if isinstance(source, pd.DataFrame):
         return source if set(_COLUMNS) <= set(source.columns) else _of_comparison(source)
-    from tpjb_ident.compare.comparison import Comparison
-
     if isinstance(source, Comparison):
-        from tpjb_ident.compare.comparison import comparison_frame
-
         return _of_comparison(comparison_frame(source))
     return _of_diagnosis(source)
 
 
 def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
-    import pandas as pd
-
-    from tpjb_ident.diagnosis.observations.gap import residuals
-
     rows = []
     models = [("before", diagnosis.problem.base)]
     models += [("after", diagnosis.after)] if diagnosis.verdict.effects else []
@@ -57,10 +48,8 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
     frames = []
-    for entry in _ENTRIES:
+    for entry in COEFFICIENTS:
         key = coefficient_column(entry)
         sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * _TWO_SIDED_95)
         frames.append(

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, Style, style_of_variant
-from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.picture import add_legend, from_zero, label, new_pictures
 from tpjb_ident.report.drawing.series import CURVE, DIRECT, axis_of, longest_series, with_errors
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
 _SMALL = 5.0
+#: A prediction nearer than this [%] is the measurement itself: it sets no scale.
+_EXACT = 1e-3
 _BARS: dict[str, Any] = {"fmt": "o", "color": INK, "markersize": 5, "capsize": 3, "linewidth": 1.2, "zorder": 5}
 
 
@@ -73,7 +75,7 @@ def coefficient(
     axes.errorbar(measured[column] / axis_scale, value, yerr=errors, label="measured, 95 %", **_BARS)
     axes.margins(x=0.06, y=0.1)
     if name in DIRECT:
-        axes.set_ylim(bottom=0.0)
+        from_zero(axes)
     add_legend(axes)
     if apart:
         below = grid[1][0]
@@ -81,7 +83,7 @@ def coefficient(
         reach = [_draw_deviations(below, rows, styles[variant], key, over) for variant, rows in variants.items()]
         below.errorbar(measured[column] / axis_scale, np.zeros_like(value), yerr=shares, **_BARS)
         below.margins(x=0.06)
-        limit = 1.4 * max(float(np.max(shares)), min(reach))
+        limit = 1.4 * max(float(np.max(shares)), min((r for r in reach if r > _EXACT), default=1.0))
         below.set_ylim(-limit, limit)
     return figure
 

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from rigdata.run import Run
 
 _FORCE_STYLE: tuple[tuple[str, Any], ...] = (("blue", "-"), ("red", (0, (5, 2))))
-
 _FEWEST_SEGMENTS = 5
-
 _LEVEL = 0.95
 
 
@@ -44,13 +42,14 @@ def coherence_spectrum(
     ValueError
         When the run is too short for the segments.
     """
-    force, move = run.vector("force"), run.vector("displacement")
-    n = min(len(force), len(move))
-    rate = run.sample_rate
+    vectors = run.vector("force"), run.vector("displacement")
+    slower = min(vectors, key=len)
+    force, move = (vector.at(slower.time) for vector in vectors)
+    n, rate = len(slower), slower.rate
     piece = int(segment * rate) if segment else n // 8
     if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
         raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
-    frequency, value, averages = _multiple_coherence(force.values[:n], move.values[:n], rate, piece)
+    frequency, value, averages = _multiple_coherence(force, move, rate, piece)
     drive = run.point.excitation_hz
     top = up_to or (4.0 * drive if drive else 0.5 * rate)
     figure, axes = new_picture("frequency, Hz", "multiple coherence", title=title)

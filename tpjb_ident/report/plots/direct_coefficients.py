@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.drawing.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.picture import add_legend, from_zero, new_picture
 from tpjb_ident.report.drawing.series import CURVE, as_table, axis_of, longest_series, with_errors
 from tpjb_ident.schema import KINDS
 
@@ -77,8 +77,8 @@ def direct_coefficients(
             )  # fmt: skip
     if not drawn:
         raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
-    if set(entries) <= {"xx", "yy"}:
-        axes.set_ylim(bottom=0.0)
     axes.margins(x=0.06)
+    if set(entries) <= {"xx", "yy"}:
+        from_zero(axes)
     add_legend(axes)
     return figure

@@ -3,37 +3,26 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, symbol
+from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.report.drawing.colours import LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import longest_series, with_errors
 from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
 
     from tpjb_ident.dynamic.results.band_result import BandResult
+    from tpjb_ident.dynamic.results.frequency_model import FrequencyModel
     from tpjb_ident.dynamic.results.identification import Identification
 
 _FRF_STYLE = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
-
-
-@dataclass(frozen=True)
-class _FittedModel:
-    """The model that the data support: its name, its band [Hz] and h (n, 2, 2) of angular frequencies (n,) [rad/s]."""
-
-    name: str
-    band: tuple[float, float]
-    h: Callable[[np.ndarray], np.ndarray]
 
 
 def frf(
@@ -91,7 +80,7 @@ def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     add_legend(axes)
 
 
-def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, _FittedModel | None]:
+def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.DataFrame | None, FrequencyModel | None]:
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     import pandas as pd
 
@@ -107,7 +96,7 @@ def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.Da
     from tpjb_ident.dynamic.results.band_result import frf_frame
 
     model = source.models.get(source.supported)
-    return frf_frame([source]), None if model is None else _FittedModel(model.model, model.band, model.h)
+    return frf_frame([source]), model
 
 
 def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
@@ -123,7 +112,7 @@ def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
     return rows[["excitation_Hz"]].assign(**columns)
 
 
-def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _FittedModel | None:
+def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> FrequencyModel | None:
     """The model that the frequencies of the series support, None where they refuse all."""
     if series is None:
         return None
@@ -131,21 +120,20 @@ def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> _Fit
     for group in source.frequency_fits():
         fit = group.fits.get(group.supported)
         if fit is not None and group.points[0].point.static_key == wanted:
-            low, high = (omega / (2 * np.pi) for omega in fit.omega_range)
-            return _FittedModel(fit.model, (low, high), fit.h)
+            return fit
     return None
 
 
 def _draw_measured(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
     colour, marker = _FRF_STYLE[entry]
-    value, errors = with_errors(table, column, 1e6)
+    value, errors = with_errors(table, column, size("stiffness"))
     axes.errorbar(
         table["excitation_Hz"], value, yerr=errors, fmt=marker, color=LIGHT[colour],
         markersize=3, capsize=1.5, linewidth=0.8, linestyle="none", label=f"h{entry}, 95 %",
     )  # fmt: skip
 
 
-def _draw_model(axes: Axes, model: _FittedModel | None, entry: str, part: str, label: bool) -> None:
+def _draw_model(axes: Axes, model: FrequencyModel | None, entry: str, part: str, label: bool) -> None:
     """The model over the band as a line."""
     if model is None:
         return
@@ -153,4 +141,4 @@ def _draw_model(axes: Axes, model: _FittedModel | None, entry: str, part: str, l
     i, j = ("xy".index(letter) for letter in entry)
     h = model.h(2 * np.pi * f)[:, i, j]
     values = (h.real if part == "real" else h.imag) * per("stiffness")
-    axes.plot(f, values, color=LIGHT[_FRF_STYLE[entry][0]], linewidth=1.4, label=model.name if label else None)
+    axes.plot(f, values, color=LIGHT[_FRF_STYLE[entry][0]], linewidth=1.4, label=model.model if label else None)

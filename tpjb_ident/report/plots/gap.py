@@ -8,14 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.colours import INK, LIGHT, PAPER
-from tpjb_ident.report.drawing.picture import (
-    CHARACTER,
-    LEFT,
-    add_legend,
-    new_picture,
-    shrink,
-)
+from tpjb_ident.report.drawing.picture import CHARACTER, LEFT, add_legend, new_picture, shrink
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.diagnose import Diagnosis
@@ -44,7 +39,7 @@ def gap(
     gaps = _gaps(source)
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
-    before, after = (np.array([_gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
+    before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
     words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
     figure, axes = new_picture("gap, sigma", "", title=title, height=0.3 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
@@ -74,10 +69,6 @@ def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Ma
         return source
     # a diagnosis holds a verdict, whose own `verdict` is a word
     return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
-
-
-def _gap_at(gaps: Mapping[str, float], end: str) -> float:
-    return next((float(v) for k, v in gaps.items() if k.endswith(end)), 0.0)
 
 
 def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import INK, PAPER, style_of_pad
-from tpjb_ident.report.drawing.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.picture import add_legend, from_zero, new_picture
 
 if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
@@ -52,7 +52,7 @@ def load_deflection(
         _draw_law(axes, curve, up_to or curve.valid_to, level)
         _draw_steps(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-    axes.set_ylim(bottom=0.0)
+    from_zero(axes)
     named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     add_legend(axes, handles=[named[name] for name in sorted(named)])  # pad by pad, what was left out last
     return figure

@@ -11,23 +11,14 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.colours import DIVERGING, INK, VARIANT_LABEL
-from tpjb_ident.report.drawing.picture import (
-    FONT_SIZE,
-    add_colour_bar,
-    label,
-    new_pictures,
-    shrink,
-)
-from tpjb_ident.schema import COEFFICIENT_COLUMNS
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
+from tpjb_ident.report.drawing.residual_frame import COEFFICIENTS, residual_frame
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-from tpjb_ident.report.drawing.residual_frame import residual_frame
-
-_ENTRIES = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 
 _ON_COLOUR = "#1b1f23"  # ink that stays dark on its coloured ground when the page turns dark
 
@@ -66,16 +57,16 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
 
 
 def _draw_map(axes: Axes, frame: pd.DataFrame, points: list[tuple[float, float]], norm: Any, name: str) -> None:
-    table = np.full((len(_ENTRIES), len(points)), np.nan)
+    table = np.full((len(COEFFICIENTS), len(points)), np.nan)
     column = {point: j for j, point in enumerate(points)}
     for entry, load, frequency, z in frame[["entry", "static_load_N", "excitation_Hz", "z"]].to_numpy():
-        table[_ENTRIES.index(entry), column[load, frequency]] = z
+        table[COEFFICIENTS.index(entry), column[load, frequency]] = z
     size = float(np.sqrt(np.nanmean(table**2)))
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
     shrink(axes, bottom=0.25)
     image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
     axes.grid(False)
-    axes.set_yticks(range(len(_ENTRIES)), _ENTRIES)
+    axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
     axes.set_xticks(range(len(points)), [f"{w * per('load'):.4g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.0)
     axes.axhline(3.5, color=INK, linewidth=0.8)
     for (i, j), z in np.ndenumerate(table):

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT, PAPER, RULE, VARIANT_LABEL
-from tpjb_ident.report.drawing.picture import (
-    add_legend,
-    new_picture,
-)
+from tpjb_ident.report.drawing.picture import add_legend, new_picture
+from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.drawing.series import CURVE, axis_of
 
 if TYPE_CHECKING:
@@ -19,7 +17,6 @@ if TYPE_CHECKING:
 
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-from tpjb_ident.report.drawing.residual_frame import residual_frame
 
 _STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
 

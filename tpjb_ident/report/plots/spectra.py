@@ -51,8 +51,9 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     for (axes,), (quantity, unit) in zip(grid, _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
         largest = 0.0
-        for values, (axis, colour, dashes) in zip(run.vector(quantity).values.T, _AXIS_STYLE, strict=True):
-            frequency, amplitude = amplitude_spectrum(values * per(unit), run.sample_rate)
+        record = run.vector(quantity)
+        for values, (axis, colour, dashes) in zip(record.values.T, _AXIS_STYLE, strict=True):
+            frequency, amplitude = amplitude_spectrum(values * per(unit), record.rate)
             shown = (frequency <= top) & (np.arange(len(frequency)) >= _DRIFT)
             if not shown.any():
                 raise ValueError(f"run {run.id} has no spectrum of {quantity} up to {top:g} Hz")

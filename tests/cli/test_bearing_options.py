@@ -1,0 +1,76 @@
+"""Which way the shaft turns, and one value per pad: what a person gives as an option or in the bearing file."""
+
+from __future__ import annotations
+
+import csv
+import re
+
+import pytest
+
+from tests.command_line import tpjb
+
+POINT = ("--load", "5 kN", "--speed", "22 Hz", "--excitation", "25 Hz")
+FILM = ("--pivots", "rigid", "--thermal", "isothermal")
+#: Entry of the rocker's bearing file, its section, and one value of it.
+PER_PAD = [
+    ("bearing", "assembled_clearance", '"0.080 mm"'),
+    ("bearing", "pad_clearance", '"0.130 mm"'),
+    ("pads", "arc", '"63.5 deg"'),
+    ("pads", "pivot_offset", "0.5"),
+    ("pads", "thickness", '"16 mm"'),
+    ("pads", "babbitt_thickness", '"3 mm"'),
+    ("pads", "mass", '"0.540 kg"'),
+    ("pads", "moment_of_inertia", '"0.256e-3 kg m^2"'),
+    ("pivot", "contact_length", '"39.6 mm"'),
+    ("pivot", "housing_diameter", '"132.0 mm"'),
+    ("pivot", "pivot_diameter", '"119.6 mm"'),
+]
+
+
+def predicted(bearing, out, *options):
+    result = tpjb("predict", bearing, *POINT, *FILM, "--load-direction", "-60 deg", *options, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    (row,) = csv.DictReader((out / "prediction.csv").read_text("utf-8").splitlines())
+    return row
+
+
+def test_predict_turns_the_shaft_the_way_that_is_asked_for_or_that_the_bearing_states(rocker_file, tmp_path):
+    drawing = tmp_path / "b.toml"
+    text = rocker_file.read_text("utf-8").replace("pivot_offset = 0.5", "pivot_offset = 0.6")
+    drawing.write_text(text, "utf-8")
+    usual = predicted(drawing, tmp_path / "usual")
+    asked = predicted(drawing, tmp_path / "asked", "--rotation", "clockwise", "--load-direction", "-120 deg")
+    assert (usual["rotation"], asked["rotation"]) == ("counter-clockwise", "clockwise")
+    for name, sign in (("kxx", 1), ("kxy", -1), ("kyx", -1), ("kyy", 1)):
+        column = f"{name}_N_per_m"
+        assert float(asked[column]) == pytest.approx(sign * float(usual[column]), rel=1e-6)
+    drawing.write_text(text.replace("[bearing]", '[bearing]\nrotation = "clockwise"'), "utf-8")
+    stated = predicted(drawing, tmp_path / "stated", "--load-direction", "-120 deg")
+    assert {**stated, "status": ""} == {**asked, "status": ""}
+    against = predicted(drawing, tmp_path / "against", "--rotation", "counter-clockwise")
+    assert against["rotation"] == "counter-clockwise"
+    assert float(against["kxx_N_per_m"]) < 0.6 * float(usual["kxx_N_per_m"])
+
+
+@pytest.mark.parametrize("name", ["predict", "plan", "simulate"])
+def test_a_sense_that_there_is_not_is_refused_with_the_nearest(name, rocker_file, tmp_path):
+    options = () if name == "simulate" else POINT
+    result = tpjb(name, rocker_file, *options, "--rotation", "clokwise", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "--rotation" in result.stderr
+    assert "Did you mean 'clockwise'?" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("section", "entry", "value"), PER_PAD, ids=[entry for _, entry, _ in PER_PAD])
+def test_a_list_of_another_length_than_pads_is_refused(section, entry, value, rocker_file, tmp_path):
+    drawing = tmp_path / "b.toml"
+    text, changed = re.subn(rf"^{entry} = \S.*?(?=\s+#|$)", f"{entry} = [{value}, {value}]",
+                            rocker_file.read_text("utf-8"), flags=re.MULTILINE)  # fmt: skip
+    assert changed == 1
+    drawing.write_text(text, "utf-8")
+    result = tpjb("predict", drawing, *POINT, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert f"b.toml, [{section}] {entry}: 2 values for 5 pads. Give one each, or one for all." in result.stderr
+    drawing.write_text(text.replace(f"[{value}, {value}]", f"[{', '.join(5 * [value])}]"), "utf-8")
+    assert predicted(drawing, tmp_path / "five")["converged"] == "True"

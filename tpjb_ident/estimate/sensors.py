@@ -1,0 +1,83 @@
+"""Sensors of a campaign as the equation knows them, and what its housing stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, FloatArray
+from rigdata.calibration import Channel
+from rigdata.campaign import Campaign
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
+
+#: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
+_FLOATS = 0.3
+#: Cells over set points between which the cells carry the static load.
+_CARRIED = (0.5, 2.0)
+#: A sensor whose phasors are below this share of its quantity's is dead.
+_NOTHING = 1e-6
+#: Gain uncertainty of a sensor of more than two for which the manifest states none, as `[tolerances] probe_gain` has
+#: it: what such sensors tell of one another needs one.
+_USUAL_GAIN = 0.005
+
+
+def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
+    """Probes, cells and accelerometers of a campaign's dynamic runs."""
+    channels = dict(campaign.channels)
+    for run in campaign.of_kind("dynamic"):
+        channels = dict(run.channels) | channels
+    sensors: list[Sensor] = []
+    for quantity in QUANTITIES:
+        alike = [channel for channel in channels.values() if channel.quantity == quantity and channel.axis is not None]
+        unstated = _USUAL_GAIN if len(alike) > 2 else None
+        sensors += [
+            Sensor(
+                channel.name,
+                quantity,
+                unstated if channel.uncertainty is None else channel.uncertainty,
+                channel.axis_uncertainty,
+                channel.delay_uncertainty,
+                channel.clock,
+                channel.plane,
+                channel.temperature_coefficient_uncertainty,
+            )
+            for channel in alike
+        ]
+    return tuple(sensors)
+
+
+def alive(sensors: Sequence[Sensor], size: FloatArray, least: float = _NOTHING) -> BoolArray:
+    """Which sensors show something of what the largest of their quantity does, (m,); `size` (m,) of their phasors."""
+    largest: dict[str, float] = {}
+    for sensor, own in zip(sensors, size.tolist()):
+        largest[sensor.quantity] = max(own, largest.get(sensor.quantity, 0.0))
+    return np.array([own > least * largest[sensor.quantity] for sensor, own in zip(sensors, size)], dtype=bool)
+
+
+def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
+    """Unit vectors of the axes (m, 2); zero where a run has no such channel."""
+    rows = [(0.0, 0.0) if c is None else (np.cos(c.axis or 0.0), np.sin(c.axis or 0.0)) for c in channels]
+    return np.array(rows)
+
+
+def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:
+    """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
+
+    Without accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the
+    housing stands on them. Cells of a floating stator show none; then it is "unknown".
+    """
+    if stated:
+        return stated
+    rig = Rig(tuple(sensors), 1.0)
+    carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
+    if len(rig.of("acceleration")) < 2:
+        return carried
+    a = vector(rig, blocks, "acceleration")
+    d = vector(rig, blocks, "displacement") * (blocks.omega**2)[:, None]
+    told = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1)
+    if not told.any():
+        return carried
+    power = np.sum(np.abs(d[told]) ** 2, axis=0)
+    quotient = np.sum(d[told].conj() * a[told], axis=0) / np.maximum(power, 1e-300)
+    return "floating" if np.abs(quotient - 1).max() < _FLOATS else "cells"

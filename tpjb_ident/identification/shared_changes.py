@@ -1,0 +1,48 @@
+"""What every source that points share does to their entries: those of sines and of bands beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.estimate.solve import Solution
+
+
+@dataclass(frozen=True)
+class SharedChanges:
+    """Changes of the entries of P points, scaled so that the mean of the rows' products is their covariance."""
+
+    changes: FloatArray = field(repr=False)  #: (q, 8 P), N/m: at least one row
+    names: tuple[str, ...] = ()  #: of the sources, term and parameter
+
+    def beside(self, other: SharedChanges) -> SharedChanges:
+        """Those of two groups of points; sources of one name are one source."""
+        names = tuple(dict.fromkeys((*self.names, *other.names)))
+        count = max(len(names), 1)
+        rows = np.zeros((count, self.changes.shape[1] + other.changes.shape[1]))
+        begin = 0
+        for group in (self, other):
+            end = begin + group.changes.shape[1]
+            for name, row in zip(group.names, group.changes):
+                rows[names.index(name), begin:end] = row * np.sqrt(count / len(group.names))
+            begin = end
+        return SharedChanges(rows, names)
+
+
+def shared_changes(solution: Solution, points: Sequence[int], scattering: Sequence[str] = ()) -> SharedChanges:
+    """Changes of some points of a solve by all terms but those whose effect scatters from run to run."""
+    names: list[str] = []
+    rows: list[int] = []
+    first = 0
+    for term in solution.terms:
+        if term.name not in scattering:
+            rows += range(first, first + len(term.parameters))
+            names += [f"{term.name}: {parameter.name}" for parameter in term.parameters]
+        first += len(term.parameters)
+    if not rows:
+        return SharedChanges(np.zeros((1, 8 * len(points))))
+    factors = solution.factors[np.ix_(rows, points)].reshape(len(rows), -1)
+    return SharedChanges(np.asarray(factors * np.sqrt(len(rows))), tuple(names))
