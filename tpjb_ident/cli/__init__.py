@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from tpjb_ident.cli.common import interrupts
+
 
 def main() -> None:
     """Run the command line; the entry point of `tpjb` and of ``python -m tpjb_ident``."""
     _one_thread_for_small_matrices()
-    sys.unraisablehook = _interrupt_again
-    _end_in_order()
+    interrupts.listen()
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
@@ -23,36 +24,8 @@ def main() -> None:
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)
-
-
-def _end_in_order() -> None:
-    """Let SIGTERM end a command as Ctrl-C does: what it began is cleared away, its workers are ended."""
-    import signal
-
-    def terminate(number: int, frame: Any) -> None:
-        raise KeyboardInterrupt(number)
-
-    signal.signal(signal.SIGTERM, terminate)
-
-
-def _interrupt_again(lost: Any) -> None:
-    """Deliver a Ctrl-C or SIGTERM again that fell into a callback, as of an import lock: Python drops such errors."""
-    import signal
-    import threading
-    from _thread import interrupt_main
-
-    number = next(iter(getattr(lost.exc_value, "args", ())), signal.SIGINT)  # SIGTERM says its own
-
-    def interrupt() -> None:
-        if hasattr(signal, "pthread_kill"):  # wakes a thread that waits, which the other one does not
-            signal.pthread_kill(threading.main_thread().ident or 0, number)
-        else:
-            interrupt_main()
-
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(0.05, interrupt).start()  # by then the callback has ended; if it meets another: again
-    else:
-        sys.__unraisablehook__(lost)
+    finally:
+        interrupts.stop_listening()
 
 
 def _one_thread_for_small_matrices() -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.command import Command, campaign_place, command
+from tpjb_ident.cli.common.interrupts import heard
 from tpjb_ident.cli.common.options import DEMO, BearingOption
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import former_runs
@@ -63,6 +64,7 @@ def view(
         try:
             serve(session, port, ready, seconds)
         except KeyboardInterrupt:
+            heard()
             c.note("closed.")
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.interrupts import heard
 from tpjb_ident.cli.common.options import BearingOption
 from tpjb_ident.cli.common.quantities import parse_amount
 from tpjb_ident.columns import Column, place_of, symbol
@@ -82,6 +83,7 @@ def watch(
                 break
             time.sleep(min(pause, 0.25 * patience) if once else pause)
     except KeyboardInterrupt:
+        heard()
         c.print("Stopped. The same command goes on from here.")
         return
     c.print(f"Results: {c.target}")

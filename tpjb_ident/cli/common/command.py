@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigdata.problem import RigError
+from tpjb_ident.cli.common.interrupts import heard, interrupt_behind
 from tpjb_ident.cli.common.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
@@ -179,7 +180,7 @@ class Command(Terminal):
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
         except Exception as error:
-            ended = _interrupt_behind(error)
+            ended = interrupt_behind(error)
             if ended is not None:  # it fell into an import, which makes an error of its own of it
                 return self._interrupted(ended)
             message = _bad_input_message(error)
@@ -193,6 +194,7 @@ class Command(Terminal):
         return 0
 
     def _interrupted(self, error: KeyboardInterrupt) -> int:
+        heard()
         kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)
         self.error(kind, "nothing was written.")
         return exit_code
@@ -291,13 +293,6 @@ def _rows(path: Path) -> Any:
         table = pq.ParquetFile(stream)
         count = table.metadata.num_rows
         return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
-
-
-def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
-    """The interrupt that an error was made of, if any."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error
 
 
 def _bad_input_message(error: Exception) -> str | None:
