@@ -156,7 +156,7 @@ class RunReader(RecordFile):
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.
 
-        Straight lines, missing before the first sample and after the last; no phasor may come from it.
+        Straight lines, missing from a step before the first sample and after the last; no phasor may come from it.
         """
         length = self._grid(name).length
         (values,) = self.read_device([name], 0, length)
@@ -164,7 +164,11 @@ class RunReader(RecordFile):
         finite = np.isfinite(values)
         if not finite.any():
             return np.full(stop - start, np.nan)
-        return np.interp(self.time(start, stop), at[finite], values[finite], left=np.nan, right=np.nan)
+        at, time = at[finite], self.time(start, stop)
+        within = np.clip(time, at[0], at[-1])
+        readings = np.interp(within, at, values[finite])
+        readings[np.abs(time - within) > 1.0 / self._grid(name).rate] = np.nan
+        return readings
 
     def _notes(self, members: str, names: Sequence[str], units: Mapping[str, str]) -> tuple[Problem, ...]:
         """Units other than the manifest's, channels that are sampled apart, and those that nobody describes."""

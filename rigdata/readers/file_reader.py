@@ -98,10 +98,10 @@ def read_contents(record: RecordFile) -> Contents:
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         fault = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
         raise record.refuse("", fault, again) from error
-    series = table(contents.series, record.channels, record.stated_rate)
-    if not series:
+    contents = table(contents, record.channels, record.stated_rate)
+    if not contents.series:
         raise record.refuse("", "holds no channel of numbers", "Export the run again, with its channels")
-    return replace(contents, series=series)
+    return contents
 
 
 @dataclass(frozen=True)

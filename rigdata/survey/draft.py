@@ -7,7 +7,7 @@ import math
 import re
 
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field
-from rigdata.survey.channels import ChannelGuess, Entry, quantity_of_unit
+from rigdata.survey.channels import PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey
 
@@ -46,8 +46,9 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     if surveyed.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
-    if surveyed.clock:
-        lines += [f"[channels.{_key(surveyed.clock)}]", 'quantity = "time"', 'unit = "s"', ""]
+    for clock, unit in surveyed.clocks.items():
+        spelt = usable_unit(unit.value)
+        lines += [f"[channels.{_key(clock)}]", 'quantity = "time"', _line("unit", f'"{spelt}"', unit), ""]
     for block in [*channel_blocks(surveyed).values(), *(run_lines(run) for run in surveyed.runs)]:
         lines += [*block, ""]
     return "\n".join(_explained_once(lines)).rstrip() + "\n"
@@ -100,7 +101,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     if guess.axis.value is not None and (guess.polarity < 0 or (like and guess.polarity != polarity)):
         lines.append(f"polarity = {guess.polarity}")
     if quantity == "temperature":
-        pad = re.search(r"(?:pad|t|tc|temp\w*?)[-_ #]*(\d{1,2})(?!\d)", name, re.IGNORECASE)
+        pad = re.search(rf"(?:{PAD}|t|tc|temp\w*?)[-_ #]*(\d{{1,2}})(?!\d)", name, re.IGNORECASE)
         lines.append(f"pad = {int(pad[1])}   # (guess) its name" if pad and int(pad[1]) else "# pad = 1")
     return lines
 

@@ -27,7 +27,7 @@ from rigdata.survey.axes import (
     with_axes,
 )
 from rigdata.survey.channels import ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
-from rigdata.survey.exports import Export
+from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
 
 #: Directions [deg] no farther apart than this are meant to be one; a dry test so near a pad's is toward that pad.
@@ -51,7 +51,7 @@ class Survey:
     channels: dict[str, ChannelGuess]
     runs: tuple[RunGuess, ...]
     speed_line: float = float("nan")
-    clock: str = ""
+    clocks: dict[str, Entry] = field(default_factory=dict)  #: unit of every time column, by name
     nameless: int = 0
     per_hertz: dict[str, float] = field(default_factory=dict)
 
@@ -62,6 +62,7 @@ def survey(
     pivots: Sequence[float] = (),
 ) -> Survey:
     """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
+    exports, clocks = in_seconds(exports, described or {})
     folder = _Folder(exports, described or {}, pivots)
     folder.find_loads()
     speed = folder.common_line()
@@ -73,7 +74,7 @@ def survey(
         runs=_set_points(folder.runs),
         speed_line=speed.number,
         per_hertz=folder.tachometers(speed.number),
-        clock=next((e.clock for e in exports if e.clock), ""),
+        clocks=clocks,
         nameless=max((e.nameless for e in exports), default=0),
     )
 

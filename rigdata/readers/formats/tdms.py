@@ -36,8 +36,7 @@ def read_series(path: Path) -> list[Series]:
         for group in file.groups():
             channels = [c for c in group.channels() if np.issubdtype(c.dtype or object, np.number)]
             clock = next((c for c in channels if is_time(c.name) and len(c)), None)
-            unit = "" if clock is None else str(clock.properties.get("unit_string", ""))
-            shared = None if clock is None else seconds(np.asarray(clock[:], dtype=float), unit)
+            shared = None if clock is None else seconds(_series(clock, group.name, None))
             series += [_series(channel, group.name, shared) for channel in channels if channel is not clock]
     return series
 
