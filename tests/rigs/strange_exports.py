@@ -252,7 +252,9 @@ def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Planned], str]:
     def title(test: Planned) -> str:
         form = {"dynamic": dynamic, "dry": dry, "clearance": sweep}[test.kind]
         kn, lbf, kgf = f"{test.load / 1e3:g}", f"{test.load / LBF:.0f}", f"{test.load / KGF:.0f}"
-        return form.format(kn=kn, lbf=lbf, kgf=kgf, n=f"{test.load:.0f}", f=f"{test.frequency:g}", pad=test.pad, i=test.number)
+        return form.format(
+            kn=kn, lbf=lbf, kgf=kgf, n=f"{test.load:.0f}", f=f"{test.frequency:g}", pad=test.pad, i=test.number
+        )
 
     return title
 
