@@ -31,17 +31,17 @@ SAMPLE = 8
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
-#: Suffix -> module of `rigdata.readers`, extra that brings its library.
+#: Suffix -> module of `rigdata.readers`, its function, and the extra that brings its library.
 FORMATS = {
-    ".tdms": ("formats.tdms", "tdms"),
-    ".lvm": ("text.lvm", ""),
-    ".uff": ("formats.uff58", "uff"),
-    ".unv": ("formats.uff58", "uff"),
-    ".58": ("formats.uff58", "uff"),
-    ".mf4": ("formats.mdf4", "mdf"),
-    ".mdf": ("formats.mdf4", "mdf"),
-    ".mat": ("formats.mat", ""),
-    ".parquet": ("formats.parquet", ""),
+    ".tdms": ("formats.loggers", "read_tdms", "tdms"),
+    ".lvm": ("text.lvm", "read_lvm", ""),
+    ".uff": ("formats.loggers", "read_uff", "uff"),
+    ".unv": ("formats.loggers", "read_uff", "uff"),
+    ".58": ("formats.loggers", "read_uff", "uff"),
+    ".mf4": ("formats.loggers", "read_mdf", "mdf"),
+    ".mdf": ("formats.loggers", "read_mdf", "mdf"),
+    ".mat": ("formats.mat", "read_mat", ""),
+    ".parquet": ("formats.loggers", "read_parquet", ""),
 }
 #: Suffixes of loggers and programs that write one of the known kinds on request.
 _EXPORTABLE = {

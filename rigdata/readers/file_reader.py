@@ -75,12 +75,12 @@ def read_contents(record: RecordFile) -> Contents:
     size = path.stat().st_size
     if size == 0:
         raise record.refuse("", "is empty", again)
-    name, extra = FORMATS.get(path.suffix.lower(), ("", ""))
+    name, function, extra = FORMATS.get(path.suffix.lower(), ("", "", ""))
     if name and size > LARGEST:
         raise record.refuse("", f"is larger than {LARGEST >> 30} GB", "Split the run")
     try:
         if name:
-            contents = Contents(importlib.import_module(f"rigdata.readers.{name}").read_series(path))
+            contents = Contents(getattr(importlib.import_module(f"rigdata.readers.{name}"), function)(path))
         else:
             contents = importlib.import_module("rigdata.readers.text.csv").read_text(record)
     except RigDataError as error:

@@ -6,12 +6,13 @@ import contextlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series
+from rigdata.survey.axes import part_means
 from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
@@ -163,13 +164,9 @@ def _slow(series: Series) -> FloatArray:
     """Means over blocks of a quarter of a second."""
     step = max(1, round(_BLOCK * series.rate))
     count = len(series.values) // step
-    blocks = series.values[: count * step].reshape(count, step)
-    means = []
-    for block in blocks:
-        finite = block[np.isfinite(block)]
-        if len(finite):
-            means.append(float(np.mean(finite)))
-    return np.array(means)
+    blocks = replace(series, values=series.values[: count * step])
+    means = part_means([blocks], count)[:, 0] if count else np.empty(0)
+    return np.asarray(means[np.isfinite(means)])
 
 
 def strongest_lines(channels: Sequence[Series]) -> tuple[SpectralPeak, ...]:

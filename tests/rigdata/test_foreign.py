@@ -173,7 +173,7 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
 
     (tmp_path / "a.tdms").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    monkeypatch.delitem(sys.modules, "rigdata.readers.formats.tdms", raising=False)
+    monkeypatch.delitem(sys.modules, "rigdata.readers.formats.loggers", raising=False)
     with pytest.raises(RigDataError, match=r'pip install "tpjb-ident\[tdms\]"'):
         read_series(tmp_path / "a.tdms", "a.tdms")
 
