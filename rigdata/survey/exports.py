@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, RecordFile, suffix_hint
 from rigdata.readers.file_reader import read_contents
-from rigdata.readers.series import Series, with_unique_names
+from rigdata.readers.series import TIME_FACTORS, Series, with_unique_names
 from rigdata.readers.text.head import find_head
 from rigdata.safe_path import inside
+from rigdata.survey.channels import Entry
 
 _MOST_FILES = 5000
+#: Slower records of a whole folder are none of a turning shaft [Hz].
+_SLOWEST = 20.0
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ class Export:
 
     name: str
     series: tuple[Series, ...] = field(repr=False)
-    clock: str = ""
+    clocks: Mapping[str, str] = field(default_factory=dict)  #: unit of every time column, by name; "" if not stated
     nameless: int = 0
 
     @property
@@ -67,12 +71,39 @@ def read_export(path: Path, name: str | None = None, names: Sequence[str] = ()) 
         if not head.header_line:
             record, nameless = replace(record, spec=CsvSpec(names=tuple(names))), len(head.names)
     contents = read_contents(record)
-    series, clock = tuple(with_unique_names(contents.series)), contents.clock
+    series, clocks = tuple(with_unique_names(contents.series)), contents.clocks
     times = next((s for s in series if _counts_evenly(s)), None)
-    if nameless and not clock and times is not None:
+    if nameless and not clocks and times is not None:
         series = tuple(replace(s, time=times.values) for s in series if s is not times)
-        clock = times.name
-    return Export(record.file, series, clock, nameless)
+        clocks = {times.name: ""}
+    return Export(record.file, series, clocks, nameless)
+
+
+def in_seconds(
+    exports: Sequence[Export], described: Mapping[str, Mapping[str, Any]]
+) -> tuple[list[Export], dict[str, Entry]]:
+    """Exports and the units of their time columns; one that the file does not state is the manifest's, or guessed.
+
+    Nobody records a rig slower than the shaft turns: times that would say so are thousandths or millionths.
+    """
+    unstated = [export for export in exports if export.clocks and not any(export.clocks.values())]
+    rate = max((export.rate for export in unstated), default=float("nan"))
+    names = {name for export in unstated for name in export.clocks}
+    typed = {described[name].get("unit") for name in names if name in described}
+    likely = next((unit for unit in ("s", "ms", "us") if rate / TIME_FACTORS[unit] >= _SLOWEST), "s")
+    unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
+    source = "file" if typed or unit == "s" else "guess"
+    units = dict.fromkeys(names, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
+    units |= {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items() if stated}
+    factor = TIME_FACTORS[unit]
+    changed = []
+    for export in exports:
+        if export in unstated and factor != 1.0:
+            times = {id(s.time): s.time * factor for s in export.series if s.time is not None}
+            series = tuple(replace(s, time=times.get(id(s.time))) for s in export.series)
+            export = replace(export, series=series)
+        changed.append(export)
+    return changed, units
 
 
 def _counts_evenly(series: Series) -> bool:
