@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import oil_force, plane_of, to_plane
+from tpjb_ident.check.set_points import oil_force, plane_of
 
 #: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.
 _SECTORS, _MET = 36, 0.9
@@ -124,7 +124,7 @@ def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
         cells, probes = observation.pick("force"), observation.pick("displacement")
         if len(cells) != 2 or observation.report.doubts & {"force", "displacement"}:
             continue
-        load = to_plane([observation.channels[i] for i in cells], observation.samples[:, cells].T).T
+        load = observation.samples[:, cells] @ plane_of(observation.of("force")).T
         for index in probes:
             centre = _swept_centre(load, observation.samples[:, index])
             if centre is not None:
