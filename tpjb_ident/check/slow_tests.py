@@ -143,9 +143,7 @@ def _check_follows(observation: Observation, planes: _Planes, push: FloatArray) 
     return None
 
 
-def _say_of_probes(
-    observation: Observation, key: tuple[str, str], severity: Severity, text: str, cure: str
-) -> None:
+def _say_of_probes(observation: Observation, key: tuple[str, str], severity: Severity, text: str, cure: str) -> None:
     """Say what is wrong with the probes, in whatever run they serve; `key` stands around their names."""
     names = [channel.name for channel in observation.of("displacement")]
     listed = " and ".join(names)

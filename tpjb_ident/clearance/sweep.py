@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
 from tpjb_ident.slow_records.bad_samples import piece_means, slow_samples
 
@@ -61,7 +61,7 @@ def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", run.file, "record", f"clearance run {run.id} {what}", cure, run=run.id))
+    return refuse(run.file, "record", f"clearance run {run.id} {what}", cure, run.id)
 
 
 def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:

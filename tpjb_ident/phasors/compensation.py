@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.calibration import VECTOR_QUANTITIES, Channel
+from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import device_readers
@@ -62,7 +62,7 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run,
     if not valid[:driven].all():
         text = f"its response at the excitation of {frequencies[~valid][0]:g} Hz is not known, or nothing comes through"
         cure = "Extend filter_table, or check filter"
-        raise RigDataError(Problem("error", run.file, f"channel {name}", text, cure, run.id))
+        raise refuse(run.file, f"channel {name}", text, cure, run.id)
     return np.where(valid, gain, 1.0)
 
 
@@ -127,32 +127,24 @@ def inspect_readings(run: Run) -> tuple[dict[str, SlowerChannel], tuple[Conditio
     What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
     limits, or sampled slower than the others.
     """
-    names = [c.name for c in run.channels.values() if c.quantity in VECTOR_QUANTITIES and c.axis is not None]
-    readings = run.reader.read(names, 0, min(run.length, _LOOK))
-    slower: dict[str, SlowerChannel] = {}
-    clipped: list[Problem] = []
-    rate = run.sample_rate
-    for name, values in zip(names, readings):
-        if run.channels[name].quantity != "acceleration":
-            clipped += _clipped(run, name, values)
-        slow = slower_channel(values, rate)
-        if slow is not None:
-            slower[name] = slow
-    if clipped:
-        raise RigDataError(clipped)
-    return slower, slower_condition(slower)
+    slower = {name: slower_channel(values, run.sample_rate) for name, values in unclipped_readings(run).items()}
+    named = {name: channel for name, channel in slower.items() if channel is not None}
+    return named, slower_condition(named)
 
 
-def refuse_clipped(run: Run) -> None:
-    """Refuse a run in which a channel was driven into its limits: what was cut off cannot be had back."""
+def unclipped_readings(run: Run) -> dict[str, FloatArray]:
+    """Readings of a run's beginning by channel; refused is one driven into its limits: what was cut off is lost."""
+    readings: dict[str, FloatArray] = {}
     clipped: list[Problem] = []
     for reader in device_readers(run):
         rows = reader.read(0, min(reader.length, _LOOK)).rows
         for channel, values in zip(reader.channels, rows):
+            readings[channel.name] = values
             if channel.quantity != "acceleration":
                 clipped += _clipped(run, channel.name, (values - channel.zero) / channel.slope)
     if clipped:
         raise RigDataError(clipped)
+    return readings
 
 
 def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:

@@ -80,14 +80,14 @@ def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest:
         candidate[np.abs(frequency - f) < _LOBE * step] = False
     candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
     candidate[[0, -1]] = False
-    peaks = [float(frequency[i] + step * _vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
+    peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
     faint = record.lines.faint
     sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)
     return peaks + [line.frequency for line, size, limit in zip(faint, sizes, least[at]) if size > limit]
 
 
-def _vertex(three: FloatArray) -> float:
+def vertex(three: FloatArray) -> float:
     """Offset of the top of the parabola through the logarithms of three neighbours [bins]."""
     a, b, c = np.log(np.maximum(three, np.finfo(float).tiny))
     curvature = a - 2 * b + c

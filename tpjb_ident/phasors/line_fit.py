@@ -86,16 +86,11 @@ class WindowFit:
         self.scale[window, channels], self.lost[window, channels] = single.scale[0], single.lost[0]
 
 
-def joined_windows(parts: list[WindowFit]) -> WindowFit:
-    """Windows of one run one after the other."""
-    names = ("z", "mean", "scale", "lost")
-    return WindowFit(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def joined_channels(fits: list[WindowFit]) -> WindowFit:
-    """Channels of the same windows side by side."""
-    z = np.concatenate([fit.z for fit in fits], axis=2)
-    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=1) for n in ("mean", "scale", "lost")))
+def joined(fits: list[WindowFit], channels: bool = False) -> WindowFit:
+    """Windows of one run one after the other, or the channels of the same windows side by side."""
+    z = np.concatenate([fit.z for fit in fits], axis=2 if channels else 0)
+    others = ("mean", "scale", "lost")
+    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=int(channels)) for n in others))
 
 
 def no_windows(count: int, lines: int, channels: int) -> WindowFit:

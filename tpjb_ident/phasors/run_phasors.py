@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, refuse_clipped
+from tpjb_ident.phasors.compensation import compensated, unclipped_readings
 from tpjb_ident.phasors.extra_lines import lines_beside, unexpected_lines
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.filled import filled_channels, slower_condition
@@ -35,9 +35,9 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     if run.excitation_kind != "sine":
         text = f"is excited by {run.excitation_kind}; coefficients come from sines, one frequency per run"
         cure = "Excite with sines, or leave the run out"
-        raise RigDataError(Problem("error", run.file, "excitation", text, cure, run.id))
+        raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    refuse_clipped(run)
+    unclipped_readings(run)
     inspection = _inspected(run, housing_mass, settings)
     result, slower = inspection.result, inspection.slower
     if inspection.run.length < run.length:
@@ -142,9 +142,8 @@ class _Inspection:
         near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
         beside = tuple(frequency for frequency in near if frequency is not None)
         if beside:
-            found = tuple(line.frequency for line in lines.nuisance if line.name == "found")
             exact = tuple(line.frequency for line in lines.excitation)
-            self._fit(self._lines(exact, lines.speed, (*found, *beside)), self.follow)
+            self._fit(self._lines(exact, lines.speed, (*lines.found, *beside)), self.follow)
             self.conditions += (lines_beside(beside),)
 
 
