@@ -12,7 +12,7 @@ from rigdata.operating_point import OperatingPoint
 from tests.dynamic.phasor_cases import complex_normal, vector_channels
 from tpjb_ident.phasors import extra_lines
 from tpjb_ident.phasors.channel_times import Samples
-from tpjb_ident.phasors.extra_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
+from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,

@@ -20,6 +20,7 @@ from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, oth
 from tpjb_ident.check.rotation import shaft_force
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
@@ -199,11 +200,9 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
         column = column[np.isfinite(column)]
         if len(column) < 10:
             return False
-        # Away from steady running nothing fits, but noise shows in the bends from sample to sample.
-        bends = np.diff(column, 2) / math.sqrt(6.0)
-        noise = 1.4826 * float(np.median(np.abs(bends)))
-        if lines is not None and run.kind in {"dynamic", "locus"}:
-            noise = float(lines.scatter[index])
+        # away from steady running nothing fits, but noise shows in the bends from sample to sample
+        fitted = lines is not None and run.kind in {"dynamic", "locus"}
+        noise = float(lines.scatter[index]) if fitted and lines is not None else white_noise(column)
         steps = np.diff(np.unique(column[:4000]))
         if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
             return False

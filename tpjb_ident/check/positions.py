@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tpjb_ident.check.observation import Observation
+from tpjb_ident.phasors.bad_samples import robust_deviation
 
 #: No film bearing lets its shaft travel further [m].
 _MAX_TRAVEL = 1e-3
@@ -52,7 +53,7 @@ def _check_steps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
         return
     values = np.array([m for _, m in means])
     off = values - np.median(values)
-    allowed = max(_STEP * 1.4826 * float(np.median(np.abs(off))), _LEAST_STEP)
+    allowed = max(_STEP * robust_deviation(off), _LEAST_STEP)
     for (observation, _), distance in zip(means, off):
         if abs(distance) > allowed and "displacement" not in observation.report.doubts:
             text = f"reads {1e6 * distance:+.0f} um on average beside the other runs at this operating point"

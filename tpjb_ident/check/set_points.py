@@ -15,6 +15,7 @@ from rigdata.problem import Severity
 from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.run_data import oil_force as film_force
 
 #: Angle [deg] between what is stated and what is shown: warning, error.
@@ -77,7 +78,7 @@ def check_static_loads(observations: Sequence[Observation]) -> None:
         return
     middle = complex(np.median(ratios.real), np.median(ratios.imag))
     off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
-    allowed = max(_LOAD_OFF, _MANY * 1.4826 * float(np.median(off)))
+    allowed = max(_LOAD_OFF, _MANY * robust_deviation(off))
     for (observation, ratio), distance in zip(shown, off):
         reported = any(f.key.startswith("load ") for f in observation.report.found)
         if distance > allowed and not reported:

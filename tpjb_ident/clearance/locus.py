@@ -16,9 +16,9 @@ from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import refused_runs, slow_samples
 from tpjb_ident.presentation import Presented
-from tpjb_ident.slow_records.bad_samples import refused_runs, slow_samples
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,10 +15,10 @@ from tpjb_ident.clearance.polygon import Centre, CentreRule, SideFit, corners, f
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
-from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     import pandas as pd

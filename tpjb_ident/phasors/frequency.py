@@ -13,6 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.line_fit import usual_scale
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
@@ -66,7 +67,7 @@ def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> fl
         return 0.0
     steps = _frequency_steps(z, t)
     slip = float(np.median(steps))
-    spread = 1.4826 * float(np.median(np.abs(steps - slip)))
+    spread = robust_deviation(steps - slip)
     return slip if abs(slip) > 4 * spread / np.sqrt(len(steps)) else 0.0
 
 

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.phasors.bad_samples import BAD_LIMIT, SCALE_LIMIT, is_present, robust_fit, with_flanks
+from tpjb_ident.phasors.bad_samples import (
+    BAD_LIMIT,
+    SCALE_LIMIT,
+    is_present,
+    robust_deviation,
+    robust_fit,
+    with_flanks,
+)
 from tpjb_ident.phasors.windows import line_design
 
 #: Outlying samples up to this share are left out again and again until fit and verdict agree.
@@ -198,7 +205,7 @@ class LineFitter:
                 return None
             solution = coefficients - change
             size = np.abs(residual + self.design @ change)
-            scale = 1.4826 * float(np.median(size))
+            scale = robust_deviation(size)
         return None
 
 

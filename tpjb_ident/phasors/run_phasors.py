@@ -14,13 +14,11 @@ import numpy as np
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, unclipped_readings
-from tpjb_ident.phasors.extra_lines import lines_beside, unexpected_lines
+from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition, unclipped_readings
 from tpjb_ident.phasors.extraction import extract
-from tpjb_ident.phasors.filled import filled_channels, slower_condition
+from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
 from tpjb_ident.phasors.lines import LineSet, known_lines
-from tpjb_ident.phasors.near_lines import near_line
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed

@@ -22,10 +22,10 @@ from scipy import fft, ndimage
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, refuse
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import slow_samples
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, Samples, cut_blocks, pad_axes
 from tpjb_ident.pivot.steps import Hold, find_holds
-from tpjb_ident.slow_records.bad_samples import slow_samples
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel

@@ -14,6 +14,8 @@ from scipy import special
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
@@ -36,8 +38,6 @@ from tpjb_ident.pivot.law_fit import (
 )
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_of
-from tpjb_ident.slow_records.bad_samples import refused_runs
-from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel

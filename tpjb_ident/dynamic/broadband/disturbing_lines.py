@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples
-from tpjb_ident.phasors.extra_lines import vertex
+from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.lines import MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
 
 #: Highest harmonics of shaft and mains that are looked for.

@@ -18,6 +18,7 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.bad_samples import robust_deviation
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -94,7 +95,7 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
 
 def _noise(x: FloatArray, median: FloatArray) -> float:
     """Robust standard deviation about the running median, never below the recording's resolution."""
-    spread = 1.4826 * float(np.median(np.abs(x - median)))
+    spread = robust_deviation(x - median)
     steps = np.abs(np.diff(x))
     # two converters turned into X and Y leave rounding residues: those are no steps
     steps = steps[steps > 1e-6 * np.ptp(x)]
