@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
-from tests.dynamic.phasor_cases import complex_normal
+from tests.dynamic.phasor_cases import complex_normal, vector_channels
 from tpjb_ident.phasors import extra_lines
 from tpjb_ident.phasors.channel_times import Samples
-from tpjb_ident.phasors.extra_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
+from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,
@@ -24,7 +24,7 @@ from tpjb_ident.phasors.frequency import (
 )
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, vector_channels
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.whole_record import fitted_whole
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12

@@ -33,7 +33,7 @@ LIMITS = {
     "exports": (6.09, 941),
     "view": (4.96, 575),
 }
-MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "identification")
+MEASUREMENT = ("dynamic", "check", "phasors", "estimate", "terms", "identification")
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import refused_runs, slow_samples
 from tpjb_ident.presentation import Presented
-from tpjb_ident.slow_records.bad_samples import slow_samples
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,9 +150,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     """
     runs = campaign.of_kind("locus")
     if not runs:
-        raise RigDataError(
-            Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-        )
+        raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
     records, refused = _usable(runs)
     noise = _noise(list(records.values()))
     centre = np.zeros(2) if polygon is None else polygon.centre
@@ -184,9 +182,7 @@ def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Record], tuple[Condition, .
             problems += error.problems
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
-    reasons = {str(p.run): p.what for p in reversed(problems)}
-    listed = "; ".join(f"{run} ({reasons[run]})" for run in reasons)
-    return records, (Condition("runs-refused", listed),) if reasons else ()
+    return records, refused_runs(problems)
 
 
 @dataclass(frozen=True)
@@ -211,7 +207,7 @@ def _read(run: Run) -> _Record:
     time, force, place, good, _ = slow_samples(run)
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
-        raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))
+        raise refuse(run.file, "record", what, "Repeat this direction", run.id)
     time, place = time[good], place[good]
     design = _turning(time, run.point.shaft_speed)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]

@@ -144,12 +144,6 @@ def _patterns(usable: BoolArray) -> list[tuple[BoolArray, list[int]]]:
     return [(rows, members) for rows, members in table if len(members) > 1]
 
 
-def vector_channels(quantities: tuple[str, ...] = QUANTITIES) -> tuple[Channel, ...]:
-    """Channels along X and Y of some quantities: what stands for vectors that were never channels."""
-    names = [(quantity, axis) for quantity in quantities for axis in (0, 1)]
-    return tuple(Channel(f"{quantity} {'xy'[axis]}", quantity, axis=axis * np.pi / 2) for quantity, axis in names)
-
-
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
     """Oil-film force phasors, (..., 2) [N]; `cell_force` (..., 2) [N], `housing_acceleration` (..., 2).
 
