@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, place_of, size, symbol
+from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
 from tpjb_ident.report.drawing.colours import INK, LIGHT
-from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures, shrink
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.series import point_labels, set_point_ticks
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.page import Page, Section, Table, write_page
 from tpjb_ident.rounding import significant
@@ -22,8 +23,6 @@ from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
 _MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
-#: Height of the ticks' second line [inches].
-_SECOND_LINE = 0.16
 
 
 def write_difference_report(
@@ -95,24 +94,19 @@ def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[
 def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
     """Differences of K or of C at every point, and which of them changed."""
     rows = []
-    for row in points.to_dict("records"):
-        cells, changed = [], []
+    for place, row in zip(point_labels(points), points.to_dict("records"), strict=True):
+        cells = []
         for entry in ENTRIES:
             cells.append(shown_difference(row, kind.column(entry), kind.display_scale))
             if row[f"{kind.symbol}{entry}_changed"] == "yes":
                 cells[-1] += " *"
-                changed.append(f"{kind.symbol}{entry}")
         flags = dict.fromkeys(
             f for side in "ab" for f in str(row.get(f"quality_{side}", "ok")).split("; ") if f != "ok"
         )
-        rows.append([_place(row), *cells, ", ".join(flags) or "ok"])
+        rows.append([place, *cells, ", ".join(flags) or "ok"])
     named = [f"{kind.symbol}{entry}, {kind.display_unit}" for entry in ENTRIES]
     caption = f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow"
     return Table(caption, ["point", *named, "flags of both"], rows, frozenset({0, 5}))
-
-
-def _place(row: Mapping[Any, Any]) -> str:
-    return place_of(row["static_load_N"], row["excitation_Hz"])
 
 
 def _drawn(points: pd.DataFrame) -> Figure:
@@ -134,11 +128,7 @@ def _drawn(points: pd.DataFrame) -> Figure:
             axes.plot(x, value, marker, color=LIGHT[colour], markerfacecolor=LIGHT["paper"], markersize=5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
             axes.plot(x[changed], value[changed], marker, color=LIGHT[colour], markersize=5)
-        texts = [
-            f"{row['static_load_N'] * per('load'):.4g}\n{row['excitation_Hz']:g}" for row in points.to_dict("records")
-        ]
-        axes.set_xticks(place, texts)
-        shrink(axes, bottom=_SECOND_LINE)
+        set_point_ticks(axes, points)
     add_legend(left, across=True)
     box = right.get_position()
     right.set_position((box.x0, box.y0, box.width, left.get_position().height))

@@ -14,7 +14,7 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
+from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coherence import coherence
@@ -216,9 +216,9 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run), _EVIDENCE),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
                       coherence_spectrum(run), _EVIDENCE),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -246,7 +246,7 @@ def budget_table(result: Identification) -> Table:
     """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
-    for p in result.points:
+    for place, p in zip(point_labels(result.to_frame()), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
         for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
@@ -254,6 +254,6 @@ def budget_table(result: Identification) -> Table:
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
             parts = [fixed(float(deviations[n][i]) / scale, digits) if n in deviations else "–" for n in sources]
             name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
-            rows.append([point_label(p), name, value, *parts])
+            rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
     return Table(caption, ["point", "", "value", *sources], rows, frozenset({0, 1}))
