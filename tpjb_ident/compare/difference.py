@@ -93,6 +93,7 @@ class Difference:
 
     a: Side
     b: Side
+    pairs: IntArray  #: (n, 2) rows of the sides' tables that met
     points: pd.DataFrame  #: difference.csv
     pivots: pd.DataFrame  #: pivot_difference.csv
     clearance: pd.DataFrame  #: clearance_difference.csv
@@ -118,6 +119,7 @@ def difference_of(a: Side, b: Side) -> Difference:
     return Difference(
         a,
         b,
+        pairs,
         _points(a, b, pairs, shared),
         _pivots(a, b),
         _clearance(a, b),
@@ -308,7 +310,8 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
         return (f"{a} and {b} have no operating point in common.", *_sentences_beside(difference))
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
     largest = _largest_change(points)
-    rest = f"{no} are the same within {100 * _NO_CHANGE:g} %, of {number - yes - no} the records cannot tell."
+    rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
+    rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
     return (
         f"{head}, most of all {largest}." if yes else f"{head}.",
         f"At {counted(len(points), 'common operating point')}: {rest}",

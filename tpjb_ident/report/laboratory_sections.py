@@ -45,16 +45,10 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
     if bearing is not None:
         diameter, length = (amount(v, "size", ".4g") for v in (bearing.journal_diameter, bearing.length))
         facts["Bearing"] = f"{bearing.name}, {len(bearing.pads)} pads, Ø {diameter} × {length}"
-    if points:
-        loads = _span({p.point.static_load * per("load") for p in points}, symbol("load"))
-        directions = ", ".join(f"{a:g}°" for a in sorted({p.point.static_load_direction_deg for p in points}))
-        facts["Static load"] = f"{loads} at {directions}"
-        facts["Shaft"] = ", ".join(
-            spinning(*s) for s in sorted({(p.point.shaft_speed_hz, p.point.rotation) for p in points})
-        )
-        amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
-        moved = f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)" if amplitude else ""
-        facts["Excitation"] = _span({p.point.excitation_hz for p in points}, "Hz") + moved
+    facts |= set_points([p.point.key for p in points])
+    amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
+    if amplitude:
+        facts["Excitation"] += f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)"
     if isinstance(campaign, TableSource):
         return facts | {"Source": campaign.description}
     counts = Counter(_KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
@@ -64,6 +58,17 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         "Runs": f"{len(campaign.runs)} ({kinds})",
         "Measured": measured or "date and by are not in campaign.toml",
     }
+
+
+def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[str, str]:
+    """Loads, speeds and excitation of operating points, whose keys are given."""
+    if not keys:
+        return {}
+    loads, directions, speeds, excitations, senses = zip(*keys, strict=True)
+    shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses, strict=True))))
+    at = ", ".join(f"{angle:g}°" for angle in sorted(set(directions)))
+    load = _span({value * per("load") for value in loads}, symbol("load"))
+    return {"Static load": f"{load} at {at}", "Shaft": shaft, "Excitation": _span(set(excitations), "Hz")}
 
 
 def _span(values: set[float], unit: str) -> str:
@@ -97,7 +102,7 @@ def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) ->
     ]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
-    return f"{head}: {', '.join(texts)}." if texts else "No flags: nothing about the records calls for caution."
+    return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."
 
 
 def set_up_section(comparison: Comparison) -> Section:
