@@ -117,9 +117,12 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
         np.array([cells.get(column + end, math.nan) for column in COEFFICIENT_COLUMNS])
         for end in ("", "_se", "_lo", "_hi")
     )
-    errors = np.where(np.isnan(errors), (high - low) / (2 * 1.96), errors)
+    stated = (high - low) / (2 * 1.96)  # our own tables have both: the interval holds calibration too
+    errors = np.where(np.isnan(stated), errors, stated)
+    text = cells.get("quality") or cells.get("status") or ""
+    status = tuple(name for name in str(text).split("; ") if name not in ("", "ok", "nan"))
     position = (cells.get("x_m", math.nan), cells.get("y_m", math.nan))
-    return TableRow(line, point, values, errors, position, cells.get("converged") is not False)
+    return TableRow(line, point, values, errors, position, cells.get("converged") is not False, status)
 
 
 @dataclass(frozen=True)

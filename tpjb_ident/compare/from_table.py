@@ -12,6 +12,8 @@ from model.bearing import Bearing
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
 from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant, possible_variants
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
+from tpjb_ident.condition_kinds import KINDS
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
@@ -54,6 +56,17 @@ def _point(row: TableRow) -> PointResult:
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
     counts: tuple[Any, ...] = (0, 0, 0.0, np.nan, np.nan)  # records, windows, outliers, coherence, amplitude
+    quality = tuple(Condition(name) for name in row.status if name in KINDS)
     return PointResult(
-        row.point, stiffness, {_METHOD: stiffness}, row.point.static_load, nowhere, nowhere, {}, *counts, (), (), ()
+        row.point,
+        stiffness,
+        {_METHOD: stiffness},
+        row.point.static_load,
+        nowhere,
+        nowhere,
+        {},
+        *counts,
+        quality,
+        (),
+        (),
     )

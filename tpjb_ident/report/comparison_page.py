@@ -16,7 +16,7 @@ from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
-from tpjb_ident.report.drawing.series import DIRECT, point_labels
+from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
@@ -149,10 +149,10 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequenc
         )
     )
     flags = _flag_table(comparison)
-    text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
-    sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
-    sections.append(set_up_section(comparison))
-    return sections
+    if flags.rows:
+        sections.append(Section("Quality flags", tables=[flags]))
+    set_up = set_up_section(comparison)
+    return [*sections, set_up] if set_up.tables else sections
 
 
 def _pivot_sections(comparison: Comparison) -> list[Section]:
@@ -194,7 +194,7 @@ _PIVOT_LOADS = (2000.0, 4000.0)
 def measured_table(result: Identification) -> Table:
     """K and C of every point with intervals."""
     rows = []
-    for place, p in zip(point_labels(result.to_frame()), result.points, strict=True):
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         share = f"{100 * p.outlier_fraction:.0f} %"
         flags = ", ".join(str(c) for c in p.quality) or "ok"
         rows.append([place, *p.stiffness.cells(), str(p.n_windows), share, flags])
@@ -231,7 +231,7 @@ def _flag_table(comparison: Comparison) -> Table:
 def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
     """What can have flags, and its flags."""
     identified = comparison.identification
-    labels = point_labels(identified.to_frame())
+    labels = point_labels(points_table(identified.points))
     parts: list[tuple[str, Sequence[Condition]]] = []
     parts += [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))

@@ -14,7 +14,7 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels
+from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coherence import coherence
@@ -251,7 +251,7 @@ def budget_table(result: Identification) -> Table:
     """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
-    for place, p in zip(point_labels(result.to_frame()), result.points, strict=True):
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
         for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
 from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
-from tpjb_ident.schema import STATIC_KEY
+from tpjb_ident.schema import POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
@@ -66,6 +66,11 @@ def constant_along(series: pd.DataFrame, axis: str) -> str:
 def point_label(p: PointResult) -> str:
     """Load and excitation of a point, in words."""
     return place_of(p.point.static_load, p.point.excitation_hz)
+
+
+def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
+    """Set points of results, by the columns of every table."""
+    return pd.DataFrame([p.point.key for p in points], columns=list(POINT_KEY))
 
 
 def point_labels(table: pd.DataFrame) -> list[str]:
