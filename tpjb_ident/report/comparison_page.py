@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.columns import amount, place_of, size, symbol
+from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
-from tpjb_ident.report.drawing.series import DIRECT, point_label
+from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
@@ -149,10 +149,10 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequenc
         )
     )
     flags = _flag_table(comparison)
-    text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
-    sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
-    sections.append(set_up_section(comparison))
-    return sections
+    if flags.rows:
+        sections.append(Section("Quality flags", tables=[flags]))
+    set_up = set_up_section(comparison)
+    return [*sections, set_up] if set_up.tables else sections
 
 
 def _pivot_sections(comparison: Comparison) -> list[Section]:
@@ -194,10 +194,10 @@ _PIVOT_LOADS = (2000.0, 4000.0)
 def measured_table(result: Identification) -> Table:
     """K and C of every point with intervals."""
     rows = []
-    for p in result.points:
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         share = f"{100 * p.outlier_fraction:.0f} %"
         flags = ", ".join(str(c) for c in p.quality) or "ok"
-        rows.append([point_label(p), *p.stiffness.cells(), str(p.n_windows), share, flags])
+        rows.append([place, *p.stiffness.cells(), str(p.n_windows), share, flags])
     named = [f"{kind.symbol}{e}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING) for e in ENTRIES]
     columns = ["point", *named, "windows", "outliers", "flags"]
     return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
@@ -207,14 +207,13 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
     """Direct coefficients predicted with every pivot model, and how far off each is."""
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
-    for _, row in ordered.iterrows():
+    for label, (_, row) in zip(point_labels(ordered), ordered.iterrows(), strict=True):
         cells = []
         for name in DIRECT:
             column = coefficient_column(name)
             cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
-        label = place_of(row["static_load_N"], row["excitation_Hz"])
         rows.append([label, row["pivots"], *cells, remark or ""])
     columns = ["point", "pivots"]
     for name in DIRECT:
@@ -232,7 +231,9 @@ def _flag_table(comparison: Comparison) -> Table:
 def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
     """What can have flags, and its flags."""
     identified = comparison.identification
-    parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
+    labels = point_labels(points_table(identified.points))
+    parts: list[tuple[str, Sequence[Condition]]] = []
+    parts += [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = (("clearance", comparison.clearance), ("locus", comparison.locus))

@@ -14,7 +14,7 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
+from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coherence import coherence
@@ -45,16 +45,10 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
     if bearing is not None:
         diameter, length = (amount(v, "size", ".4g") for v in (bearing.journal_diameter, bearing.length))
         facts["Bearing"] = f"{bearing.name}, {len(bearing.pads)} pads, Ø {diameter} × {length}"
-    if points:
-        loads = _span({p.point.static_load * per("load") for p in points}, symbol("load"))
-        directions = ", ".join(f"{a:g}°" for a in sorted({p.point.static_load_direction_deg for p in points}))
-        facts["Static load"] = f"{loads} at {directions}"
-        facts["Shaft"] = ", ".join(
-            spinning(*s) for s in sorted({(p.point.shaft_speed_hz, p.point.rotation) for p in points})
-        )
-        amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
-        moved = f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)" if amplitude else ""
-        facts["Excitation"] = _span({p.point.excitation_hz for p in points}, "Hz") + moved
+    facts |= set_points([p.point.key for p in points])
+    amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
+    if amplitude:
+        facts["Excitation"] += f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)"
     if isinstance(campaign, TableSource):
         return facts | {"Source": campaign.description}
     counts = Counter(_KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
@@ -64,6 +58,17 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         "Runs": f"{len(campaign.runs)} ({kinds})",
         "Measured": measured or "date and by are not in campaign.toml",
     }
+
+
+def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[str, str]:
+    """Loads, speeds and excitation of operating points, whose keys are given."""
+    if not keys:
+        return {}
+    loads, directions, speeds, excitations, senses = zip(*keys, strict=True)
+    shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses, strict=True))))
+    at = ", ".join(f"{angle:g}°" for angle in sorted(set(directions)))
+    load = _span({value * per("load") for value in loads}, symbol("load"))
+    return {"Static load": f"{load} at {at}", "Shaft": shaft, "Excitation": _span(set(excitations), "Hz")}
 
 
 def _span(values: set[float], unit: str) -> str:
@@ -97,7 +102,7 @@ def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) ->
     ]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
-    return f"{head}: {', '.join(texts)}." if texts else "No flags: nothing about the records calls for caution."
+    return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."
 
 
 def set_up_section(comparison: Comparison) -> Section:
@@ -216,9 +221,9 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run), _EVIDENCE),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
                       coherence_spectrum(run), _EVIDENCE),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -246,7 +251,7 @@ def budget_table(result: Identification) -> Table:
     """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
-    for p in result.points:
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
         for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
@@ -254,6 +259,6 @@ def budget_table(result: Identification) -> Table:
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
             parts = [fixed(float(deviations[n][i]) / scale, digits) if n in deviations else "–" for n in sources]
             name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
-            rows.append([point_label(p), name, value, *parts])
+            rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
     return Table(caption, ["point", "", "value", *sources], rows, frozenset({0, 1}))

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
-from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.schema import STATIC_KEY
+from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
+from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
+from tpjb_ident.schema import POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
@@ -24,6 +26,8 @@ _AXES = {
 }
 #: Points from which on a line joins them; between fewer nobody knows what it would do.
 CURVE = 5
+#: Height of a further line of ticks [inches].
+_LINE = 0.16
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
 
@@ -62,6 +66,36 @@ def constant_along(series: pd.DataFrame, axis: str) -> str:
 def point_label(p: PointResult) -> str:
     """Load and excitation of a point, in words."""
     return place_of(p.point.static_load, p.point.excitation_hz)
+
+
+def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
+    """Set points of results, by the columns of every table."""
+    return pd.DataFrame([p.point.key for p in points], columns=list(POINT_KEY))
+
+
+def point_labels(table: pd.DataFrame) -> list[str]:
+    """Load and excitation of every row, in words, and what else tells the rows apart."""
+    places = [place_of(*row) for row in table[["static_load_N", "excitation_Hz"]].to_numpy()]
+    return [", ".join([place, *others]) for place, others in zip(places, _other_set_points(table), strict=True)]
+
+
+def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
+    """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
+    places = [f"{load * per('load'):.4g}\n{f:g}" for load, f in table[["static_load_N", "excitation_Hz"]].to_numpy()]
+    texts = ["\n".join([place, *others]) for place, others in zip(places, _other_set_points(table), strict=True)]
+    axes.set_xticks(range(len(texts)), texts, fontsize=FONT_SIZE - 1.0)
+    shrink(axes, bottom=0.09 + _LINE * max((text.count("\n") for text in texts), default=0))
+
+
+def _other_set_points(table: pd.DataFrame) -> list[list[str]]:
+    """Of every row, what of these differs between rows: direction of the load, speed of the shaft, its sense."""
+    words = {
+        "static_load_direction_deg": lambda angle: f"{angle:g}°",
+        "shaft_speed_Hz": lambda speed: f"shaft {speed:g} Hz",
+        "rotation": lambda sense: "cw" if sense == ROTATIONS[1] else "ccw",
+    }
+    varied = [name for name in words if name in table and len(table[name].drop_duplicates()) > 1]
+    return [[words[name](row[name]) for name in varied] for row in table.to_dict("records")]
 
 
 def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:
