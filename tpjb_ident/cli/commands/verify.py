@@ -68,7 +68,7 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     if (results / READY).is_dir():
         raise NotTrustedError(f"{results}: a command was killed while its results moved in. Run it again into it.")
     entries = former_runs(results)
-    if not entries:
+    if not any(map(outputs_of, entries.values())):
         raise BadInputError(f"{results}: has no {RECORD} that can be read. Give an output folder of tpjb commands.")
     for name, entry in entries.items():
         if set(outputs_of(entry)) - set(_texts(entry.get("outputs_sha256"))):
