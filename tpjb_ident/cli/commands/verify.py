@@ -37,6 +37,8 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
     files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
+    if not files:
+        raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
     same = sum(f["state"] == "same" for f in files)
     count = "all" if same == len(files) else f"{same} of {len(files)}"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
@@ -68,7 +70,7 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     if (results / READY).is_dir():
         raise NotTrustedError(f"{results}: a command was killed while its results moved in. Run it again into it.")
     entries = former_runs(results)
-    if not any(map(outputs_of, entries.values())):
+    if not entries:
         raise BadInputError(f"{results}: has no {RECORD} that can be read. Give an output folder of tpjb commands.")
     for name, entry in entries.items():
         if set(outputs_of(entry)) - set(_texts(entry.get("outputs_sha256"))):
