@@ -83,11 +83,11 @@ def __getattr__(name: str) -> Any:
         check_model()
     module = importlib.import_module(home)
     value: Any = module if name in _PACKAGES else getattr(module, name)
-    if name in _CHECKED:
+    if callable(value) and not isinstance(value, type):
         from tpjb_ident.arguments import checked
 
         settings = __getattr__("IdentifySettings") if name == "identify" else None
-        value = checked(value, name, _CHECKED[name], settings)
+        value = checked(value, name, _CHECKED.get(name, ""), settings)
     globals()[name] = value
     return value
 

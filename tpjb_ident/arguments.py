@@ -99,7 +99,7 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
 def checked(
     function: Callable[..., Any], called: str, names: str, settings: Callable[[], Any] | None = None
 ) -> Callable[..., Any]:
-    """Let a function take paths for a campaign or a bearing, and refuse in our own words what it cannot take.
+    """Let a function take paths for a campaign or a bearing, and refuse in our own words, with its name.
 
     Where `settings` are given, its default ones, it is called with the clearance of the campaign's bearing in them.
     """
@@ -111,12 +111,18 @@ def checked(
             bound = signature.bind(*args, **kwargs)
         except TypeError as error:
             raise TypeError(f"{called}: {error}; it takes {', '.join(signature.parameters)}") from None
-        for name in names.split():
-            if name in bound.arguments:
-                bound.arguments[name] = _CHECKS[name](bound.arguments[name], f"{called}: {name}")
-        if settings is not None:
-            chosen = bound.arguments.get("settings") or settings()
-            bound.arguments["settings"] = _with_clearance(chosen, bound.arguments["campaign"])
-        return function(*bound.args, **bound.kwargs)
+        try:
+            for name in names.split():
+                if name in bound.arguments:
+                    bound.arguments[name] = _CHECKS[name](bound.arguments[name], name)
+            if settings is not None:
+                chosen = bound.arguments.get("settings") or settings()
+                bound.arguments["settings"] = _with_clearance(chosen, bound.arguments["campaign"])
+            return function(*bound.args, **bound.kwargs)
+        except ValueError as error:
+            text = str(error)
+            if error.args == (text,) and not text.startswith(called):  # else its text is made of more than one
+                error.args = (f"{called}: {text}",)
+            raise
 
     return wrapper

@@ -127,7 +127,7 @@ _STATIC = (
     Column("static_load_N", "force", "N", "static load, set point, per bearing"),
     Column("static_load_direction_deg", "angle", "deg", "where it pushes the shaft, counter-clockwise from x"),
     Column("shaft_speed_Hz", "frequency", "Hz", "set point of the shaft speed"),
-    Column("rotation", "text", "", "which way the shaft turns: counter-clockwise or clockwise"),
+    Column("rotation", "rotation", "", "which way the shaft turns: counter-clockwise or clockwise"),
 )
 _POINT = (*_STATIC[:3], Column("excitation_Hz", "frequency", "Hz", "frequency of the excitation"), _STATIC[3])
 _MEASURED_LOAD = Column("static_load_measured_N", "force", "N", "mean load that the cells show")

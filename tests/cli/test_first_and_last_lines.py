@@ -37,6 +37,29 @@ def test_first_the_verdict_last_the_next_command(name, tmp_path):
     assert str(words[1]) in arguments or str(tmp_path / "out") in arguments
 
 
+@pytest.mark.slow
+def test_of_a_watch_and_of_a_page_as_well(tmp_path):
+    folder = tmp_path / "here"
+    result = tpjb("simulate", ROCKER, "--plan", "short", "--load", "5 kN", "--format", "csv", "--out", folder)
+    assert result.exit_code == 0, result.output
+    campaign = folder / "campaign"
+    watched = tpjb("watch", campaign, "--once", "--settle", "0 s", "--out", tmp_path / "o").stdout.strip().splitlines()
+    assert watched[0] == "virtual: 22 of 22 runs landed, 0 to be repeated, 0 to look at."
+    assert watched[-1] == f"Next: tpjb check {campaign}"
+    shown = tpjb("view", tmp_path / "o", "--no-browser", "--seconds", "0.2").stdout.strip().splitlines()
+    assert shown[-1] == f"Next: tpjb verify {tmp_path / 'o'}"
+
+
+@pytest.mark.slow
+def test_after_a_prediction_without_answer_comes_one_that_may_have_it(tmp_path):
+    result = tpjb("predict", ROCKER, "--load", "500 kN", "--out", tmp_path / "o")
+    assert result.exit_code == 3
+    expected = ["Next:", "tpjb", "predict", ROCKER, "--load", "500 kN", "--speed", "22 Hz"]
+    assert shlex.split(result.stdout.strip().splitlines()[-1]) == [
+        *expected, "--pivots", "rigid", "--thermal", "isothermal",
+    ]  # fmt: skip
+
+
 def test_after_a_result_that_is_not_to_be_trusted_the_records_are_checked(tmp_path, capsys):
     def untrusted(c):
         c.next("compare", "somewhere")

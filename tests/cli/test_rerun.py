@@ -60,7 +60,7 @@ def test_a_number_that_does_not_come_out_again_is_named_with_its_place(results):
     path.write_text("\n".join([head, ",".join(cells), *others]) + "\n", encoding="utf-8")
     result = tpjb("rerun", results)
     assert result.exit_code == 3
-    assert "clearance.csv differs clearance_m, row 1" in plain(result)
+    assert "clearance.csv differs row 1.clearance_m" in plain(result)
     assert "is not what was computed" in plain(result)
     assert tpjb("rerun", results, "--tolerance", "0.01").exit_code == 0
 
@@ -157,4 +157,4 @@ def test_what_should_be_zero_differs_by_rounding(tmp_path):
     assert rounded.state == "numbers"
     moved = pair(tmp_path, "locus.csv", f"{head}\n5000,6.4e-20,-4.2e-5\n", f"{head}\n5000,1e-9,-4.2e-5\n")
     assert moved.state == "differs"
-    assert moved.where == "x_m, row 1: 6.4e-20, now 1e-09"
+    assert moved.where == "row 1.x_m: 6.4e-20, now 1e-09"

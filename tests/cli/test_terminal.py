@@ -164,3 +164,14 @@ def test_what_is_printed_fits_80_columns_in_a_pipe(capsys):
     assert max(map(len, lines)) <= 80
     assert any("dir. deg -90; speed Hz 22" in line for line in lines)  # what is the same in all rows is said once
     assert lines[-1] == "Next: tpjb check 'a folder'"
+
+
+def test_numbers_that_have_no_room_are_below_their_row(capsys):
+    c = Terminal()
+    columns = ["load kN", *(Column(f"c{entry} kN s/m") for entry in "abcdef"), *words("verdict")]
+    rows = [[str(load), *5 * [f"{load}2345.6 ±123.4"], last, "refused"] for load, last in ((3, "-"), (6, "6.5 ±1"))]
+    c.show("a table", columns, rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[-2] == "    ce kN s/m: 62345.6 ±123.4; cf kN s/m: 6.5 ±1; verdict: refused"
+    assert not any("cf kN s/m: -" in line for line in lines)

@@ -81,7 +81,10 @@ def test_results_and_inputs_moved_together_are_found(place, tmp_path):
     assert tpjb("verify", tmp_path / "there" / "out").exit_code == 0
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[" * 5000, '{"schema": "tpjb-run/1", "commands": []}'])
+NOTHING = '{"schema": "tpjb-run/2", "commands": {"locus": {"outputs": []}}}'
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[" * 5000, '{"schema": "tpjb-run/1", "commands": []}', NOTHING])
 def test_without_a_record_nothing_can_be_said(place, text):
     (place / "out" / "run.json").write_text(text)
     result = tpjb("verify", place / "out")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
 import os
 import signal
+import sys
 import time
 import warnings
 from concurrent.futures import Executor, Future
@@ -181,6 +183,37 @@ def test_a_background_job_ends_with_its_block():
     with background_job(time.sleep, 600.0):
         began = time.monotonic()
     assert time.monotonic() - began < 60.0
+
+
+def _interrupted_while_starting(ready):
+    """A process in which Ctrl-C comes between the start of a worker and the line that notes it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    start = multiprocessing.process.BaseProcess.start
+
+    def started(self):
+        start(self)
+        signal.raise_signal(signal.SIGINT)
+
+    multiprocessing.process.BaseProcess.start = started
+    for opened in (lambda: background_job(bytes, 10**7), lambda: local_workers(2, start="fork")):
+        try:
+            with opened() as work:
+                ready.send(f"not interrupted: {work}")
+        except KeyboardInterrupt:
+            ready.send([child.is_alive() for child in multiprocessing.active_children()])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="copies of a process")
+def test_an_interrupt_while_a_process_starts_leaves_none_that_the_end_would_wait_for():
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_interrupted_while_starting, args=(sender,))
+    process.start()
+    sender.close()
+    assert [receiver.recv(), receiver.recv()] == [[], []]
+    process.join(30.0)
+    assert process.exitcode == 0
 
 
 @pytest.mark.slow

@@ -83,6 +83,17 @@ def test_a_line_that_does_not_hold_to_the_schema_is_refused_at_its_place(tmp_pat
         read_table(path)
 
 
+@pytest.mark.parametrize("rotation", ["sideways", "Clockwise", "cw", "nan"])
+def test_the_sense_of_turning_is_one_of_two_words(tmp_path, rotation):
+    """Whatever is not counter-clockwise would be mirrored by the exports, without a word."""
+    head = "static_load_N,rotation"
+    assert read_table(saved(tmp_path, "5000,", "5000,clockwise", head=head))["rotation"].tolist() == [
+        "counter-clockwise", "clockwise",
+    ]  # fmt: skip
+    with pytest.raises(BadInputError, match=r"line 2, rotation: '.*' is not known\. Write counter-clockwise or clock"):
+        read_table(saved(tmp_path, f"5000,{rotation}", head=head))
+
+
 @pytest.mark.parametrize(
     ("end", "limit", "is_within"), [("lo", 9e7, 1), ("lo", 2e8, 0), ("hi", 2e8, 1), ("hi", 9e7, 0)]
 )

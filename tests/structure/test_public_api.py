@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tpjb_ident as ti
@@ -88,7 +89,7 @@ def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_impo
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.splitlines() == [
         "['campaign', 'bearing'] ['source', 'to']",
-        "campaign: must be a Campaign or the path of one, got int.",
+        "diagnose: campaign: must be a Campaign or the path of one, got int.",
     ], done.stderr
 
 
@@ -143,3 +144,16 @@ def test_a_plan_from_python(rocker_file):
     with pytest.raises(ValueError, match="no dynamic runs"):
         ti.plan(rocker_file, [])
     assert point.excitation_hz == 25.0
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("r_matrix", (3, 4)), ("diagnose", (3,)), ("export", (3, "csv", "x")), ("check_campaign", (3,)),
+        ("estimate_dynamic_stiffness", (np.eye(2), np.eye(2), -1.0)), ("load_pivots", (3,)), ("plan", (3, ())),
+        ("predict", ("model/bearings/rocker.toml", 5000.0)), ("identify", (3,)),
+    ],
+)  # fmt: skip
+def test_what_is_refused_begins_with_the_name_of_the_function_once(name, arguments):
+    with pytest.raises(ValueError, match=rf"^{name}: (?!{name})"):
+        getattr(ti, name)(*arguments)

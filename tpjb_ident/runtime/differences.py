@@ -8,13 +8,10 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import TABLES
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Kinds of file whose numbers are compared; of others only the bytes are.
 _DOCUMENTS = {".json": json.loads, ".toml": tomllib.loads}
@@ -48,11 +45,11 @@ def compared(first: Path, second: Path, file: str, tolerance: float) -> Differen
         return Difference(file, "missing" if old.is_file() else "new")
     if old.read_bytes() == new.read_bytes():
         return Difference(file, "same")
-    pairs = _pairs(old, new)
-    if pairs is None:
+    before, now = _content(old), _content(new)
+    if before is None:
         return Difference(file, "not judged")
     size, where = 0.0, ""
-    for place, a, b, width in pairs:
+    for place, a, b, width in _pairs(before, now):
         off = _off(a, b, width)
         if off > size:
             size, where = off, f"{place}: {_shown(a)}, now {_shown(b)}"
@@ -74,39 +71,29 @@ def _off(a: object, b: object, width: float) -> float:
     return off if math.isfinite(off) else math.inf
 
 
-_Pairs = Iterator[tuple[str, Any, Any, float]]
+def _content(path: Path) -> Any | None:
+    """A file as plain data; None where only bytes can be compared."""
+    if path.suffix == ".csv" and path.stem in TABLES:
+        rows = read_table(path).to_dict("records")
+        return {f"row {number}": row for number, row in enumerate(rows, start=1)}
+    parse = _DOCUMENTS.get(path.suffix)
+    return None if parse is None else parse(path.read_text("utf-8"))
 
 
-def _pairs(old: Path, new: Path) -> _Pairs | None:
+def _pairs(old: Any, new: Any, place: str = "", width: float = 0.0) -> Iterator[tuple[str, Any, Any, float]]:
     """Values of two files that belong together, with their place and half the width of their interval."""
-    if old.suffix == ".csv" and old.stem in TABLES:
-        return _cells(read_table(old), read_table(new))
-    parse = _DOCUMENTS.get(old.suffix)
-    if parse is None:
-        return None
-    return _entries(parse(old.read_text("utf-8")), parse(new.read_text("utf-8")), "")
-
-
-def _cells(old: pd.DataFrame, new: pd.DataFrame) -> _Pairs:
-    if list(old.columns) != list(new.columns) or len(old) != len(new):
-        yield "shape", f"{len(old)} rows of {len(old.columns)}", f"{len(new)} rows of {len(new.columns)}", 0.0
-        return
-    for name in old.columns:
-        base = next((name.removesuffix(end) for end in ("_lo", "_hi") if name.endswith(end)), name)
-        has_interval = f"{base}_lo" in old and f"{base}_hi" in old
-        halves = 0.5 * (old[f"{base}_hi"] - old[f"{base}_lo"]) if has_interval else [0.0] * len(old)
-        for row, (a, b, half) in enumerate(zip(old[name], new[name], halves, strict=True), start=1):
-            yield f"{name}, row {row}", a, b, half
-
-
-def _entries(old: Any, new: Any, place: str) -> _Pairs:
-    """Walk two documents side by side."""
     if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
         for key in old:
             if key not in _ASIDE:
-                yield from _entries(old[key], new[key], f"{place}.{key}" if place else str(key))
+                yield from _pairs(old[key], new[key], f"{place}.{key}" if place else str(key), _half_width(old, key))
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for index, (a, b) in enumerate(zip(old, new, strict=True)):
-            yield from _entries(a, b, f"{place}[{index}]")
+            yield from _pairs(a, b, f"{place}[{index}]")
     else:
-        yield place, old, new, 0.0
+        yield place, old, new, width
+
+
+def _half_width(values: dict[str, Any], name: str) -> float:
+    base = name.removesuffix("_lo").removesuffix("_hi")
+    low, high = values.get(f"{base}_lo"), values.get(f"{base}_hi")
+    return 0.5 * (high - low) if isinstance(low, float) and isinstance(high, float) else 0.0

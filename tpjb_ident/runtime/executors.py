@@ -104,9 +104,10 @@ class PoolWorkers(Workers):
 
     def submit(self, *call: Any) -> Future[Any]:
         """Hand a call to the executor, which is opened for the first one."""
-        if self._executor is None:
-            self._executor = self._opened()
-        return self._executor.submit(*call)
+        with _interrupts_held():
+            if self._executor is None:
+                self._executor = self._opened()
+            return self._executor.submit(*call)
 
     def close(self, wait: bool = True, at_once: bool = False) -> None:
         """End the executor; with it the jobs that have not begun, and `at_once` those that have."""
@@ -274,6 +275,26 @@ def _stop_forkserver() -> None:
 
 
 @contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hear Ctrl-C and SIGTERM only when the block has ended: a process begun and not yet noted would never be ended.
+
+    The end of this one would wait for it, and it for somebody who takes its answer.
+    """
+    held: list[int] = []
+    former: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # others are not interrupted
+        for number in (signal.SIGINT, signal.SIGTERM):
+            former[number] = signal.signal(number, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+    for number in held[:1]:
+        signal.raise_signal(number)
+
+
+@contextmanager
 def _shared_memory(forked: bool) -> Iterator[None]:
     """Copies of this process share its memory with it as long as nobody's garbage collector walks through all of it."""
     ours = forked and not gc.get_freeze_count()  # what somebody else froze stays frozen
@@ -299,14 +320,15 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send_outcome, args=(sender, task, job))
-    with one_thread_each():
-        process.start()
-    sender.close()
     try:
+        with one_thread_each(), _interrupts_held():
+            process.start()
+        sender.close()
         yield functools.cache(lambda: _received_value(receiver))
     finally:
-        process.kill()
-        process.join()
+        if process.pid is not None:
+            process.kill()
+            process.join()
         receiver.close()
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigdata.near_names import nearest_name
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
 from tpjb_ident.us_table import UNITS
@@ -30,7 +31,11 @@ _DELIMITERS = (",", ";", "\t")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", re.ASCII)
 _NOTHING = ("", "nan", "NaN")
 _INFINITE = {"inf": math.inf, "+inf": math.inf, "-inf": -math.inf}
-_TRUTH = {"True": True, "False": False, "": None}
+#: Quantities that are one of a few words, with what each means.
+_WORDS: dict[str, dict[str, object]] = {
+    "truth value": {"True": True, "False": False, "": None},
+    "rotation": {**{name: name for name in ROTATIONS}, "": ROTATIONS[0]},
+}
 #: Ends of columns in US units, ours and as people write them: the same in SI, and the size of the unit in it.
 _US = {f"_{us}": (f"_{si}", size) for si, (us, size, zero) in UNITS.items() if not zero}
 _US |= {"_lbf_s_per_in": _US["_lbfs_per_in"], "_rpm": ("_Hz", 1.0 / 60.0)}
@@ -144,12 +149,12 @@ def _value(cell: str, column: Column | None, ending: str, place: str) -> object:
     """Text, truth value or number of a cell."""
     if column is None or column.quantity == "text":
         return cell
-    if column.quantity == "truth value":
-        if cell not in _TRUTH:
-            raise BadInputError(
-                f"{place}: {cell[:40]!r} is neither True nor False. Correct the cell, or leave it empty."
-            )
-        return _TRUTH[cell]
+    if column.quantity in _WORDS:
+        known = _WORDS[column.quantity]
+        if cell not in known:
+            names = " or ".join(filter(None, known))
+            raise BadInputError(f"{place}: {cell[:40]!r} is not known. Write {names}, or leave the cell empty.")
+        return known[cell]
     if cell in _NOTHING:
         return math.nan
     if cell in _INFINITE and column.may_be_infinite(ending):

@@ -120,7 +120,10 @@ def predict(
     bad = int((~frame["converged"]).sum())
     state = f"{bad} did NOT converge" if bad else "all converged"
     c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
-    c.next("export", c.target, "--to", "ross")
+    if bad:  # whether the bearing carries the load at all
+        c.next("predict", bearing, "--load", load, "--speed", speed, "--pivots", "rigid", "--thermal", "isothermal")
+    else:
+        c.next("export", c.target, "--to", "ross")
     c.show(drawing.name, list(COLUMNS.values()), frame.head(MOST_ROWS)[list(COLUMNS)].itertuples(index=False))
     if len(frame) > MOST_ROWS:
         c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")

@@ -37,6 +37,8 @@ def verify(c: Command, results: Folder, given: Inputs = None) -> None:
         if not path.exists():
             raise BadInputError(f"--input {path}: no such file or folder. Check the path.")
     files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
+    if not files:
+        raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
     same = sum(f["state"] == "same" for f in files)
     count = "all" if same == len(files) else f"{same} of {len(files)}"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")

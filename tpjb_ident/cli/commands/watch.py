@@ -62,7 +62,7 @@ def watch(
     watcher, drawing = _open_watcher(c, folder, bearing, patience, width)
     c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
-    c.print(f"Watching {folder}; the page: {c.target / 'watch.html'}")
+    c.doing(f"watching {folder}; the page: {c.target / 'watch.html'}")
     latest: Snapshot | None = None
     printed: set[str] = set()
     until = time.monotonic() + 2.0 * patience
@@ -162,7 +162,14 @@ def _state_document(snapshot: Snapshot) -> dict[str, Any]:
 
 
 def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
-    """Print what landed, and every step that was not printed before; what is printed now."""
+    """Print how the campaign stands, what landed, and every step that was not printed before; what is printed now."""
+    landed, repeat, look = (
+        sum(bool(s.landed) for s in snapshot.states),
+        snapshot.count("repeat"),
+        snapshot.count("look"),
+    )
+    runs = counted(len(snapshot.states), "run")
+    c.print(f"{snapshot.campaign.id}: {landed} of {runs} landed, {repeat} to be repeated, {look} to look at.")
     if len(snapshot.new) > MOST_LINES:
         from tpjb_ident.report.watch_page import coverage_table
 

@@ -196,7 +196,7 @@ def _titled_table(title: str, headings: list[str], rows: list[list[str]], words:
     while True:
         chosen = [[row[i] for i in columns] for row in rows]
         texts = [columns.index(i) for i in words]
-        lines = table_lines([headings[i] for i in columns], chosen, texts, _width())
+        lines = table_lines([headings[i] for i in columns], chosen, texts, _width(), whole=bool(common))
         if not common or max(map(cell_len, lines)) <= _width():
             return "\n".join(wrapped(title, _width())), lines
         constant = common.pop(0)
@@ -227,41 +227,45 @@ def wrapped(text: str, width: int) -> list[str]:
     return lines or [""]
 
 
-def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
-    """Lay out a table: numbers are never broken, words wrap, what has no room is printed below its row."""
+def table_lines(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int, whole: bool = False
+) -> list[str]:
+    """Lay out a table: numbers are never broken, words wrap, what has no room is printed below its row.
+
+    Numbers of a `whole` one stay in their row, however wide it is.
+    """
     cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
     sizes = [max(cell, cell_len(column)) for cell, column in zip(cells, columns, strict=True)]
     if _total(sizes) > width:  # headings break at spaces first
         longest = [max((cell_len(word) for word in column.split()), default=0) for column in columns]
         sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
-    below = _narrow(sizes, words, width)
+    below = _narrow(sizes, words, width, words if whole else range(len(sizes)))
     beside = [i for i in range(len(columns)) if i not in below]
     layout = [(i, sizes[i], i in words) for i in beside]
     lines = _row_lines(columns, layout, bottom=True)
     lines.append("-" * min(width, _total([sizes[i] for i in beside])))
     for row in rows:
         lines += _row_lines(row, layout)
-        for i in below:
-            if row[i].strip():
-                text = f"{columns[i]}: {row[i]}".lstrip(": ")
-                lines += [f"    {line}" for line in wrapped(text, width - 4)]
+        texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below if row[i].strip(" -")]
+        if texts:
+            lines += [f"    {line}" for line in wrapped("; ".join(texts), width - 4)]
     return lines
 
 
-def _narrow(sizes: list[int], words: Collection[int], width: int) -> list[int]:
-    """Make columns of words narrower until the table fits; those that cannot be are to be printed below their row."""
+def _narrow(sizes: list[int], words: Collection[int], width: int, movable: Iterable[int]) -> list[int]:
+    """Make columns of words narrower until the table fits; what still has no room is to be printed below its row."""
     below: list[int] = []
     while True:
         over = _total([size for i, size in enumerate(sizes) if i not in below]) - width
-        candidates = [i for i in words if i not in below]
-        wide = [i for i in candidates if sizes[i] > _NARROWEST]
+        candidates = [i for i in movable if i > 0 and i not in below]
+        wide = [i for i in words if i not in below and sizes[i] > _NARROWEST]
         if over > 0 and wide:
             widest = max(wide, key=lambda i: sizes[i])
             sizes[widest] = max(_NARROWEST, sizes[widest] - over)
-        elif over > 0 and max(candidates, default=0) > 0:
-            below.append(max(candidates))
+        elif over > 0 and candidates:
+            below.append(max([i for i in candidates if i in words] or candidates))
         else:
-            return sorted(below)  # or numbers alone are wider than the terminal: nothing is lost by a long line
+            return sorted(below)
 
 
 def _total(sizes: Sequence[int]) -> int:
