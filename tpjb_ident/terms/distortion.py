@@ -15,7 +15,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Change of H over the squared motion of a band, and over a blow's peak in one sense, and in both its square.
@@ -63,12 +63,7 @@ class Distortion(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """G d in the cells, G a share of every entry of H."""
         columns = self.no_columns(blocks)
-        h, d = state.h[blocks.point], state.u[:, :2]
-        force = np.zeros((len(blocks), 2, _NUMBERS), complex)
-        for k in range(_NUMBERS):
-            i, j = k % 4 // 2, k % 2
-            entry = np.abs(h.real[:, i, j]) if k < 4 else 1j * np.abs(h.imag[:, i, j])
-            force[:, i, k] = entry * d[:, j]
+        force = entry_forces(entry_sizes(state.h[blocks.point]), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
         for n, b in enumerate(self._bent):
             mine = self._band[blocks.point] == b
