@@ -1,8 +1,8 @@
 """Normal equations of an arrow: numbers of every point, bordered by the parameters that all points share.
 
-A point's numbers are those of its H and the parameters of terms that are its own. With A_p = J_p^T J_p, E_p = J_p^T J_t,
-g_p = J_p^T r summed over a point's blocks (a prior of its own parameters added), G = J_t^T J_t + Lambda and
-g = J_t^T r + Lambda (theta_0 - theta) over all blocks::
+A point's numbers x_p are those of its H and the parameters of terms that are its own. With A_p = J_p^T J_p,
+E_p = J_p^T J_t, g_p = J_p^T r summed over a point's blocks (the prior of its own parameters added),
+G = J_t^T J_t + Lambda and g = J_t^T r + Lambda (theta_0 - theta) over all blocks::
 
     S = G - sum_p E_p^T A_p^-1 E_p          d_theta = S^-1 (g - sum_p E_p^T A_p^-1 g_p)
     K_p = -A_p^-1 E_p                       d_x_p = A_p^-1 (g_p - E_p d_theta)

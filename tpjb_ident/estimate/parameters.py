@@ -1,4 +1,4 @@
-"""Values of all terms' parameters with their priors: those that all points share in a row, the points' own in a table."""
+"""Values of the terms' parameters with their priors: those that all points share, and a table of the points' own."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Parameters:
 
     def _place(self, term: Term) -> tuple[IntArray, slice]:
         groups = self._group[list(term.points)]
-        assert len(np.unique(groups)) == len(groups), f"{term.name}: points of one group have no parameters of their own"
+        assert len(np.unique(groups)) == len(groups), f"{term.name}: points of one group have nothing of their own"
         return groups, self._part[term.name]
 
     def of(self, term: Term) -> FloatArray:

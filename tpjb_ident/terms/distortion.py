@@ -16,6 +16,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
+from tpjb_ident.estimate.noise import scatter_patterns
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Change of H over the squared motion of a band, and over a blow's peak in one sense, and in both its square.
@@ -44,14 +45,23 @@ def line_scatter(rms: float) -> float:
 
 
 class Distortion(Additive):
-    """Real and imaginary parts of H of every band, each changed by its own share; no run tells them."""
+    """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter.
+
+    `share`, `scatter` by band, `band` (P,) of every point.
+    """
 
     name = "distortion"
 
     def __init__(
-        self, rig: Rig, blocks: Blocks, share: Sequence[float] | FloatArray = (), band: IntArray | None = None
+        self,
+        rig: Rig,
+        blocks: Blocks,
+        share: Sequence[float] | FloatArray = (),
+        band: IntArray | None = None,
+        scatter: FloatArray | None = None,
     ) -> None:
         super().__init__(rig, blocks)
+        self._scatter = scatter
         self._band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
         self._bent = [b for b, size in enumerate(share) if size > 0]
         parameters = []
@@ -69,3 +79,10 @@ class Distortion(Additive):
             mine = self._band[blocks.point] == b
             columns[mine, :, _NUMBERS * n : _NUMBERS * (n + 1)] = rows[mine]
         return columns
+
+    def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
+        """The film's force at every line of one phase set, along X and Y: cells and housing answer to it alike."""
+        if self._scatter is None or not self._scatter.any():
+            return None
+        size = self._scatter[self._band[blocks.point]] / np.sqrt(2)
+        return film_force_rows(self.rig, blocks, state, np.stack(scatter_patterns(blocks, state, size), axis=2))
