@@ -148,14 +148,14 @@ class Step:
 def step(sums: Sums, shared: Prior, own: Prior) -> Step:
     """Solve the normal equations; the points' own parameters are the last of their numbers."""
     k = sums.A.shape[1] - own.precision.shape[1]
-    given = np.linalg.inv(sums.A[:, :k, :k])
+    given = np.asarray(np.linalg.inv(sums.A[:, :k, :k]), dtype=float)
     A, g = sums.A.copy(), sums.g_h.copy()
     last = np.arange(k, A.shape[1])
     A[:, last, last] += own.precision
     g[:, k:] += own.precision * own.distance
     G = sums.G + np.diag(shared.precision)
     A_inverse, K, S = _eliminated(A, sums.E, G)
-    inverse = np.linalg.inv(S) if len(S) else S
+    inverse = np.asarray(np.linalg.inv(S), dtype=float)
     estimated = shared.estimated(np.diag(inverse))
     told = own.estimated(_variances(A_inverse, K, inverse)[:, k:])
     # what is considered takes no part: its place holds a one, what it would move is kept apart
@@ -164,34 +164,34 @@ def step(sums: Sums, shared: Prior, own: Prior) -> Step:
     moves_shared = (sums.E[:, k:] * ~told[:, :, None]).transpose(0, 2, 1)
     distance = np.where(told, 0.0, own.distance)
     g = part * (g - np.einsum("pal,pl->pa", moves, distance))
-    A_inverse, K, S = _eliminated(
-        A * part[:, :, None] * part[:, None, :] + ~part[:, :, None] * np.eye(A.shape[1]), sums.E * part[:, :, None], G
-    )
+    g_t = sums.g_t + shared.precision * shared.distance - np.einsum("pql,pl->q", moves_shared, distance)
+    A = A * part[:, :, None] * part[:, None, :] + ~part[:, :, None] * np.eye(A.shape[1])
+    A_inverse, K, S = _eliminated(A, sums.E * part[:, :, None], G)
     S_inverse = np.zeros_like(S)
     chosen = np.ix_(estimated, estimated)
     S_inverse[chosen] = np.linalg.inv(S[chosen])
-    g_t = sums.g_t + shared.precision * shared.distance - np.einsum("pql,pl->q", moves_shared, distance)
     remaining = g_t + np.einsum("pak,pa->k", K, g) - S[:, ~estimated] @ shared.distance[~estimated]
     theta = S_inverse @ (estimated * remaining) + np.where(estimated, 0.0, shared.distance)
     x = np.einsum("pab,pb->pa", A_inverse, g) + K @ theta
-    root = np.sqrt(own.precision)
     posterior = np.sqrt(np.maximum(_variances(A_inverse, K, S_inverse)[:, k:], 0.0))
-    learnt, passed = A_inverse[:, :k, k:] * root[:, None, :], -(A_inverse @ moves)[:, :k] / root[:, None, :]
-    through = S_inverse @ np.where(
-        told[:, None, :],
-        K[:, k:].transpose(0, 2, 1) * root[:, None, :],
-        -(moves_shared + K.transpose(0, 2, 1) @ moves) / root[:, None, :],
-    )
+    root = np.sqrt(own.precision)
+    pushes = -(moves_shared + K.transpose(0, 2, 1) @ moves)
     points = Own(
         np.where(told, x[:, k:], own.distance),
         np.where(told, posterior, 1 / root),
         told,
-        np.where(told[:, None, :], learnt, passed),
-        through,
+        _by_prior(told, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),
+        S_inverse @ _by_prior(told, K[:, k:].transpose(0, 2, 1), pushes, root),
     )
     weight = np.concatenate([np.zeros((len(A), k)), own.precision * told], axis=1)
     records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
     return Step(x[:, :k], theta, points, given, records, K[:, :k], S, S_inverse, estimated, shared.precision)
+
+
+def _by_prior(told: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
+    """Changes (P, .., L) by one standard deviation of estimated and considered priors; `root` (P, L) of precision."""
+    scale = root[:, None, :]
+    return np.asarray(np.where(told[:, None, :], learnt * scale, passed / scale))
 
 
 def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -202,7 +202,7 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     n = A.shape[1]
     white = np.linalg.solve(_root(A), np.concatenate([E, np.broadcast_to(np.eye(n), A.shape)], axis=2))
     E_white, back = np.split(white, [E.shape[2]], axis=2)
-    A_inverse = back.transpose(0, 2, 1) @ back
+    A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
     flat = E_white.reshape(len(A) * n, E.shape[2])
     return A_inverse, -back.transpose(0, 2, 1) @ E_white, G - flat.T @ flat
 
