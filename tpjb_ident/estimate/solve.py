@@ -26,7 +26,7 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
-from tpjb_ident.estimate.parameters import Parameters
+from tpjb_ident.estimate.parameters import Table
 from tpjb_ident.estimate.scatter import Residuals, Scatter
 from tpjb_ident.estimate.shape import Shape
 from tpjb_ident.estimate.term import Additive, Fitted, Term
@@ -91,8 +91,9 @@ class Solver:
         self.shape = shape or Shape(np.arange(len(blocks.points)))
         self.group = self.shape.group[blocks.point]
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
-        self.parameters = Parameters(terms, self.shape.group, self.shape.groups)
-        self.terms = self.parameters.terms
+        self.terms = tuple(term for term in terms if term.parameters)
+        self.shared = Table([term for term in self.terms if not term.points], 1)
+        self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
         self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
@@ -112,7 +113,7 @@ class Solver:
         self.scatter = self._scatter(self._sums(None)[1], 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums(last)
-            last = step(sums, *self.parameters.priors())
+            last = step(sums, self.shared.prior(), self.own.prior())
             change = self._move(last)
             if count == 3:
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
@@ -121,8 +122,13 @@ class Solver:
             elif count > 3 and change < _CONVERGED:
                 break
         sums, fit = self._sums(last)
-        last = step(sums, *self.parameters.priors())
+        last = step(sums, self.shared.prior(), self.own.prior())
         return self._solution(last, fit, count)
+
+    def _value(self, term: Term) -> FloatArray:
+        """Values of a term's parameters."""
+        table = self.own if term.points else self.shared
+        return table.of(term, table.value)
 
     def _scatter(self, fit: Residuals, count: int) -> Scatter:
         return self.scatter.updated(self.group, fit, self.answered, count, self.shape.numbers)
@@ -147,8 +153,8 @@ class Solver:
             yield slice(first, first + _CHUNK)
 
     def _sums(self, last: Step | None) -> tuple[Sums, Residuals]:
-        own = self.parameters.own.shape[1]
-        sums = Sums.empty(self.shape.groups, len(self.parameters.value), self.shape.numbers + own)
+        numbers = self.shape.numbers + self.own.value.shape[1]
+        sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
         fits = []
         slope, known = self._load_slopes()
         for places in self._slices():
@@ -182,7 +188,7 @@ class Solver:
             np.ones((n, m), complex),
             np.zeros((n, m + HOUSING_ROWS), complex),
             self.u[places],
-            self.parameters.by_term(),
+            {term.name: self._value(term) for term in self.terms},
         )
         self._apply(blocks, state, additive=False)
         if not self.moved:
@@ -213,14 +219,14 @@ class Solver:
         state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
         forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
-        own = [term.columns(blocks, state) for term in self.parameters.local]
-        shared = [term.columns(blocks, state) for term in self.parameters.shared]
+        own = [term.columns(blocks, state) for term in self.own.terms]
+        shared = [term.columns(blocks, state) for term in self.shared.terms]
         columns = np.concatenate([film, 1j * film, *own, *shared], axis=2)
         projected = _real(Q2 @ np.linalg.solve(L, columns))
         remainder = Q2 @ white
         force = _along_force(Q2 @ np.linalg.solve(L, film_force_rows(rig, blocks, state, forces)), remainder)
         r = _real(remainder)[:, :, 0]
-        J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.parameters.own.shape[1]], axis=2)
+        J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
         slopes = self._slope_rows(blocks, state)
         if slopes is not None:
             r = np.concatenate([r, slopes[0]], axis=1)
@@ -232,19 +238,19 @@ class Solver:
 
     def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
         """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
-        if all(type(term).slope_columns is Term.slope_columns for term in self.parameters.shared):
+        if all(type(term).slope_columns is Term.slope_columns for term in self.shared.terms):
             return None
         m = blocks.z.shape[1]
         told = (blocks.windows > 3) & blocks.present.all(axis=1)
         reading = state.reading(self.rig, blocks)[:, :m]
-        columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.parameters.shared], axis=2)
+        columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.shared.terms], axis=2)
         safe = np.where(told[:, None, None], blocks.slope_noise, np.eye(m))
         L = np.linalg.cholesky(safe)
         Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
         Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
         J = _real(Q2 @ np.linalg.solve(L, columns)) * told[:, None, None]
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
-        return r - J @ self.parameters.value, J
+        return r - J @ self.shared.value[0], J
 
     def _fit(self, group: IntArray, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
         r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
@@ -263,7 +269,8 @@ class Solver:
         damped = np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, _LARGEST_STEP))
         change = self.shape.change(x * damped[:, None]) * self.solvable[:, None, None]
         self.h = self.h + change
-        self.parameters.move(taken)
+        self.shared.value = self.shared.value + taken.theta
+        self.own.value = self.own.value + taken.own.change
         self.moved = True
         size = np.abs(self.h).max(axis=(1, 2))
         return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
@@ -271,8 +278,17 @@ class Solver:
     def _solution(self, last: Step, fit: Residuals, count: int) -> Solution:
         groups = self.shape.groups
         factors = last.factors()
-        fitted = {term.name: self.parameters.fitted(term, last, self.housing_noise) for term in self.terms}
-        shares = {term.name: self.parameters.share(term, last, factors) * self.unit**2 for term in self.terms}
+        fitted, shares = {}, {}
+        for term in self.terms:
+            if term.points:
+                told = (self.own.of(term, last.own.deviation), self.own.of(term, last.own.estimated))
+                share = last.own_share(self.own.chosen(term))
+            else:
+                told = (self.shared.of(term, last.deviation[None]), self.shared.of(term, last.estimated[None]))
+                part = factors[self.shared.chosen(term)[0]]
+                share = np.einsum("qpa,qpb->pab", part, part)
+            fitted[term.name] = Fitted(self._value(term), *told, self.housing_noise)
+            shares[term.name] = share * self.unit**2
         weight = self.scatter.weights
         chi_square = totals(self.group, weight * fit.chi_square, groups)
         counted = totals(self.group, fit.rows * (weight > 0.05), groups)
