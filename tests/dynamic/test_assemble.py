@@ -48,17 +48,12 @@ def run_at(name, direction, load, turn, rng, noise):
 
 
 class Kept:
-    """Finished runs, all in memory."""
-
-    all_in_memory = True
+    """Finished runs."""
 
     def __init__(self, runs, left_out=()):
-        self._runs, self.left_out = runs, left_out
+        self.left_out = left_out
         self.digests = [digest(RunResult(run, {1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)]
         self.places = list(range(len(runs)))
-
-    def take(self, place):
-        return self._runs[place]
 
 
 @pytest.fixture(scope="module")

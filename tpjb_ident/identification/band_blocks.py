@@ -40,8 +40,9 @@ class BandBlocks:
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     strength: FloatArray  #: (L,): F ratio of the weaker direction of motion
     bent: FloatArray = field(default_factory=lambda: np.zeros(0))  #: (B,): share by which the motion may change H
+    uneven: FloatArray | None = None  #: (B,): relative scatter of the lines' film force, in one phase set
 
-    def with_film(self, sensors: Sequence[Sensor], points: Sequence[BandPoint], clearance: float) -> BandBlocks:
+    def with_film(self, points: Sequence[BandPoint], clearance: float) -> BandBlocks:
         """With what a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
         bent, scatter = np.zeros(len(points)), np.zeros(len(points))
         for b, point in enumerate(points):
@@ -51,11 +52,7 @@ class BandBlocks:
             if point.method == "periods" and one_phase_set(point.spectra):
                 # alike in all runs: more than the two that h needs do not average it away
                 scatter[b] = line_scatter(rms) * np.sqrt(max(len(point.spectra), 2) / 2)
-        cells = Rig(tuple(sensors), 1.0).of("force")
-        force = np.linalg.norm(self.blocks.z[:, cells], axis=1) / np.sqrt(2)
-        noise = self.blocks.noise.copy()
-        noise[:, cells, cells] += ((scatter[self.band[self.line[self.blocks.point]]] * force) ** 2)[:, None]
-        return replace(self, blocks=replace(self.blocks, noise=noise), bent=bent)
+        return replace(self, bent=bent, uneven=scatter)
 
 
 def band_blocks(

@@ -57,13 +57,13 @@ def campaign_blocks(
     temperatures: Mapping[str, float],
 ) -> Blocks:
     """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
-    noises, freedoms = _pooled_noise(means, [source.digests[0].window for source in sources])
+    noises, freedoms = _pooled_noise(means, [source.data.runs[0].length for source in sources])
     names: list[str] = []
     known: list[list[Hashable]] = []
     rows: list[dict[str, object]] = []
     for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
         w = point.means
-        for g, (digest, (_, line)) in enumerate(zip(source.digests, source.members)):
+        for g, (digest, line) in enumerate(zip(source.digests, source.data.lines)):
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]

@@ -62,7 +62,7 @@ class MeansTask:
 
 def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     """Robust start and means of one point."""
-    data = source.load()
+    data = source.data
     z, channels = channel_windows(data, task)
     time = window_times(data)
     z = _driven(z * clock_turns(data, task, time), data)
