@@ -81,7 +81,9 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
     with workers(forward, base, settings.workers) as run:
         columns = np.column_stack([np.zeros((len(base), 0)), *run(_column, [(listed, i) for i in range(len(listed))])])
-    return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip))
+    # without a cold polygon the clearance of the file and that of the running bearing are one
+    unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})
+    return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip | unseen))
 
 
 def _column(forward: ForwardModel, base: FloatArray, unknowns: tuple[Nuisance, ...], index: int) -> FloatArray:

@@ -182,7 +182,7 @@ def _assumptions(problem: Problem, fit: Fit, settings: DiagnoseSettings) -> tupl
     out = []
     for name, values in fitted.items():
         sigma, unit = units[name]
-        source = tolerances[name].source if name in tolerances else settings.tolerances.cell_gain.source
+        source = tolerances[name].source if name in tolerances else "default"
         value = values if len(values) > 1 else values[0]
         out.append(Assumption(name, sigma, value, unit, source, farthest.get(name, 0.0)))
     stated = settings.tolerance.stiffness
