@@ -156,7 +156,7 @@ def one_probe_gain(setup: Setup, probe: float, factor: float) -> Setup:
     source="A parallel load path (hoses, leaf springs) takes 0.5 to 5 %",
     words=EffectWords(
         finding="cell {cell:0} reads {factor:size} {factor:more|less} than true",
-        physics="One cell has another sensitivity, or a load path stands beside it. One row of the coefficients is off.",
+        physics="One cell has another sensitivity, or a load path beside it. One row of the coefficients is off.",
         on_the_rig="Coefficients of one force direction are off alike; the loads that were set seem to turn.",
         check="that cell's calibration, and hoses or springs beside it",
     ),

@@ -15,11 +15,10 @@ from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.next_test import Design, ranked, say, separated
 from tpjb_ident.diagnosis.observations.folds import folds, held_out
-from tpjb_ident.diagnosis.observations.gap import gap, residuals
+from tpjb_ident.diagnosis.observations.gap import gap, localise, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
 from tpjb_ident.diagnosis.planned import dynamic, planned_observations
-from tpjb_ident.diagnosis.verdict.remainder import localise
 
 #: A part of the library, so that a test takes seconds.
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "oil_viscosity", "probe_gain", "channel_delay"}

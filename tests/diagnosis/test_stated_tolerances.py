@@ -8,9 +8,12 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects, kind_of
-from tests.diagnosis.rocker_case import ROCKER, rocker_setup
+from tests.diagnosis.rocker_case import ROCKER, points, rocker_setup
+from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Shift, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.errors import BadInputError
 
 
@@ -75,10 +78,11 @@ def test_a_tolerance_that_an_effect_says_does_what_the_effect_does():
         assert changed.change(instruments=setup.instruments) == other.change(instruments=setup.instruments)
 
 
-def test_a_thermometer_has_its_own_number(rocker_layout_elements):
-    setup, elements = rocker_layout_elements
+def test_a_thermometer_has_its_own_number():
+    setup, layout = rocker_setup(), Layout(points([5000.0], 5))
+    elements = planned_observations(setup, layout).elements
     listed = [n for n in nuisances(elements, setup, Tolerances()) if n.name == "thermometer"]
     assert [n.effect for n in listed] == [f"thermometer_offset pad {k}" for k in range(1, 6)]
-    forward = Forward(setup, LAYOUT, elements)
+    forward = Forward(setup, layout, elements)
     shown = forward([Effect("thermometer_offset", pad=2, offset=0.5)]) - forward()
     assert np.allclose(shown, listed[1].column, atol=1e-9)

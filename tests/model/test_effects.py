@@ -61,7 +61,8 @@ def same(p: Prediction, q: Prediction, tolerance: float = 1e-10) -> None:
 
 def neutral(name: str) -> Effect:
     values = {p.name: p.neutral for p in known_effects()[name].parameters_of(5)}
-    return Effect(name, **{k: ({"pad": 2, "probe": 1, "cell": 2}.get(k, 0.3)) if math.isnan(v) else v for k, v in values.items()})
+    places = {"pad": 2, "probe": 1, "cell": 2}
+    return Effect(name, **{k: places.get(k, 0.3) if math.isnan(v) else v for k, v in values.items()})
 
 
 def typical(name: str) -> Effect:

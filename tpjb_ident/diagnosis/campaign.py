@@ -21,8 +21,7 @@ from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.forward import SENSOR
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.observations.from_table import observe_table
-from tpjb_ident.diagnosis.observations.observe import observe
+from tpjb_ident.diagnosis.observations.observe import observe, observe_table
 from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError

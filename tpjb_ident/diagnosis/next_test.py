@@ -24,7 +24,7 @@ from scipy.special import ndtr
 from model.effects import Effect, kind_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances

@@ -15,7 +15,7 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline

@@ -11,7 +11,14 @@ from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, s
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
-from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
+from tpjb_ident.report.diagnosis_words import (
+    beyond_stated,
+    in_words,
+    observable,
+    parameter_rows,
+    place,
+    verdict_sentences,
+)
 from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
@@ -203,10 +210,7 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
             "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
             "model is what the campaign turned out to need."
         )
-        far = [
-            f"The {label_in_words(a.name)} is {abs(a.deviation):.1f} standard deviations from what is stated: check it."
-            for a in verdict.assumptions if abs(a.deviation) > DiagnoseSettings.visible
-        ]  # fmt: skip
+        far = [f"{sentence}: check it." for sentence in beyond_stated(verdict)]
         columns = ["tolerance", "stated", "source", "fitted", "deviations"]
         rows = [_row(a) for a in verdict.assumptions]
         table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
@@ -225,8 +229,7 @@ def _left_sentence(remainder: Remainder) -> str:
 
 def _row(one: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
-    values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
     unit, scale = shown_unit(one.unit)
-    fitted = ", ".join(signed(v / scale) for v in values)
+    fitted = ", ".join(signed(v / scale) for v in one.values)
     far = signed(one.deviation) if one.deviation else ""
     return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}", far]

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import amount, finding, label_in_words, shown_unit, words_of
+from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.series import DIRECT
-from tpjb_ident.rounding import MINUS, percent, significant
+from tpjb_ident.rounding import MINUS, percent, signed, significant
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
+#: Parameters that number what there are several of.
+_PLACES = ("pad", "probe", "cell")
 #: Observables of a diagnosis in words.
 _OBSERVABLES = {
     "locus_x": "the shaft's horizontal position",
@@ -32,7 +35,7 @@ def verdict_sentences(
     name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None = None
 ) -> list[str]:
     """Say what came out, the answer first."""
-    sentences = [_answer(name, verdict, deviations)]
+    sentences = [_answer(name, verdict, deviations), *verdict.beforehand]
     if deviations and verdict.verdict != "consistent":
         before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
         after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
@@ -60,11 +63,27 @@ def verdict_sentences(
     worse = [observable(o) for o, g in verdict.gap_by_observable.items() if _worse(g)]
     if verdict.effects and worse:
         sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
+    if verdict.verdict != "consistent":
+        sentences += [f"Beside it: {sentence}, without a name of its own." for sentence in beyond_stated(verdict)]
     if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
         sentences.append(f"Next test: {in_words(verdict.next_test)}.")
     if verdict.below_floor:
         hidden = ", ".join(label_in_words(n) for n in verdict.below_floor)
         sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
+    return sentences
+
+
+def beyond_stated(verdict: Verdict) -> list[str]:
+    """Tolerances that stand further out than would surprise nobody, with their sizes."""
+    sentences = []
+    for one in verdict.assumptions:
+        if abs(one.deviation) > Deciding.visible:
+            unit, scale = shown_unit(one.unit)
+            sizes = ", ".join(signed(value / scale) for value in one.values)
+            sentences.append(
+                f"the {label_in_words(one.name)} is {abs(one.deviation):.1f} standard deviations from what is stated "
+                f"({sizes} {unit})"
+            )
     return sentences
 
 
@@ -167,7 +186,7 @@ def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:
     """One row per parameter of the effects, in the units that people read."""
     return [
-        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
+        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key in _PLACES else amount(p)]
         for e in verdict.effects
         for key, p in e.parameters.items()
     ]

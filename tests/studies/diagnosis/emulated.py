@@ -69,9 +69,7 @@ REACH = 1.5
 def axes(setup: Setup) -> dict[str, tuple[tuple[float, ...], float, float]]:
     """Coordinates of a bearing with as many pads as it has; lengths are of a journal of 100 mm."""
     size = setup.bearing.journal_diameter / 0.1
-    pads = {
-        f"{name} {k}": row for name, row in _OF_A_PAD.items() for k in range(len(setup.bearing.pads))
-    }
+    pads = {f"{name} {k}": row for name, row in _OF_A_PAD.items() for k in range(len(setup.bearing.pads))}
     scale = {"offset": size, "bore": size}
     return {
         name: (shares, reach * scale.get(name.split()[0], 1.0), step * scale.get(name.split()[0], 1.0))
@@ -272,9 +270,7 @@ def _tabulate(forward: Forward, points: Any, pairs: bool) -> Table:
         steps = [along[names[k]][2] for k in (i, j)]
         corners = []
         for sign in (1.0, -1.0):
-            a, b = (
-                sign * step if along[names[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True)
-            )
+            a, b = (sign * step if along[names[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True))
             place = np.zeros(len(names))
             place[[i, j]] = a, b
             try:

@@ -118,7 +118,9 @@ def bearing_of(rng: np.random.Generator) -> tuple[Bearing, int, str]:
     thickness = 0.16 * diameter
     length = diameter * float(rng.uniform(0.5, 0.9))
     mass = 7800.0 * thickness * length * math.radians(arc) * diameter / 2
-    words = f"{pads} pads, load {'between' if between else 'on'}, offset {offset:g}, {1e3 * diameter:.0f} mm, VG {grade}"
+    words = (
+        f"{pads} pads, load {'between' if between else 'on'}, offset {offset:g}, {1e3 * diameter:.0f} mm, VG {grade}"
+    )
     text = TEXT.format(
         name=words, diameter=diameter, length=length, clearance=clearance, bore=clearance / (1.0 - preload),
         angles=[f"{-90.0 + pitch * (k + between / 2):.4f} deg" for k in range(pads)], arc=arc, offset=offset,

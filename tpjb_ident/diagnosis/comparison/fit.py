@@ -11,11 +11,10 @@ import numpy as np
 from model.effects import Effect
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, Posterior, posterior
-from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Strain
+from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
-from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.workers import Map
 
 #: Steps on one set of derivatives, which every step corrects.

@@ -13,9 +13,8 @@ import numpy as np
 
 from model.effects import Effect
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.problem import Problem
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
+from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.errors import TpjbError

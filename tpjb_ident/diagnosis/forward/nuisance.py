@@ -49,7 +49,9 @@ OWN_NUMBERS = {
     "preload_error": OwnNumber("pad_clearance", "m"),
     "pivot_offset_error": OwnNumber("pivot_offset"),
     "heat_loss": OwnNumber(
-        "film_heat", parameter=lambda change: 1.0 - math.exp(change), change=lambda value: math.log(max(1.0 - value, 1e-9))
+        "film_heat",
+        parameter=lambda change: 1.0 - math.exp(change),
+        change=lambda value: math.log(max(1.0 - value, 1e-9)),
     ),
     "pad_offset": OwnNumber("clearance_scatter", "m", "pad"),
     "soft_pivot": _ratio("pivot_stiffness_scatter", place="pad"),
