@@ -17,13 +17,15 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Problem, loosened
 from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
-from tpjb_ident.diagnosis.comparison.settings import Deciding, DiagnoseSettings
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
-from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances
+from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.verdict.decide import decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -80,15 +82,16 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     base = forward()
     trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
     listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
-    with workers(forward, base, settings.workers) as run:
-        columns = np.column_stack([np.zeros((len(base), 0)), *run(_column, [(listed, i) for i in range(len(listed))])])
     # without a cold polygon the clearance of the file and that of the running bearing are one
     unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})
-    return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip | unseen))
-
-
-def _column(forward: ForwardModel, base: FloatArray, unknowns: tuple[Nuisance, ...], index: int) -> FloatArray:
-    return column_of(forward, (), unknowns, np.zeros(len(unknowns)), base, index)
+    pool = candidates(forward.setup.bearing, settings.skip | unseen)
+    problem = Problem(trusted, base, listed, np.zeros((len(base), len(listed))), pool)
+    with workers(forward, problem, settings.workers) as run:
+        jobs = [((), np.zeros(len(listed)), (i,)) for i in range(len(listed))]
+        for i, (column,) in enumerate(run(derivatives, jobs)):
+            if column is not None:
+                problem.columns[:, i] = column * problem.sigma
+    return problem
 
 
 def _next_test(

@@ -9,7 +9,7 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.diagnosis.forward.forward import Forward
-from tpjb_ident.diagnosis.forward.tolerances import Tolerance
+from tpjb_ident.diagnosis.observations.constants import Tolerance
 from tpjb_ident.diagnosis.observations.gap import direct_scale
 from tpjb_ident.diagnosis.observations.observe import (
     ENTRY_NAMES,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import amount, finding, label_in_words, shown_unit, words_of
-from tpjb_ident.diagnosis.comparison.settings import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.rounding import MINUS, percent, signed, significant

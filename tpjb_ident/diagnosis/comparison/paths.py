@@ -130,7 +130,8 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     nodes = [[share * float(f.width[0]) for share in _NEAR] for f in curved]
     changes = run(path_changes, list(zip(curved, nodes, strict=True)))
     paths = [_curved(fault, row) for fault, row in zip(curved, changes, strict=True) if row]
-    jobs = [((fault,), _start(problem, fault), tuple(range(len(fault.width)))) for fault in straight]
+    count = len(problem.nuisances)
+    jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
     for fault, columns in zip(straight, run(derivatives, jobs), strict=True):
         whole = [column for column in columns if column is not None]
         if len(whole) == len(fault.width):
@@ -181,8 +182,3 @@ def _beyond(path: Path, size: float) -> bool:
 def _curved(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:
     curve = path_through([float(at) for at, _ in changes], [change for _, change in changes])
     return Path(fault, curve.columns, curve)
-
-
-def _start(problem: Problem, fault: Fault) -> FloatArray:
-    gone = fault.own >= 0
-    return np.zeros(len(fault.width) + len(problem.nuisances) - gone)

@@ -11,10 +11,9 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
-from tpjb_ident.diagnosis.comparison.settings import Deciding
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance
-from tpjb_ident.diagnosis.forward.tolerances import Tolerance
+from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 from tpjb_ident.diagnosis.observations.folds import held_out
 from tpjb_ident.diagnosis.observations.model_error import model_error
 from tpjb_ident.diagnosis.observations.observe import Observations

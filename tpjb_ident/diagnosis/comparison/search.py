@@ -197,16 +197,14 @@ class _Search:
 
     def _beside(self, path: Path, fit: Fit) -> Path:
         """A path beside a fit: a tolerance's own number has its derivative there, which large faults change."""
-        own = path.fault.own
-        if own < 0:
+        if path.fault.own < 0:
             return path
-        column = fit.unknowns.amplitudes + fit.unknowns.tolerances.index(own)
-        return Path(path.fault, fit.point.jacobian[:, [column]])
+        return Path(path.fault, fit.point.jacobian[:, [fit.unknowns.amplitudes + path.fault.own]])
 
     def _propose(
         self, score: Score, faults: tuple[Fault, ...], theta: FloatArray, jacobian: FloatArray, coarse: bool = False
     ) -> None:
-        """Add a fault to a model: what its tolerance had found becomes the fault's start."""
+        """Add a fault to a model: what its tolerance had found is where it begins."""
         if not np.any(score.amplitudes):
             return
         fault = score.path.fault.turned()
@@ -214,45 +212,36 @@ class _Search:
         estimate = score.total + self._log_prior(faults) + (_FIRST if coarse else 0.0)
         if score.p < self.settings.untenable:  # it would have to be a step on the way
             estimate -= self.settings.near
-        labels = frozenset(f.label for f in faults)
-        if labels in self.fits or (labels in self.proposals and self.proposals[labels].estimate >= estimate):
-            return
-        start = np.zeros(len(fault.width))
-        start[: len(score.amplitudes)] = score.amplitudes
-        columns = np.zeros((len(jacobian), len(start)))
-        slopes = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
-        columns[:, : slopes.shape[1]] = slopes
-        before = Unknowns(self.problem, faults[:-1])
-        first = before.amplitudes
-        rest, kept = theta[first:], jacobian[:, first:]
-        if fault.own >= 0:
-            index = before.tolerances.index(fault.own)
-            start[0] += rest[index]
-            rest, kept = np.delete(rest, index), np.delete(kept, index, axis=1)
-        self.proposals[labels] = Proposal(
-            faults, np.concatenate([theta[:first], start, rest]),
-            np.column_stack([jacobian[:, :first], columns, kept]), coarse, estimate,
-        )  # fmt: skip
+        if fault.own < 0:
+            first = len(theta) - len(self.problem.nuisances)
+            theta = np.insert(theta, [first] * len(fault.width), 0.0)
+            jacobian = np.insert(jacobian, [first] * len(fault.width), 0.0, axis=1)
+        else:
+            theta, jacobian = theta.copy(), jacobian.copy()
+        start = Unknowns(self.problem, faults).slices[-1].start
+        at = slice(start, start + len(score.amplitudes))
+        theta[at] += score.amplitudes
+        jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
+        self._offer(Proposal(faults, theta, jacobian, coarse, estimate))
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model; its tolerance has its stated prior again."""
-        remaining = tuple(f for f in fit.faults if f is not fault)
-        labels = frozenset(f.label for f in remaining)
-        if labels in self.fits:
-            return
+        faults = tuple(f for f in fit.faults if f is not fault)
         point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
-        theta, jacobian = np.delete(point.theta, at), np.delete(point.jacobian, at, axis=1)
-        gone = point.jacobian[:, at] @ point.theta[at]
-        unknowns = Unknowns(self.problem, remaining)
-        if fault.own >= 0:
-            index = unknowns.amplitudes + unknowns.tolerances.index(fault.own)
-            theta = np.insert(theta, index, 0.0)
-            jacobian = np.insert(jacobian, index, point.jacobian[:, at.start], axis=1)
-        residual = self.problem.measured - point.prediction + gone
-        total = posterior(self.problem.errors, Linear(residual, theta, jacobian, unknowns.width)).promised
-        estimate = total + self._log_prior(remaining)
-        if labels not in self.proposals or self.proposals[labels].estimate < estimate:
-            self.proposals[labels] = Proposal(remaining, theta, jacobian, estimate=estimate)
+        residual = self.problem.measured - point.prediction + point.jacobian[:, at] @ point.theta[at]
+        theta, jacobian = point.theta.copy(), point.jacobian
+        theta[at] = 0.0
+        if fault.own < 0:
+            theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
+        linear = Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
+        estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
+        self._offer(Proposal(faults, theta, jacobian, estimate=estimate))
+
+    def _offer(self, proposal: Proposal) -> None:
+        """Keep the likeliest start of every explanation that was not fitted yet."""
+        known = self.proposals.get(proposal.labels)
+        if proposal.labels not in self.fits and (known is None or known.estimate < proposal.estimate):
+            self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:
         """Probabilities among the tenable fits; among all where none is."""

@@ -130,24 +130,11 @@ def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
-    bearing_nuisances = nuisances(forward.elements, setup, known, by_pad=False)
-    at = np.zeros(len(bearing_nuisances))
-    columns = [column_of(forward, effects, bearing_nuisances, at, base, i) for i in range(len(at))]
+    columns = []
+    for one in nuisances(forward.elements, setup, known, by_pad=False):
+        moved = predict(forward, effects, (one,), np.array([_STEP]))
+        columns.append((moved - base) / _STEP)
     return np.column_stack(columns)
-
-
-def column_of(
-    forward: ForwardModel, effects: Sequence[Effect], unknowns: Sequence[Nuisance], at: FloatArray, base: FloatArray,
-    index: int,
-) -> FloatArray:  # fmt: skip
-    """Change of the observation vector per standard deviation of one nuisance, (n,); `at` (m,), `base` (n,)."""
-    if unknowns[index].column is not None:
-        return np.asarray(unknowns[index].column)
-    # towards zero: there the model surely has an equilibrium
-    step = -_STEP if at[index] > 0.0 else _STEP
-    moved = at.copy()
-    moved[index] += step
-    return (predict(forward, effects, unknowns, moved) - base) / step
 
 
 def predict(

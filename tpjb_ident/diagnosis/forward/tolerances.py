@@ -77,21 +77,3 @@ class Tolerances:
         """Return a copy with what a bearing file states where the command line states nothing."""
         typed = {k: v.value for k, v in self.stated.items() if v.source == "command line"}
         return self.states(dict(bearing.tolerances), "bearing file").states(typed, "command line")
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
-
-    How much of it a campaign really needs is summed over (`comparison.evidence`).
-    """
-
-    stiffness: float = 0.015
-    position: float = 0.5e-6
-    temperature: float = 0.5
-    dry: float = 0.02
-    angle: float = 0.003
-    load: float = 0.003
-    idle_temperature: float = 1.0
-    load_miss: float = 0.003
-    direction_miss: float = 0.0035

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.arrays import BoolArray, IntArray
-from tpjb_ident.diagnosis.comparison.settings import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 
 

@@ -20,8 +20,7 @@ from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import read_coefficients
-from tpjb_ident.diagnosis.comparison.settings import Deciding
-from tpjb_ident.diagnosis.forward.tolerances import Tolerance
+from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import pad_means

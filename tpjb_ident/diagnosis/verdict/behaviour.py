@@ -15,7 +15,7 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Fault
-from tpjb_ident.diagnosis.comparison.settings import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 #: What a pad by itself may be off by: kind, effect and parameter that say it, unit.
 _PADS = {
