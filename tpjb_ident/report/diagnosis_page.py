@@ -11,14 +11,7 @@ from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, s
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import TERMS
-from tpjb_ident.report.diagnosis_words import (
-    beyond_stated,
-    in_words,
-    observable,
-    parameter_rows,
-    place,
-    verdict_sentences,
-)
+from tpjb_ident.report.diagnosis_words import in_words, observable, parameter_rows, place, verdict_sentences
 from tpjb_ident.report.drawing.residual_frame import residual_frame
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
@@ -136,14 +129,13 @@ def _rivals(verdict: Verdict) -> list[str]:
     notes = []
     for rival in listed:
         if rival not in named and rival.probability * odds > own:
-            sizes = [_found(label, parameters) for label, parameters in rival.parameters.items()]
+            sizes = [
+                finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
+                for label, parameters in rival.parameters.items()
+            ]
             share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
-
-
-def _found(label: str, parameters: Mapping[str, Any]) -> str:
-    return finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
 
 
 def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
@@ -160,20 +152,14 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
     tried = [
         [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
     ]
+    columns = ["observable", "where", "size, sigma", "share"]
     sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
     sections.append(
         Section(
             _GROUP,
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
-            tables=[
-                Table(
-                    "Largest shares of the squared gap",
-                    ["observable", "where", "size, sigma", "share"],
-                    places,
-                    frozenset({0, 1}),
-                )
-            ],
+            tables=[Table("Largest shares of the squared gap", columns, places, frozenset({0, 1}))],
         )
     )
     sections += _evidence_sections(verdict)
@@ -202,20 +188,16 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
-    """Sections of the report; those for which a diagnosis holds nothing are left out."""
-    out = [Section("What is left", [_left_sentence(verdict.remainder)])]
-    if verdict.assumptions:
-        note = (
-            "One standard deviation each. They are free within these in every fit and part of every interval; the last "
-            "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
-            "model is what the campaign turned out to need."
-        )
-        far = [f"{sentence}: check it." for sentence in beyond_stated(verdict)]
-        columns = ["tolerance", "stated", "source", "fitted", "deviations"]
-        rows = [_row(a) for a in verdict.assumptions]
-        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
-        out.append(Section("What may be off", [note, *far], tables=[table]))
-    return out
+    """What is left, and what was made of the tolerances."""
+    note = (
+        "One standard deviation each. They are free within these in every fit and part of every interval; the last "
+        "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
+        "model is what the campaign turned out to need."
+    )
+    columns = ["tolerance", "stated", "source", "fitted", "deviations"]
+    table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions], frozenset({0, 2, 3}))
+    left = Section("What is left", [_left_sentence(verdict.remainder)])
+    return [left, Section("What may be off", [note], tables=[table])]
 
 
 def _left_sentence(remainder: Remainder) -> str:

@@ -14,7 +14,7 @@ from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.rounding import MINUS, percent, signed, significant
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnosis.verdict.verdict import Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")
@@ -37,8 +37,9 @@ def verdict_sentences(
     """Say what came out, the answer first."""
     sentences = [_answer(name, verdict, deviations), *verdict.beforehand]
     if deviations and verdict.verdict != "consistent":
-        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
-        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
+        before, after = (
+            ", ".join(f"{c} {percent(deviations[c][end])}" for c in DIRECT if c in deviations) for end in (0, 1)
+        )
         with_effects = f"; with it {after}" if verdict.effects else ""
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
@@ -63,8 +64,7 @@ def verdict_sentences(
     worse = [observable(o) for o, g in verdict.gap_by_observable.items() if _worse(g)]
     if verdict.effects and worse:
         sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
-    if verdict.verdict != "consistent":
-        sentences += [f"Beside it: {sentence}, without a name of its own." for sentence in beyond_stated(verdict)]
+    sentences += [_beyond(one) for one in verdict.assumptions if abs(one.deviation) > Deciding.visible]
     if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
         sentences.append(f"Next test: {in_words(verdict.next_test)}.")
     if verdict.below_floor:
@@ -73,18 +73,12 @@ def verdict_sentences(
     return sentences
 
 
-def beyond_stated(verdict: Verdict) -> list[str]:
-    """Tolerances that stand further out than would surprise nobody, with their sizes."""
-    sentences = []
-    for one in verdict.assumptions:
-        if abs(one.deviation) > Deciding.visible:
-            unit, scale = shown_unit(one.unit)
-            sizes = ", ".join(signed(value / scale) for value in one.values)
-            sentences.append(
-                f"the {label_in_words(one.name)} is {abs(one.deviation):.1f} standard deviations from what is stated "
-                f"({sizes} {unit})"
-            )
-    return sentences
+def _beyond(one: Assumption) -> str:
+    """What is further out than its tolerance explains, with its size: no name, but to be looked at."""
+    unit, scale = shown_unit(one.unit)
+    sizes = ", ".join(signed(value / scale) for value in one.values)
+    far = f"{abs(one.deviation):.1f} standard deviations"
+    return f"Beyond what is stated, without a name: {label_in_words(one.name)} {sizes} {unit}, {far}."
 
 
 def _tested(verdict: Verdict) -> bool:
