@@ -164,9 +164,9 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
     )
     sections += _evidence_sections(verdict)
     if tried:
-        text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
+        title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
         columns = ["explanation", "log evidence", "held-out gap", "probability"]
-        sections.append(Section("Explanations that were fitted", [text], tables=[Table("Best first", columns, tried)]))
+        sections.append(Section("Explanations that were fitted", tables=[Table(title, columns, tried)]))
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))
     return sections

@@ -77,8 +77,10 @@ def _beyond(one: Assumption) -> str:
     """What is further out than its tolerance explains, with its size: no name, but to be looked at."""
     unit, scale = shown_unit(one.unit)
     sizes = ", ".join(signed(value / scale) for value in one.values)
-    far = f"{abs(one.deviation):.1f} standard deviations"
-    return f"Beyond what is stated, without a name: {label_in_words(one.name)} {sizes} {unit}, {far}."
+    return (
+        f"Beyond what is stated, without a name: {label_in_words(one.name)} {sizes} {unit}, "
+        f"{abs(one.deviation):.1f} standard deviations."
+    )
 
 
 def _tested(verdict: Verdict) -> bool:
