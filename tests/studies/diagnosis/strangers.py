@@ -30,8 +30,8 @@ from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.mixtures import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
-from tests.studies.diagnosis.tables import tables
-from tests.studies.results import Rows, write_section
+from tests.studies.diagnosis.tables import all_there, no_false, tables
+from tests.studies.results import Rows, table, write_section
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import ACCURACY, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
@@ -156,12 +156,26 @@ def plan_of(bearing: Bearing, rng: np.random.Generator) -> tuple[Layout, str]:
     return layout, f"{points} points, {', '.join(word for word in rest if word)}"
 
 
-def stranger(number: int, folder: Path) -> Stranger:
-    """Draw bearings and plans until the model has an equilibrium everywhere, and emulate it."""
+def full_plan(bearing: Bearing, count: int) -> tuple[Layout, str]:
+    """A plan of so many operating points with everything beside them."""
+    pads, size = len(bearing.pads), bearing.journal_diameter
+    speed, area = 50.0 / size, size * bearing.length
+    loads = area * np.linspace(0.4e6, 1.3e6, count // 2 + 1)
+    middle = len(loads) // 2
+    tests = dynamic(loads[[middle]], list(speed * np.linspace(0.5, 2.0, count - len(loads) + 1)), speed, DOWN, pads)
+    tests += dynamic(np.delete(loads, middle), [1.1 * speed], speed, DOWN, pads)
+    top = float(loads[-1])
+    shares = (0.2 * top, 0.5 * top, top)
+    layout = Layout(tests, around(float(loads[middle]), 10, speed), dry(range(1, pads + 1), shares), 0.04 * top)
+    return layout, f"{count} points, all static tests"
+
+
+def stranger(number: int, folder: Path, points: int = 0) -> Stranger:
+    """Draw bearings and plans (or one of so many points) until the model has an equilibrium everywhere; emulate it."""
     rng = np.random.default_rng([number, 40])
     while True:
         bearing, grade, words = bearing_of(rng)
-        layout, plan = plan_of(bearing, rng)
+        layout, plan = full_plan(bearing, points) if points else plan_of(bearing, rng)
         setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(32, 4), accuracy=ACCURACY)
         try:
             observations = planned_observations(setup, layout)
@@ -170,7 +184,7 @@ def stranger(number: int, folder: Path) -> Stranger:
             break
         except NoEquilibriumError:
             continue
-    cache = emulate(model, Layout(()), folder / f"stranger-{number}.table", pairs=False)
+    cache = emulate(model, Layout(()), folder / f"stranger-{number}-{points}.table", pairs=False)
     forward = Forward(setup, layout, observations.elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=SKIPPED))
     return Stranger(Bench(problem, forward, forward, seen_sizes(problem, forward)), grade, f"{words}; {plan}")
@@ -269,6 +283,52 @@ def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> di
     }  # fmt: skip
 
 
+def clean(one: Stranger, place: int, deviations: float, settings: DiagnoseSettings) -> dict[str, Any]:
+    """A bearing as drawn but for one tolerance, off by some stated deviations; what was said."""
+    problem, rng = one.bench.problem, np.random.default_rng([place, int(deviations), 4])
+    nuisance = problem.nuisances[place]
+    fault = next(fault for fault in problem.faults if fault.label == nuisance.effect)
+    size = np.zeros(len(problem.nuisances))
+    size[place] = deviations * float(rng.choice([-1.0, 1.0]))
+    truth = Effect(fault.name, **fault.values(size[[place]]))
+    value = measured(one.bench, [], size, 0.0)
+    observations = replace(problem.observations, value=value + noise(problem.observations, value, rng))
+    decision, _ = solve(replace(problem, observations=observations), one.bench.forward, settings)
+    return {
+        "deviations": deviations, "truth": [{"name": truth.name, **truth.parameters}], "shares": [1.0], "outside": "",
+        "words": one.words, **said(decision.verdict), "far": [(d.name, d.size) for d in decision.model.tolerances[:2]],
+    }  # fmt: skip
+
+
+def clean_table(rows: Sequence[dict[str, Any]]) -> str:
+    """What came of clean effects, by size and plan."""
+    lines = []
+    for points, size in sorted({(r["points"], r["deviations"]) for r in rows}):
+        mine = [r for r in rows if (r["points"], r["deviations"]) == (points, size)]
+        right = sum(all_there(r) and no_false(r) for r in mine)
+        wrong = sum(not no_false(r) for r in mine)
+        lines.append([
+            points, f"{size:g}", len(mine), f"{right} ({100 * right / len(mine):.0f} %)", wrong,
+            sum(r["verdict"] == "consistent" for r in mine), sum(r["verdict"] == "unexplained" for r in mine),
+        ])  # fmt: skip
+    head = ["points", "stated deviations", "campaigns", "listed, or in a group of three", "wrong", "consistent"]
+    return table([*head, "unexplained"], lines)
+
+
+def run_clean(folder: Path) -> str:
+    """Every tolerance that has a name, at 4, 6, 10 and 15 stated deviations with 7 points; at 6 with 3 and 13."""
+    stored = Rows(folder / "clean.jsonl", "points", "place", "deviations")
+    settings = DiagnoseSettings(workers=1, skip=SKIPPED)
+    for points, sizes in ((7, (6.0, 4.0, 10.0, 15.0)), (3, (6.0,)), (13, (6.0,))):
+        one = stranger(100, folder, points)
+        first = {n.effect.split()[0]: i for i, n in enumerate(one.bench.problem.nuisances) if n.effect}
+        for size in sizes:
+            for place in first.values():
+                if (points, place, size) not in stored.known:
+                    stored.add({"points": points, "place": place, **clean(one, place, size, settings)})
+    return clean_table([*stored.known.values()])
+
+
 def main() -> None:
     """Draw, diagnose, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -276,8 +336,15 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=30)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=Path, default=Path("strangers.jsonl"))
+    parser.add_argument("--clean", action="store_true", help="single tolerances on a bearing as drawn instead")
     parser.add_argument("--write", action="store_true", help="replace the tables of RESULTS.md")
     asked = parser.parse_args()
+    if asked.clean:
+        text = run_clean(asked.rows.parent)
+        if asked.write:
+            write_section("clean", "python -m tests.studies.diagnosis.strangers --clean --write", text)
+        print(text)
+        return
     stored = Rows(asked.rows, "bearing", "seed")
     settings = DiagnoseSettings(workers=1, skip=SKIPPED)
     for number in range(asked.bearings):

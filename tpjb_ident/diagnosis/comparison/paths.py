@@ -74,8 +74,8 @@ def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> 
     return AmplitudePath(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))
 
 
-#: Nodes of a path in widths of the prior: typical sizes first, the ends only on the side that the data ask for.
-_NEAR, _FAR = (1.0 / 3.0, -1.0 / 3.0), 1.0
+#: A typical size in widths of the prior.
+_NEAR = 1.0 / 3.0
 #: Parts of the way from one direction of the grid to the next.
 _BETWEEN = 3
 #: Amplitudes of a path at which a score is asked for.
@@ -124,16 +124,21 @@ class Path:
 
 
 def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
-    """Lay the path of every fault about its typical sizes; those without an equilibrium anywhere are left out."""
+    """Lay the path of every fault to a typical size on one side; a tolerance's own number is known from its column.
+
+    Those without an equilibrium anywhere are left out.
+    """
     curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in _SLOW]
     straight = [f for f in problem.faults if f not in curved]
-    nodes = [[share * float(f.width[0]) for share in _NEAR] for f in curved]
-    changes = run(path_changes, list(zip(curved, nodes, strict=True)))
-    paths = [_curved(fault, row) for fault, row in zip(curved, changes, strict=True) if row]
+    columns = problem.scaled(problem.columns)
+    paths = [_curved(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
+    asked = [f for f in curved if f.own < 0]
+    changes = run(path_changes, [(f, [sign * _NEAR * float(f.width[0]) for sign in (1.0, -1.0)], 1) for f in asked])
+    paths += [_curved(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
     count = len(problem.nuisances)
     jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
-    for fault, columns in zip(straight, run(derivatives, jobs), strict=True):
-        whole = [column for column in columns if column is not None]
+    for fault, found in zip(straight, run(derivatives, jobs), strict=True):
+        whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):
             paths.append(Path(fault, np.column_stack(whole)))
     return _between_directions(paths)
@@ -163,20 +168,19 @@ def _between_directions(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 
 def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:
-    """Paths with one more node, at the end towards which a score went beyond what was laid."""
-    asked = [i for i, (path, size) in enumerate(zip(paths, sizes, strict=True)) if _beyond(path, size)]
-    jobs = [(paths[i].fault, [_FAR * float(np.sign(sizes[i]) * paths[i].fault.width[0])]) for i in asked]
+    """Paths with what a size asks for: typical sizes on both sides, and the end towards which it goes beyond them."""
+    jobs, asked = [], []
+    for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
+        near = _NEAR * float(path.fault.width[0])
+        wanted = [near, -near, *([float(np.copysign(near / _NEAR, size))] if abs(size) > near else [])]
+        if size and path.curve is not None:
+            asked.append((i, path.curve))
+            jobs.append((path.fault, [node for node in wanted if not np.isclose(path.curve.at, node).any()]))
     out = list(paths)
-    for i, row in zip(asked, run(path_changes, jobs), strict=True):
-        curve = paths[i].curve
-        if row and curve is not None:
-            known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
-            out[i] = _curved(paths[i].fault, [*known, *row])
+    for (i, curve), row in zip(asked, run(path_changes, jobs), strict=True):
+        known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
+        out[i] = _curved(paths[i].fault, [*known, *row])
     return tuple(out)
-
-
-def _beyond(path: Path, size: float) -> bool:
-    return path.curve is not None and not path.curve.at[0] <= size <= path.curve.at[-1]
 
 
 def _curved(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:

@@ -23,6 +23,7 @@ from tpjb_ident.diagnosis.comparison.scores import Score, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
 #: Nats that put a coarse start before all others.
@@ -97,9 +98,12 @@ class _Search:
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
         nothing = np.zeros(len(self.problem.nuisances))
-        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)))
+        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)), rough=True)
         self.report("every effect of the library", 0.1)
         self._propose_singles()
+        baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
+        if baseline.posterior.promised + self._log_prior(()) > best - self.settings.worth_derivatives:
+            self.fits[frozenset()] = self._renewed(baseline)
         while (proposal := self._next()) is not None:
             self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / self.settings.most_fits))
             self._fit(proposal)
@@ -127,16 +131,20 @@ class _Search:
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         return proposal.estimate > total - self.settings.near - rise
 
-    def _fit(self, proposal: Proposal) -> None:
+    def _renewed(self, fit: Fit) -> Fit:
+        """A fit with derivatives of its own, where these do not make it worse."""
+        again = refined(self.run, fit)
+        return again if again.posterior.total > fit.posterior.total - 1.0 else fit
+
+    def _fit(self, proposal: Proposal, rough: bool = False) -> None:
         fit = fitted(self.run, self.problem, proposal)
         if fit is None:
             return
         leader = self._leader()
         right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
         # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
-        if self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
-            again = refined(self.run, fit)
-            fit = again if again.posterior.total > fit.posterior.total - 1.0 else fit
+        if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
+            fit = self._renewed(fit)
         self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
@@ -171,8 +179,9 @@ class _Search:
         strain = self.fits[frozenset()].strain
         first = scores(problem.errors, linear, self.paths, strain)
         suspect = self.settings.suspect
-        rows = {id(score.path): score.amplitudes[0] for score in first}
-        self.paths = lengthened(self.run, problem, self.paths, [float(rows[id(path)]) for path in self.paths])
+        leading = list(dict.fromkeys(score.path.fault.label for score in first))[: Deciding.followed]
+        sizes = {id(score.path): float(score.amplitudes[0]) for score in first if score.path.fault.label in leading}
+        self.paths = lengthened(self.run, problem, self.paths, [sizes.get(id(path), 0.0) for path in self.paths])
         singles = scores(problem.errors, linear, self.paths, strain)
         for end in (-1.0, 1.0) if singles and singles[0].scale > suspect else ():  # a jump hides what lies behind it
             ends = [end * float(path.fault.width[0]) for path in self.paths]

@@ -110,16 +110,16 @@ def _difference(
 
 
 def path_changes(
-    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float]
+    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float], most: int = 9
 ) -> list[tuple[float, FloatArray]]:
-    """Job: changes of the prediction along a fault's first amplitude, everything else as stated."""
+    """Job: changes of the prediction along a fault's first amplitude, all else as stated, at `most` of some nodes."""
     unknowns, base = Unknowns(problem, (fault,)), problem.scaled(problem.base)
     at = unknowns.slices[0].start
     out = []
     for node in nodes:
         theta = np.zeros(len(unknowns.width))
         theta[at] = node
-        if unknowns.low[at] <= node <= unknowns.high[at]:
+        if len(out) < most and unknowns.low[at] <= node <= unknowns.high[at]:
             changed = unknowns.predict(forward.fresh(), problem, theta)
             if changed is not None:
                 out.append((node, changed - base))

@@ -64,6 +64,8 @@ class Deciding:
     silent = 0.05
 
     # Search.
+    #: Faults that lead by straight paths and of which the whole path is asked: right ones are among the first five.
+    followed = 12
     #: Nats that a fit rises above its score at the most, and so may its rivals: derivatives from elsewhere miss that.
     mistaken = 25.0
     #: Nats behind the leader within which a fit gets derivatives of its own.

@@ -16,6 +16,7 @@ from tpjb_ident.diagnosis.comparison.search import Comparison
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
@@ -23,30 +24,14 @@ from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
-
-@dataclass(frozen=True)
-class Plausible:
-    """Range of a parameter that its source allows."""
-
-    low: float
-    high: float
-    source: str
-
-    def words(self, name: str, value: float, lo: float, hi: float) -> str:
-        """What to say of an amplitude with its interval; empty where it is plausible."""
-        if lo <= self.high and hi >= self.low:
-            return ""
-        limit = self.high if value > self.high else self.low
-        return (
-            f"{name} {value:.3g} is beyond {limit:.3g}, as far as its source goes ({self.source}): "
-            "another cause, or a second one, may stand behind this name"
-        )
-
-
 #: Effect and parameter: what its source allows. What is not here is bounded by three typical sizes of the library,
 #: whose sources stand with the effects.
 _RANGES = {
-    ("oil_viscosity", "factor"): (0.9, 1.1, "ISO 3448 holds a grade within 10 %"),
+    ("oil_viscosity", "factor"): (
+        0.9,
+        1.1,
+        "ISO 3448 holds a grade within 10 %, the next one is 1.5 times as thick or thin",
+    ),
     ("pivot_flexibility", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
     ("soft_pivot", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
     ("hot_oil_carryover", "fraction"): (0.0, 0.95, "groove mixing of 0.4 to 0.95 in flooded bearings"),
@@ -60,18 +45,27 @@ _RANGES = {
 }
 
 
-def plausible(name: str, parameter: str, pads: int) -> Plausible | None:
-    """Range of an effect's parameter; None where nothing bounds it (a direction, a generic term)."""
+def _stands_in(name: str, parameter: str, value: Estimate, pads: int) -> str:
+    """What to say of a size that lies wholly beyond what its source allows; empty where it does not."""
     kind = kind_of(name)
     described = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
+    if value.lo == value.hi:
+        return ""
     if (name, parameter) in _RANGES:
-        return Plausible(*_RANGES[(name, parameter)])
-    if described is None or described.neutral != described.neutral or math.isnan(described.typical):
-        return None
-    origin, reach = described.to_linear(described.neutral), 3.0 * described.typical_step
-    ends = sorted(described.from_linear(origin + s * reach) for s in (-1.0, 1.0))
-    return Plausible(
-        max(ends[0], described.low), min(ends[1], described.high), f"three times a typical size; {kind.source}"
+        low, high, source = _RANGES[(name, parameter)]
+    elif described is None or math.isnan(described.neutral) or math.isnan(described.typical):
+        return ""
+    else:
+        origin, reach = described.to_linear(described.neutral), Deciding.width * described.typical_step
+        ends = sorted(described.from_linear(origin + s * reach) for s in (-1.0, 1.0))
+        low, high = max(ends[0], described.low), min(ends[1], described.high)
+        source = f"three times a typical size; {kind.source}"
+    if value.lo <= high and value.hi >= low:
+        return ""
+    limit = high if value.value > high else low
+    return (
+        f"{name} {parameter} {value.value:.3g} is beyond {limit:.3g}, as far as its source goes ({source}): "
+        "another cause, or a second one, may stand behind this name"
     )
 
 
@@ -152,18 +146,10 @@ def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect,
             continue
         parameters = parameters_of(fit, index)
         change = float(np.linalg.norm(fit.point.jacobian[:, at] @ fit.point.theta[at]))
-        words = _stands_in(fault.name, parameters, pads)
+        said = (_stands_in(fault.name, key, value, pads) for key, value in parameters.items())
+        words = "; ".join(word for word in said if word)
         rows.append((change, FoundEffect(fault.name, parameters, words, round(shares[fault.name], 4))))
     return tuple(effect for _, effect in sorted(rows, key=lambda row: -row[0]))
-
-
-def _stands_in(name: str, parameters: dict[str, Estimate], pads: int) -> str:
-    words = []
-    for key, value in parameters.items():
-        limits = plausible(name, key, pads) if value.lo < value.hi else None
-        if limits is not None:
-            words.append(limits.words(f"{name} {key}", value.value, value.lo, value.hi))
-    return "; ".join(word for word in words if word)
 
 
 def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
