@@ -129,14 +129,13 @@ def _rivals(verdict: Verdict) -> list[str]:
     notes = []
     for rival in listed:
         if rival not in named and rival.probability * odds > own:
-            sizes = [_found(label, parameters) for label, parameters in rival.parameters.items()]
+            sizes = [
+                finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
+                for label, parameters in rival.parameters.items()
+            ]
             share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
-
-
-def _found(label: str, parameters: Mapping[str, Any]) -> str:
-    return finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
 
 
 def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
@@ -153,27 +152,21 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
     tried = [
         [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
     ]
+    columns = ["observable", "where", "size, sigma", "share"]
     sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
     sections.append(
         Section(
             _GROUP,
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
-            tables=[
-                Table(
-                    "Largest shares of the squared gap",
-                    ["observable", "where", "size, sigma", "share"],
-                    places,
-                    frozenset({0, 1}),
-                )
-            ],
+            tables=[Table("Largest shares of the squared gap", columns, places, frozenset({0, 1}))],
         )
     )
     sections += _evidence_sections(verdict)
     if tried:
-        text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
+        title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
         columns = ["explanation", "log evidence", "held-out gap", "probability"]
-        sections.append(Section("Explanations that were fitted", [text], tables=[Table("Best first", columns, tried)]))
+        sections.append(Section("Explanations that were fitted", tables=[Table(title, columns, tried)]))
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))
     return sections
@@ -195,23 +188,16 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
-    """Sections of the report; those for which a diagnosis holds nothing are left out."""
-    out = [Section("What is left", [_left_sentence(verdict.remainder)])]
-    if verdict.assumptions:
-        note = (
-            "One standard deviation each. They are free within these in every fit and part of every interval; the last "
-            "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
-            "model is what the campaign turned out to need."
-        )
-        far = [
-            f"The {label_in_words(a.name)} is {abs(a.deviation):.1f} standard deviations from what is stated: check it."
-            for a in verdict.assumptions if abs(a.deviation) > DiagnoseSettings.visible
-        ]  # fmt: skip
-        columns = ["tolerance", "stated", "source", "fitted", "deviations"]
-        rows = [_row(a) for a in verdict.assumptions]
-        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
-        out.append(Section("What may be off", [note, *far], tables=[table]))
-    return out
+    """What is left, and what was made of the tolerances."""
+    note = (
+        "One standard deviation each. They are free within these in every fit and part of every interval; the last "
+        "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
+        "model is what the campaign turned out to need."
+    )
+    columns = ["tolerance", "stated", "source", "fitted", "deviations"]
+    table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions], frozenset({0, 2, 3}))
+    left = Section("What is left", [_left_sentence(verdict.remainder)])
+    return [left, Section("What may be off", [note], tables=[table])]
 
 
 def _left_sentence(remainder: Remainder) -> str:
@@ -225,8 +211,7 @@ def _left_sentence(remainder: Remainder) -> str:
 
 def _row(one: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
-    values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
     unit, scale = shown_unit(one.unit)
-    fitted = ", ".join(signed(v / scale) for v in values)
+    fitted = ", ".join(signed(v / scale) for v in one.values)
     far = signed(one.deviation) if one.deviation else ""
     return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}", far]
