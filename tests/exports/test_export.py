@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from tpjb_ident.columns import use_units
+from tpjb_ident.compare.coefficient_table import read_rows
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import (
     COLUMNS,
@@ -30,7 +31,7 @@ from tpjb_ident.exports.rotor_programs import (
     write_xltrc,
 )
 from tpjb_ident.exports.structural import sep005
-from tpjb_ident.exports.table import write_csv, write_excel, write_mat, write_parquet
+from tpjb_ident.exports.table import write_csv, write_excel, write_mat, write_parquet, write_us
 from tpjb_ident.exports.write import export
 
 
@@ -210,6 +211,16 @@ def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path, points):
     frame = pd.read_csv(tmp_path / "bearing_coefficients.csv")
     assert set(frame["shaft_speed_rpm"]) == {1320.0}
     assert frame["frequency_rad_per_s"].iloc[0] == pytest.approx(2 * math.pi * 25)
+
+
+def test_exported_tables_are_read_back_at_their_own_frequencies(tmp_path, points):
+    write_csv(tmp_path, points, "c")
+    write_us(tmp_path, points, "bearing_coefficients")
+    for name in ("bearing_coefficients.csv", "bearing_coefficients_us.csv"):
+        rows = read_rows(tmp_path / name)
+        assert [row.point.excitation / (2 * math.pi) for row in rows] == pytest.approx(list(points["excitation_Hz"]))
+        assert [row.point.static_load for row in rows] == pytest.approx(list(points["static_load_N"]))
+        assert [row.k[1, 1] for row in rows] == pytest.approx(list(points["kyy_N_per_m"]))
 
 
 def test_matlab_gets_matrices(tmp_path, points):
