@@ -18,6 +18,7 @@ from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import refused_runs, slow_samples
+from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
@@ -209,33 +210,26 @@ def _read(run: Run) -> _Record:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
         raise refuse(run.file, "record", what, "Repeat this direction", run.id)
     time, place = time[good], place[good]
-    design = _turning(time, run.point.shaft_speed)
-    mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
-    steady = place - design[:, 1:] @ mean[1:, :2]
+    speed = run.point.shaft_speed_hz
+    turning = [speed, 2 * speed] if speed * (time[-1] - time[0]) > 2.0 else []
+    design = line_design(time, np.array(turning), drift_order=0)
+    mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
+    steady = place - design[:, :-1] @ mean[:-1, :2]
     label = np.floor((time - time[0]) / _BLOCK).astype(int)
     count = np.bincount(label)
     usual = np.median(count[count > 0])
     parts = [label == k for k in np.flatnonzero(count > 0.5 * usual)]
-    load = mean[0, 2:]
+    load = mean[-1, 2:]
     return _Record(
         point=run.point,
-        position=np.asarray(mean[0, :2], dtype=float),
+        position=np.asarray(mean[-1, :2], dtype=float),
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
         span=float(time[-1] - time[0]),
         block_time=np.array([time[part].mean() for part in parts]),
         blocks=np.array([steady[part].mean(axis=0) for part in parts]),
     )
-
-
-def _turning(time: FloatArray, speed: float) -> FloatArray:
-    """Columns (n, p): one, and cosine and sine of once and twice per turn where the record holds two turns."""
-    columns = [np.ones_like(time)]
-    if speed > 0.0 and speed * (time[-1] - time[0]) > 4.0 * math.pi:
-        for order in (1.0, 2.0):
-            columns += [np.cos(order * speed * time), np.sin(order * speed * time)]
-    return np.column_stack(columns)
 
 
 def _noise(records: list[_Record]) -> NoiseModel:

@@ -129,8 +129,8 @@ class RunPhasors:
         late = self._late(delays)
         return replace(self, record=record / late, residual=tuple(bins / gain for bins, gain in zip(residual, late)))
 
-    def oil_force(self, line: int = 0) -> ComplexArray:
-        """Oil-force phasors at one line, shape (n, 2) [N]."""
+    def oil_force(self, line: int | slice = 0) -> ComplexArray:
+        """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
         a = None if self.acceleration is None else self.acceleration.phasors[:, line]
         return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.broadband.responses import end_columns, place_in_line
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
 
@@ -74,11 +75,6 @@ def _rows(
     F = np.concatenate([s.F[:, bins].reshape(-1, 2) for s in spectra])
     if spectra[0].period is not None:
         return D, F, np.zeros((len(D), 0), complex), np.zeros(len(D))
-    place = spectra[0].frequencies[bins] - spectra[0].frequencies[bins].mean()
-    place = place / max(float(np.abs(place).max()), 1e-300)
-    runs = len(spectra) if ends else 0
-    columns = np.zeros((runs, len(spectra), len(bins), _ORDER + 1), complex)
-    for r in range(runs):
-        columns[r, r] = place[:, None] ** np.arange(_ORDER + 1)
-    rows = columns.transpose(1, 2, 0, 3).reshape(len(D), -1)
-    return D, F, rows, np.tile(place, len(spectra))
+    place = place_in_line(spectra[0].frequencies[bins])
+    columns = end_columns(len(spectra), place, _ORDER)[:, : None if ends else 0]
+    return D, F, columns, np.tile(place, len(spectra))

@@ -24,7 +24,7 @@ from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
 from tpjb_ident.phasors.compensation import compensated, inspect_readings
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors, oil_force
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")
@@ -67,8 +67,7 @@ class RunSpectra:
     @cached_property
     def F(self) -> ComplexArray:
         """Oil force by the accelerometers where there are any, (n_windows, n_bins, 2) [N]."""
-        a = None if self.phasors.acceleration is None else self.phasors.acceleration.phasors
-        return oil_force(self.phasors.cell_force.phasors, a, self.phasors.housing_mass)
+        return self.phasors.oil_force(slice(None))
 
     @property
     def amplitude(self) -> float:

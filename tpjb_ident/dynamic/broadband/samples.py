@@ -11,7 +11,7 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import inverse_directions
+from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 from tpjb_ident.phasors.run_data import QUANTITIES
@@ -85,7 +85,7 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     channels, rows, lost = [], [], 0.0
     for channel, values in recorded:
         missing = float((~np.isfinite(values)).mean())
-        if missing > _MAX_LOST and _spare(channel, [c for c, _ in recorded]):
+        if missing > _MAX_LOST and is_spare(channel, [c for c, _ in recorded]):
             continue
         bridged, share = _bridged(run, channel, values)
         channels.append(channel)
@@ -105,12 +105,6 @@ def _refuse_unlike(run: Run, readers: tuple[DeviceReader, ...]) -> None:
             listed = f"{first.rate:.6g} Hz and {reader.rate:.6g} Hz"
             text = f"are sampled at {listed}; over a band all channels need one rate"
             raise refuse(run.file, "channels", text, "Record them at one rate, or excite by sines", run.id)
-
-
-def _spare(channel: Channel, channels: list[Channel]) -> bool:
-    """Whether the other channels of its quantity still span the plane."""
-    axes = [float(c.axis or 0.0) for c in channels if c.quantity == channel.quantity and c.name != channel.name]
-    return len(axes) > 1 and bool(np.isfinite(inverse_directions(tuple(axes))).all())
 
 
 def _even(run: Run, time: FloatArray, rate: float) -> None:
