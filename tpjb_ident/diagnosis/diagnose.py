@@ -183,11 +183,12 @@ def before_and_after(diagnosis: Diagnosis, identification: Identification | None
     for name, prediction in models:
         predicted = _coefficients(observations, prediction)
         for place, (point, columns) in measured.items():
-            row: dict[str, Any] = {"pivots": name, **dict(zip(POINT_KEY, point.key, strict=True)), **columns}
+            empty = {f"{column}{end}": math.nan for column in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")}
+            row: dict[str, Any] = {"pivots": name, **dict(zip(POINT_KEY, point.key, strict=True)), **empty, **columns}
             own = predicted[place][1] if place in predicted else {}
             for column in COEFFICIENT_COLUMNS:
                 row[f"{column}_predicted"] = own.get(column, math.nan)
-                row[f"{column}_ratio"] = row[f"{column}_predicted"] / row.get(column, math.nan)
+                row[f"{column}_ratio"] = row[f"{column}_predicted"] / row[column]
             rows.append(row)
     return pd.DataFrame(rows)
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -76,8 +75,6 @@ def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> 
 
 #: A typical size in widths of the prior.
 _NEAR = 1.0 / 3.0
-#: Parts of the way from one direction of the grid to the next.
-_BETWEEN = 3
 #: Amplitudes of a path at which a score is asked for.
 _POINTS = 41
 #: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
@@ -141,30 +138,7 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
         whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):
             paths.append(Path(fault, np.column_stack(whole)))
-    return _between_directions(paths)
-
-
-def _between_directions(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Paths of directions between those of the grid, by the second harmonic through all of the grid."""
-    groups: dict[str, list[Path]] = {}
-    for path in paths:
-        if "direction" in path.fault.candidate.fixed and path.curve is not None:
-            groups.setdefault(path.fault.label, []).append(path)
-    out = list(paths)
-    for group in groups.values():
-        grid = np.array([path.fault.candidate.fixed["direction"] for path in group])
-        curves = [path.curve for path in group if path.curve is not None]
-        alike = all(np.array_equal(curve.at, curves[0].at) for curve in curves)
-        if len(grid) < 3 or not alike:
-            continue
-        for turn in np.arange(1, _BETWEEN) * math.pi / len(grid) / _BETWEEN:
-            for path, angle in zip(group, grid, strict=True):
-                share = (1.0 + 2.0 * np.cos(2.0 * (angle + turn - grid))) / len(grid)
-                columns = np.tensordot(share, [curve.columns for curve in curves], 1)
-                fixed = {**path.fault.candidate.fixed, "direction": float(angle + turn)}
-                fault = replace(path.fault, candidate=replace(path.fault.candidate, fixed=fixed))
-                out.append(Path(fault, columns, AmplitudePath(curves[0].at, columns)))
-    return tuple(out)
+    return tuple(paths)
 
 
 def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:

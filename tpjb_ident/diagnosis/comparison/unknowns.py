@@ -115,7 +115,7 @@ def path_changes(
     """Job: changes of the prediction along a fault's first amplitude, all else as stated, at `most` of some nodes."""
     unknowns, base = Unknowns(problem, (fault,)), problem.scaled(problem.base)
     at = unknowns.slices[0].start
-    out = []
+    out: list[tuple[float, FloatArray]] = []
     for node in nodes:
         theta = np.zeros(len(unknowns.width))
         theta[at] = node
