@@ -204,7 +204,8 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     E_white, back = np.split(white, [E.shape[2]], axis=2)
     A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
     flat = E_white.reshape(len(A) * n, E.shape[2])
-    return A_inverse, -back.transpose(0, 2, 1) @ E_white, G - flat.T @ flat
+    K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
+    return A_inverse, K, G - flat.T @ flat
 
 
 def _root(A: FloatArray) -> FloatArray:
