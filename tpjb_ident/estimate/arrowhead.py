@@ -205,7 +205,7 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
     flat = E_white.reshape(len(A) * n, E.shape[2])
     K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
-    return A_inverse, K, G - flat.T @ flat
+    return A_inverse, K, np.asarray(G - flat.T @ flat, dtype=float)
 
 
 def _root(A: FloatArray) -> FloatArray:
