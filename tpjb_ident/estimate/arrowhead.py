@@ -211,9 +211,10 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
 def _root(A: FloatArray) -> FloatArray:
     """Cholesky factors; where one has none, a point whose weights left it at the edge of what is told, with a ridge."""
     try:
-        return np.linalg.cholesky(A)
+        return np.asarray(np.linalg.cholesky(A), dtype=float)
     except np.linalg.LinAlgError:
-        return np.linalg.cholesky(A + _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1]))
+        ridge = _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1])
+        return np.asarray(np.linalg.cholesky(A + ridge), dtype=float)
 
 
 def _records(
