@@ -70,7 +70,7 @@ def runs():
 def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
     named = {c.name: c for c in channels}
     campaign = SimpleNamespace(
-        id="c", channels=named, of_kind=lambda kind: [], housing_mass=30.0, mass_uncertainty=0.0, mount=None
+        id="c", channels=named, of_kind=lambda kind: [], housing_mass=3.0, mass_uncertainty=0.0, mount=None
     )
     chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
     return assemble(campaign, Kept(runs, left_out), chosen, progress or (lambda text, done, total: None))

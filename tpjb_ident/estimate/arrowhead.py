@@ -204,15 +204,17 @@ def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray
     E_white, back = np.split(white, [E.shape[2]], axis=2)
     A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
     flat = E_white.reshape(len(A) * n, E.shape[2])
-    return A_inverse, -back.transpose(0, 2, 1) @ E_white, G - flat.T @ flat
+    K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
+    return A_inverse, K, np.asarray(G - flat.T @ flat, dtype=float)
 
 
 def _root(A: FloatArray) -> FloatArray:
     """Cholesky factors; where one has none, a point whose weights left it at the edge of what is told, with a ridge."""
     try:
-        return np.linalg.cholesky(A)
+        return np.asarray(np.linalg.cholesky(A), dtype=float)
     except np.linalg.LinAlgError:
-        return np.linalg.cholesky(A + _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1]))
+        ridge = _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1])
+        return np.asarray(np.linalg.cholesky(A + ridge), dtype=float)
 
 
 def _records(

@@ -16,7 +16,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import calibration_numbers
+from tpjb_ident.identification.campaign_blocks import calibration_numbers, run_miss
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
@@ -24,8 +24,6 @@ from tpjb_ident.terms.distortion import band_change, line_scatter
 STRONG = 10.0
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
-#: Misses that no scatter of loads explains say nothing of how H changes with the load.
-_MAX_MISS = 0.05
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ def band_blocks(
             warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth[0], "miss": _miss(miss, members)}
+            row |= {"run": len(runs), "temperature": warmth[0], "miss": run_miss(miss, members)}
             for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
                 rows.append(response | row | {"point": first + place, "omega": omega[first + place]})
             runs.append(", ".join(s.phasors.run for s in spectra))
@@ -109,12 +107,6 @@ def _members(point: BandPoint) -> list[list[int]]:
     """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
     runs = range(len(point.spectra))
     return [list(runs)] if point.method == "hv" else [[r] for r in runs]
-
-
-def _miss(miss: LoadMiss, members: Sequence[int]) -> complex:
-    """Missed load of some runs together, relative size + i turn [rad]."""
-    size, turn = float(np.mean(miss.size[members])), float(np.mean(miss.sideways[members]))
-    return complex(size, turn) if abs(size) < _MAX_MISS and abs(turn) < _MAX_MISS else 0j
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
