@@ -48,10 +48,10 @@ def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
     for name, entry in repeated.items():
-        for file in files_of(folder, name, entry, ()):
-            if file["role"] == "input" and file["state"] != "same":
+        for known in files_of(folder, name, entry, ()):
+            if known["role"] == "input" and known["state"] != "same":
                 raise BadInputError(
-                    f"{folder}: input {file['file']} of {name} {STATES[file['state']]}. Bring it back to where it was."
+                    f"{folder}: input {known['file']} of {name} {STATES[known['state']]}. Bring it back to where it was."
                 )
     from tpjb_ident.runtime.differences import compared
 

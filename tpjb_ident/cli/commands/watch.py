@@ -169,7 +169,8 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         snapshot.count("look"),
     )
     c.print(
-        f"{snapshot.campaign.id}: {landed} of {len(snapshot.states)} runs landed, {repeat} to be repeated, {look} to look at."
+        f"{snapshot.campaign.id}: {landed} of {len(snapshot.states)} runs landed, {repeat} to be repeated, "
+        f"{look} to look at."
     )
     if len(snapshot.new) > MOST_LINES:
         from tpjb_ident.report.watch_page import coverage_table
