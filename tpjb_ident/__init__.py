@@ -56,8 +56,6 @@ _HOMES = {
     "plots": "tpjb_ident.report.plots",
 }
 
-#: Names of packages.
-_PACKAGES = {"plots"}
 #: Arguments that are looked at before a function is called: the path of a campaign or a bearing does as well.
 _CHECKED = {
     "identify": "campaign", "fit_pivots": "campaign", "measure_locus": "campaign", "measure_clearance": "campaign",
@@ -82,7 +80,7 @@ def __getattr__(name: str) -> Any:
 
         check_model()
     module = importlib.import_module(home)
-    value: Any = module if name in _PACKAGES else getattr(module, name)
+    value: Any = module if name == "plots" else getattr(module, name)
     if callable(value) and not isinstance(value, type):
         from tpjb_ident.arguments import checked
 

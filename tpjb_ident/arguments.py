@@ -42,14 +42,10 @@ def as_bearing(value: Any, name: str) -> Bearing:
     raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(value).__name__}.")
 
 
-def _path(value: Any, name: str) -> Any:
+def _path(value: Any, name: str) -> Path:
     if not isinstance(value, (str, os.PathLike)):
         raise ArgumentError(f"{name}: must be a path, got {type(value).__name__}.")
-    return value
-
-
-def _folder(value: Any, name: str) -> Path:
-    return Path(_path(value, name))
+    return Path(value)
 
 
 def _curves(value: Any, name: str) -> Any:
@@ -91,7 +87,7 @@ def _with_clearance(settings: Any, campaign: Campaign) -> Any:
 
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path, "folder": _folder,
+    "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path, "folder": _path,
     "curves": _curves, "comparison": _comparison,
 }  # fmt: skip
 

@@ -9,8 +9,7 @@ def check_model() -> None:
     """Do nothing if `import model` gives the bundled bearing model."""
     package = importlib.import_module("model")
     if getattr(package, "DISTRIBUTION", None) != "tpjb-ident":
-        place = getattr(package, "__file__", None) or getattr(package, "__path__", "an unknown place")
         raise ImportError(
-            f"another package named 'model' ({place}) hides the bearing model of tpjb-ident. Rename it, start "
+            f"another package named 'model' ({package}) hides the bearing model of tpjb-ident. Rename it, start "
             "Python from another folder, or take its folder off sys.path / PYTHONPATH."
         )

@@ -351,27 +351,25 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("x_m_predicted", "length", "m", "x of the shaft centre, predicted"),
         Column("y_m_predicted", "length", "m", "y of it"),
     ),
+    "difference": (
+        *_POINT,
+        Column("static_load_measured_N", "force", "N", "mean load that the cells show", ("_a", "_b")),
+        Column("quality", "text", "", 'named conditions, "ok" if there are none', ("_a", "_b")),
+        *_coefficients(_CHANGE, STIFFNESS, DAMPING),
+        *(Column(f"{s}{{e}}_changed", "text", "", "yes, no, or cannot tell") for s in "kc"),
+    ),
+    "pivot_difference": (
+        PAD,
+        Column("force_N", "force", "N", "load on the pad"),
+        Column(TANGENT, "stiffness", "N/m", "tangent, what small vibrations feel", _CHANGE),
+        Column("stiffness_changed", "text", "", "yes, no, or cannot tell"),
+    ),
+    "clearance_difference": (
+        PAD,
+        Column("clearance_m", "length", "m", "assembled clearance at zero push load", _CHANGE),
+        Column("clearance_changed", "text", "", "yes, no, or cannot tell"),
+    ),
 }
-
-
-TABLES["difference"] = (
-    *_POINT,
-    Column("static_load_measured_N", "force", "N", "mean load that the cells show", ("_a", "_b")),
-    Column("quality", "text", "", 'named conditions, "ok" if there are none', ("_a", "_b")),
-    *_coefficients(_CHANGE, STIFFNESS, DAMPING),
-    *(Column(f"{s}{{e}}_changed", "text", "", "yes, no, or cannot tell") for s in "kc"),
-)
-TABLES["pivot_difference"] = (
-    PAD,
-    Column("force_N", "force", "N", "load on the pad"),
-    Column(TANGENT, "stiffness", "N/m", "tangent, what small vibrations feel", _CHANGE),
-    Column("stiffness_changed", "text", "", "yes, no, or cannot tell"),
-)
-TABLES["clearance_difference"] = (
-    PAD,
-    Column("clearance_m", "length", "m", "assembled clearance at zero push load", _CHANGE),
-    Column("clearance_changed", "text", "", "yes, no, or cannot tell"),
-)
 
 
 def markdown(table: str) -> str:

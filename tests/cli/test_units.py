@@ -79,6 +79,25 @@ def test_a_prediction_is_printed_in_pounds_and_written_in_both(tmp_path):
 
 
 @pytest.mark.slow
+def test_channels_are_shown_in_us_units_and_written_in_si(tmp_path):
+    words = ("show", "rigdata/samples/demo.h5", "--run", "d-05000-25-01", "--out")
+    shown = {}
+    for system in ("si", "us"):
+        result = tpjb(*words, tmp_path / system, "--units", system)
+        assert result.exit_code == 0, result.output
+        rows = [line.split() for line in result.output.splitlines()]
+        shown[system] = {row[0]: (row[1], float(row[4])) for row in rows if len(row) > 7 and row[2] == "2000"}
+    units = {name: (shown["si"][name][0], shown["us"][name][0]) for name in ("X1A", "L1V", "T1", "K1", "A1H")}
+    assert units == {
+        "X1A": ("µm", "mil"), "L1V": ("N", "lbf"), "T1": ("°C", "degF"), "K1": ("Hz", "rpm"), "A1H": ("m/s²", "m/s²"),
+    }  # fmt: skip
+    for name, factor, zero in (("X1A", 1 / 25.4, 0), ("L1V", 1 / 4.44822, 0), ("T1", 1.8, 32), ("K1", 60, 0)):
+        assert shown["us"][name][1] == pytest.approx(factor * shown["si"][name][1] + zero, rel=2e-3)
+    si, us = ((tmp_path / system / "channels.csv").read_text() for system in ("si", "us"))
+    assert si == us
+
+
+@pytest.mark.slow
 def test_a_report_in_us_units_holds_no_other(tmp_path):
     result = tpjb(
         "compare", "rigdata/samples/demo.h5", "--pivots", "measured", "--units", "us", "--out", tmp_path / "o"

@@ -62,7 +62,7 @@ def _shown(value: object) -> str:
 
 def _off(a: object, b: object, width: float) -> float:
     """Difference of two values over their size or, where that is larger, half the width of their interval."""
-    if not (isinstance(a, int | float) and isinstance(b, int | float)) or isinstance(a, bool) or isinstance(b, bool):
+    if not (isinstance(a, int | float) and isinstance(b, int | float) and bool not in (type(a), type(b))):
         return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
     if a == b or (math.isnan(a) and math.isnan(b)):
         return 0.0

@@ -180,14 +180,8 @@ def _attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
     return Outcome(value, error, tuple((str(w.message), w.category, w.filename, w.lineno) for w in caught))
 
 
-_last_shared: dict[bytes, Any] = {}
-
-
-def _unpacked(packed: bytes) -> Any:
-    if packed not in _last_shared:
-        _last_shared.clear()
-        _last_shared[packed] = pickle.loads(packed)
-    return _last_shared[packed]
+#: What all jobs share, unpacked once.
+_unpacked = functools.lru_cache(maxsize=1)(pickle.loads)
 
 
 def _portable(error: Exception) -> Exception:
@@ -281,15 +275,14 @@ def _interrupts_held() -> Iterator[None]:
     The end of this one would wait for it, and it for somebody who takes its answer.
     """
     held: list[int] = []
-    former: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():  # others are not interrupted
-        for number in (signal.SIGINT, signal.SIGTERM):
-            former[number] = signal.signal(number, lambda number, frame: held.append(number))
+    # other threads are not interrupted
+    kinds = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}
     try:
         yield
     finally:
-        for number, handler in former.items():
-            signal.signal(number, handler or signal.SIG_DFL)
+        for kind, handler in former.items():
+            signal.signal(kind, handler or signal.SIG_DFL)
     for number in held[:1]:
         signal.raise_signal(number)
 

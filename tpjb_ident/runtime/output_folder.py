@@ -18,8 +18,6 @@ from tpjb_ident.runtime.documents import read_document, schema
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.runtime.tables import write_text
 
-__all__ = ["RECORD", "contradiction", "former_runs", "output_folder"]
-
 #: Full: the disk, the user's share of it, or the largest file that the system allows.
 _FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
@@ -125,7 +123,7 @@ def record_text(commands: Mapping[str, Any]) -> str:
 def _move_in(staging: Path, target: Path, command: str) -> None:
     """Move results into an existing folder, whose lock the caller holds; drop what the command left there before."""
     _finish_moving(target)
-    new = _files_in(staging)
+    new = files_in(staging)
     before = former_runs(target)
     ours = {name for entry in before.values() for name in outputs_of(entry)} | {RECORD}
     foreign = [name for name in new if (target / name).exists() and name not in ours]
@@ -144,13 +142,13 @@ def _move_in(staging: Path, target: Path, command: str) -> None:
     _finish_moving(target)
 
 
-def _finish_moving(target: Path) -> bool:
-    """Bring in what waits in `READY`; whether there was anything."""
+def _finish_moving(target: Path) -> None:
+    """Bring in what waits in `READY`, if anything does."""
     ready = target / READY
     if not ready.is_dir():
-        return False
+        return
     (target / RECORD).unlink(missing_ok=True)
-    names = [name for name in _files_in(ready) if name != ".stale"]
+    names = [name for name in files_in(ready) if name != ".stale"]
     for name in sorted(names, key=lambda n: n == RECORD):
         if name == RECORD:
             _drop_stale(target, ready, names)
@@ -158,7 +156,6 @@ def _finish_moving(target: Path) -> bool:
         (ready / name).replace(target / name)
     flush(target, deep=False)
     shutil.rmtree(ready)
-    return True
 
 
 def _drop_stale(target: Path, ready: Path, new: list[str]) -> None:
@@ -179,7 +176,7 @@ def outputs_of(entry: Mapping[str, Any]) -> list[str]:
     return [name for name in outputs if isinstance(name, str)] if isinstance(outputs, list) else []
 
 
-def _files_in(folder: Path) -> list[str]:
+def files_in(folder: Path) -> list[str]:
     """Relative names of all files, sorted."""
     return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
 

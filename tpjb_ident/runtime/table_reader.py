@@ -73,7 +73,7 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
             column.append(values[name])
         _check_intervals(values, place)
         lines.append(number)
-    frame = pd.DataFrame(dict(zip(names, cells, strict=True)), columns=names)
+    frame = pd.DataFrame(dict(zip(names, cells, strict=True)))
     frame.attrs["lines"] = lines
     return frame
 
@@ -85,7 +85,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
         if path.stat().st_size > _LARGEST:
             raise BadInputError(f"{path.name}: is larger than {_LARGEST >> 20} MB. Is it the right file?")
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            head = next((line for line in stream if _is_content(line)), "")
+            head = next((line for line in stream if line.strip() and not line.lstrip().startswith("#")), "")
             stream.seek(0)
             reader = csv.reader(stream, delimiter=max(_DELIMITERS, key=head.count), strict=True)
             for row in reader:
@@ -94,10 +94,6 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise BadInputError(f"{path.name}: cannot be read as a table ({reason}). {remedy}.") from error
-
-
-def _is_content(line: str) -> bool:
-    return bool(line.strip()) and not line.lstrip().startswith("#")
 
 
 def _header(
@@ -142,8 +138,7 @@ def column_of(name: str, table: str = "") -> tuple[Column | None, str]:
     for column in (*TABLES.get(table, ()), *itertools.chain.from_iterable(TABLES.values())):
         match = re.fullmatch(column.pattern(), name)
         if match is not None:
-            ending = next((e for e in sorted(column.endings, key=len, reverse=True) if name.endswith(e)), "")
-            return column, ending
+            return column, (match[match.re.groups] or "") if column.endings else ""
     return None, ""
 
 

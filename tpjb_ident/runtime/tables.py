@@ -37,12 +37,9 @@ def write_atomic(path: Path, write: Callable[[Path], object]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write UTF-8 text with Unix line ends, whole or not at all."""
-    write_atomic(path, lambda temporary: _write_utf8(temporary, text))
-
-
-def _write_utf8(path: Path, text: str) -> None:
     # UTF-8 has no sign for a file name's broken bytes; JSON reads the escape back as what it stands for
-    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    form = {"encoding": "utf-8", "errors": "backslashreplace", "newline": "\n"}
+    write_atomic(path, lambda part: part.write_text(text, **form))
 
 
 def write_table(folder: Path, name: str, frame: pd.DataFrame) -> tuple[Path, Path]:

@@ -69,7 +69,7 @@ def _checked(client: Any, address: str, patience: float) -> int:
         ) from error
     ours = {name: versions()[name] for name in _SAME}
     try:
-        theirs = client.run(_versions)
+        theirs = client.run(versions)
     except Exception as error:  # what a worker without this package raises depends on its versions
         raise ClusterError(
             f"the workers of {address} cannot run tpjb-ident ({type(error).__name__}: {str(error)[:160]}). "
@@ -83,7 +83,3 @@ def _checked(client: Any, address: str, patience: float) -> int:
             text = ", ".join(differences)
             raise ClusterError(f"worker {worker} has {text}. Install the same versions on all machines")
     return max(1, sum(client.nthreads().values()))
-
-
-def _versions() -> dict[str, str]:
-    return versions()

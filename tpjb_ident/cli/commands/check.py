@@ -85,12 +85,11 @@ def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: 
     """Gather the content of check.json; without a campaign, where it could not even be opened."""
     counts = {severity: sum(p.severity == severity for p in problems) for severity in SEVERITIES}
     keys = ("severity", "file", "place", "run", "what", "cure")
-    kinds = ("dynamic", "dry_pivot", "locus", "clearance")
     return {
         "schema": "tpjb-check/1",
         "campaign": name,
         "ok": not counts["error"],
-        "runs": {kind: len(campaign.of_kind(kind)) for kind in kinds} if campaign else {},
+        "runs": {kind: len(campaign.of_kind(kind)) for kind in KINDS} if campaign else {},
         "counts": counts,
         "problems": [{key: getattr(p, key) for key in keys} for p in problems],
         "files_sha256": c.inputs,

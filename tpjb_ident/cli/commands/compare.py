@@ -28,8 +28,7 @@ from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
-    from tpjb_ident.compare.comparison import CompareSettings, Comparison
+    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.compare.difference import Difference, Side
 
 Other = Annotated[
@@ -91,9 +90,13 @@ def compare(
     typed = str(campaign or f"--coefficients {coefficients}")
     with c.results() as folder:
         if coefficients is not None:
+            from tpjb_ident.compare.from_table import compare_table
             from tpjb_ident.report.comparison_page import write_report
 
-            result = with_predictions(_table_compared(c, coefficients, drawing, settings, reading_error), tables)
+            share = parse_share(reading_error, "--reading-error")
+            with c.progress("comparing") as show:
+                compared = compare_table(coefficients, drawing, settings, share, show)
+            result = with_predictions(compared, tables)
             c.table("comparison", comparison_frame(result))
             following = next_command(result, typed, bearing)
             write_report(folder, result, named(c.options), c.inputs, following)
@@ -111,15 +114,6 @@ def compare(
     show_comparison(c, result, following)
     c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
-
-
-def _table_compared(
-    c: Command, path: Path, drawing: Bearing | None, settings: CompareSettings, reading_error: str | None
-) -> Comparison:
-    from tpjb_ident.compare.from_table import compare_table
-
-    with c.progress("comparing") as show:
-        return compare_table(path, drawing, settings, parse_share(reading_error, "--reading-error"), show)
 
 
 def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
@@ -140,7 +134,11 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
     _show_difference(c, difference)
     c.print(f"Report: {c.target / 'report.html'}")
     c.next(following)
-    _refuse_difference(difference)
+    if difference.points.empty:
+        raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
+    bad = difference.untrusted_points()
+    if bad:
+        raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
 def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str | None) -> Side:
@@ -177,15 +175,6 @@ def _show_difference(c: Command, difference: Difference) -> None:
     c.show(f"{difference.a.name} and {difference.b.name}", columns, rows, file="difference.csv")
     for line in more:
         c.print(line)
-
-
-def _refuse_difference(difference: Difference) -> None:
-    """End with exit code 3 where nothing can be compared, or a point is not to be trusted."""
-    if difference.points.empty:
-        raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
-    bad = difference.untrusted_points()
-    if bad:
-        raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
 def _variants(text: str) -> tuple[str, ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,9 +28,6 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
-    from rigdata.campaign import Campaign
-    from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -89,7 +86,13 @@ def diagnose(
             with c.progress("diagnosing") as show:
                 result = diagnose_table(coefficients, drawing, baseline, settings, error, show)
         else:
-            with _static_tests(source, drawing, workers) as ahead, c.progress("diagnosing") as show:
+            from tpjb_ident.compare.static_tests import measure_static
+            from tpjb_ident.runtime.executors import background_job, cores, forks
+
+            # in a copy of this process, while it identifies
+            is_quicker = workers != 1 and cores() > 1 and forks()
+            job = background_job(measure_static, source, drawing) if is_quicker else nullcontext()
+            with job as ahead, c.progress("diagnosing") as show:
                 result = diagnose_campaign(source, drawing, baseline, settings, show, ahead)
         if result.identification is not None:
             write_identification(c, result.identification)
@@ -121,21 +124,6 @@ def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers:
     if model_tolerance is not None:
         typed["model"] = model_tolerance
     return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
-
-
-@contextmanager
-def _static_tests(
-    campaign: Campaign, bearing: Bearing, workers: int | None
-) -> Iterator[Callable[[], StaticTests | None] | None]:
-    """Measure the static tests in a copy of this process while it identifies; None where there is no second core."""
-    from tpjb_ident.compare.static_tests import measure_static
-    from tpjb_ident.runtime.executors import background_job, cores, forks
-
-    if workers == 1 or cores() < 2 or not forks():
-        yield None
-        return
-    with background_job(measure_static, campaign, bearing) as ahead:
-        yield ahead
 
 
 def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:

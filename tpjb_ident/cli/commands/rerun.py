@@ -48,7 +48,11 @@ def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
     for name, entry in repeated.items():
-        _check_inputs(folder, name, entry)
+        for known in files_of(folder, name, entry, ()):
+            if known["role"] == "input" and known["state"] != "same":
+                raise BadInputError(
+                    f"{folder}: input {known['file']} of {name} {STATES[known['state']]}. Bring it back to where it was."
+                )
     from tpjb_ident.runtime.differences import compared
 
     found = []
@@ -73,14 +77,6 @@ def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
         raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n" + "\n".join(different[:8]))
-
-
-def _check_inputs(folder: Path, name: str, entry: dict[str, Any]) -> None:
-    for file in files_of(folder, name, entry, ()):
-        if file["role"] == "input" and file["state"] != "same":
-            raise BadInputError(
-                f"{folder}: input {file['file']} of {name} {STATES[file['state']]}. Bring it back to where it was."
-            )
 
 
 def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:

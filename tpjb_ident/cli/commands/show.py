@@ -5,18 +5,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
 from tpjb_ident.cli.common.options import DEMO
-from tpjb_ident.columns import Column, words
+from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from rigdata.run import Run
     from rigdata.survey.spectrum import Look
 
-#: Unit that people read, its size in SI and its zero.
-READ = {"m": ("µm", 1e-6, 0.0), "K": ("degC", 1.0, 273.15), "rad/s": ("Hz", 2 * math.pi, 0.0), "Pa": ("bar", 1e5, 0.0)}
 #: Runs that are listed.
 MOST_RUNS = 200
 Source = Annotated[
@@ -47,8 +46,8 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
     """Show channels, statistics and spectra of a file.
 
     Of a campaign the list of its runs, or one of them with --run. With --picture or --out also writes channels.csv and
-    .parquet, and the picture. Values of a campaign are shown in µm, N, m/s^2, degC, Hz and written in SI; those of a
-    record file have the units of the file.
+    .parquet, and the picture. Values of a campaign are shown in µm, N, m/s^2, degC, Hz (in mil, lbf, degF, rpm with
+    --units us) and written in SI; those of a record file have the units of the file.
     """
     from rigdata.survey.exports import read_export
     from rigdata.survey.spectrum import look_at
@@ -70,8 +69,7 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
         raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
     with c.progress(f"looking at {source.name}"):
         if campaign is not None and run is not None:
-            title, series = _run_series(campaign.run(run))
-            displayed = [_in_display_units(s) for s in series]
+            title, series, displayed = _run_series(campaign.run(run))
         else:
             title = source.name
             displayed = series = list(read_export(source).series)
@@ -111,14 +109,15 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
         c.print(f"... and {len(campaign.runs) - len(rows)} more runs")
 
 
-def _run_series(run: Run) -> tuple[str, list[Series]]:
-    """Title and channels of a run, calibrated."""
+def _run_series(run: Run) -> tuple[str, list[Series], list[Series]]:
+    """Title and channels of a run, calibrated: in SI, and in the units that people read."""
     from rigdata.calibration import DIMENSIONS
     from rigdata.problem import Problem, RigDataError
     from rigdata.readers.series import Series
     from rigdata.units import SI_UNITS
 
     series: list[Series] = []
+    displayed: list[Series] = []
     problems: list[Problem] = []
     for name, channel in run.channels.items():
         if channel.quantity == "time":
@@ -130,15 +129,21 @@ def _run_series(run: Run) -> tuple[str, list[Series]]:
         else:
             unit = SI_UNITS.get(DIMENSIONS.get(channel.quantity, ""), "")
             series.append(Series(name, unit, record.values, record.time))
+            shown, scale, zero = _shown_in(channel.quantity, unit)
+            displayed.append(Series(name, shown, (record.values - zero) / scale, record.time))
     if not series:
         raise RigDataError(problems)
-    return f"{run.id} ({run.kind})", series
+    return f"{run.id} ({run.kind})", series, displayed
 
 
-def _in_display_units(series: Series) -> Series:
-    """A calibrated channel in the unit that people read."""
-    unit, scale, zero = READ.get(series.unit, (series.unit, 1.0, 0.0))
-    return replace(series, unit=unit, values=series.values / scale - zero)
+def _shown_in(quantity: str, unit: str) -> tuple[str, float, float]:
+    """Symbol, size and zero of the unit in which people read a quantity whose unit in SI is `unit`."""
+    if quantity == "temperature":
+        return UNITS["K"] if in_us_units() else ("degC", 1.0, ZERO_CELSIUS)
+    if quantity == "speed":
+        return symbol("speed"), 2 * math.pi * size("speed"), 0.0
+    shown, scale = channel_unit(quantity)
+    return shown or unit, scale, 0.0
 
 
 def _show_channels(c: Command, title: str, series: list[Series], looks: dict[str, Look]) -> None:

@@ -16,7 +16,16 @@ from tpjb_ident.cli.common.model_inputs import (
     refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.common.options import ROCKER, BearingPath, EffectsFile, PivotChoice, Rotation, Speeds, Thermal
+from tpjb_ident.cli.common.options import (
+    ROCKER,
+    BearingPath,
+    EffectsFile,
+    PivotChoice,
+    Rotation,
+    Speeds,
+    Thermal,
+    refuse_unknown,
+)
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -95,8 +104,7 @@ def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed:
     """The plan with the tests asked for, every run with a shaft that turns at the speed asked for."""
     from rigdata.virtual_rig import RigPlan
 
-    if plan not in PLANS:
-        raise BadInputError(f"--plan: {plan!r} is not known. Use {' or '.join(PLANS)}.")
+    refuse_unknown(plan, PLANS, "--plan")
     rig_plan = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
     points = tuple(operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz"))
     turning = points[0].shaft_speed

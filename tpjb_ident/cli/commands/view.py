@@ -48,10 +48,9 @@ def view(
     place = campaign_place(source)
     if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
         session = Session(name=place.resolve().name, tables=_tables(c, place))
-        c.next("verify", source)
     else:
         session = _campaign_session(c, source, bearing)
-        c.next("check", source)
+    c.next("verify" if session.campaign is None else "check", source)
     from tpjb_ident.view.server import private_link, serve
 
     with contextlib.ExitStack() as links:

@@ -168,8 +168,10 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         snapshot.count("repeat"),
         snapshot.count("look"),
     )
-    runs = counted(len(snapshot.states), "run")
-    c.print(f"{snapshot.campaign.id}: {landed} of {runs} landed, {repeat} to be repeated, {look} to look at.")
+    c.print(
+        f"{snapshot.campaign.id}: {landed} of {len(snapshot.states)} runs landed, {repeat} to be repeated, "
+        f"{look} to look at."
+    )
     if len(snapshot.new) > MOST_LINES:
         from tpjb_ident.report.watch_page import coverage_table
 

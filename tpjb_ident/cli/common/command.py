@@ -31,7 +31,7 @@ from tpjb_ident.cli.common.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.documents import TABLE_SCHEMA
-from tpjb_ident.runtime.output_folder import RECORD, contradiction, former_runs, output_folder, record_text
+from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import sha256, versions
 from tpjb_ident.runtime.tables import write_csv, write_table, write_text
 
@@ -349,7 +349,7 @@ def write_record(
 
     Commands that share an output folder share its run.json: one entry each.
     """
-    outputs = sorted(p.relative_to(staging).as_posix() for p in staging.rglob("*") if p.is_file())
+    outputs = files_in(staging)
     record = {
         "tables": TABLE_SCHEMA,
         "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),

@@ -223,8 +223,7 @@ def cell_len(text: str) -> int:
 
 def wrapped(text: str, width: int) -> list[str]:
     """Break a sentence at spaces; words that are longer than a line, as paths are, stay whole."""
-    lines = textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    return lines or [""]
+    return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False) or [""]
 
 
 def table_lines(
