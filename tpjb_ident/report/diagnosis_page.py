@@ -81,8 +81,7 @@ def write_diagnosis_report(
 
 def _effects_table(verdict: Verdict) -> Table:
     return Table(
-        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict),
-        frozenset({0, 1}),
+        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict)
     )  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def _gap_table(verdict: Verdict) -> Table:
         for name, words in _GAPS.items()
         if verdict.effects or not name.endswith("after")  # where nothing was added, both are the same
     ]
-    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
+    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
 def _effect_sections(verdict: Verdict) -> list[Section]:
@@ -160,12 +159,7 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
             tables=[
-                Table(
-                    "Largest shares of the squared gap",
-                    ["observable", "where", "size, sigma", "share"],
-                    places,
-                    frozenset({0, 1}),
-                )
+                Table("Largest shares of the squared gap", ["observable", "where", "size, sigma", "share"], places)
             ],
         )
     )
@@ -191,7 +185,7 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     if len(frame):
         panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), _GROUP)]
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP)]
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
@@ -209,7 +203,7 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
         ]  # fmt: skip
         columns = ["tolerance", "stated", "source", "fitted", "deviations"]
         rows = [_row(a) for a in verdict.assumptions]
-        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
+        table = Table("Stated tolerances", columns, rows)
         out.append(Section("What may be off", [note, *far], tables=[table]))
     return out
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ def coefficient(
     comparison: Comparison | pd.DataFrame,
     name: str,
     *,
-    over: Literal["load", "frequency"] = "load",
+    over: str = "load",
     title: str | None = None,
 ) -> Figure:
     """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
