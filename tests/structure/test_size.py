@@ -23,14 +23,14 @@ LIMITS = {
     "rigdata": (70.95, 9_550),
     "diagnosis": (39.51, 4_900),
     "cli": (29.03, 4_040),
-    "report": (28.29, 3_652),
+    "report": (28.29, 3_620),
     "pivot": (19.1, 2_620),
     "clearance": (8.75, 1_155),
-    "compare": (13.4, 1_880),
+    "compare": (13.38, 1_860),
     "watch": (6.5, 840),
     "top level": (6.9, 1_291),
     "runtime": (7.7, 1_195),
-    "exports": (6.09, 941),
+    "exports": (5.51, 860),
     "view": (4.96, 575),
 }
 MEASUREMENT = ("dynamic", "check", "slow_records", "phasors", "estimate", "terms", "identification")

@@ -81,7 +81,7 @@ def write_report(
     answer, *more = summary_sentences(comparison, frame)
     points = comparison.identification.points
     coefficients = coefficient_panels(frame)
-    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), coefficients[0] if coefficients else None)
+    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), next(iter(coefficients), None))
     campaign, bearing = comparison.campaign, comparison.bearing
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -39,7 +39,7 @@ _GAPS = {
     "noise_floor": "what noise alone would leave",
 }
 _GROUP = "Where model and measurement part"
-OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
+OVER = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
 )

@@ -94,11 +94,9 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
 def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first."""
     counts = Counter((str(c), c.severity) for _, conditions in named for c in conditions)
-    order = ("error", "warning", "note")
-    texts = [
-        f"{name} ({n})" if n > 1 else name
-        for (name, _), n in sorted(counts.items(), key=lambda c: order.index(c[0][1]))
-    ]
+    texts = []
+    for grave in ("error", "warning", "note"):
+        texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
     return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."

@@ -13,7 +13,7 @@ from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
 from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
-from tpjb_ident.schema import POINT_KEY, STATIC_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
@@ -28,6 +28,7 @@ _AXES = {
 CURVE = 5
 #: Height of a further line of ticks [inches].
 _LINE = 0.16
+COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
 
