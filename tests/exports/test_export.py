@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import use_units
 from tpjb_ident.compare.coefficient_table import read_rows
 from tpjb_ident.errors import NotTrustedError
@@ -196,6 +197,22 @@ def test_rotor_programs_get_the_mirror_image_of_a_shaft_that_turns_clockwise(to,
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+(?:[eE][+-]?\d+)?", text)]
     assert np.isclose(numbers, -frame["kxy_N_per_m"].iloc[0]).any()
     assert set(written.chosen.table["static_load_direction_deg"]) == {-60.0}
+
+
+@pytest.mark.parametrize("to", ["ross", "xltrc", "dyrobes", "ansys"])
+def test_a_campaign_of_both_senses_leaves_with_both(to, tmp_path):
+    senses = [table(SERIES[:3]).assign(rotation=sense) for sense in ROTATIONS]
+    written = export(pd.concat(senses, ignore_index=True), to, tmp_path)
+    files = [name for name in written.files if name.startswith(to)]
+    mirrored = [name for name in files if "_mirrored" in name]
+    assert 2 * len(mirrored) == len(files) > 0
+    assert {name.replace("_mirrored", "") for name in mirrored} == set(files) - set(mirrored)
+    for name in files:
+        assert ("mirrored, x to -x" in (tmp_path / name).read_text(encoding="utf-8")) == (name in mirrored)
+    intervals = pd.read_csv(tmp_path / "bearing_coefficients_intervals.csv")
+    first, second = (intervals[intervals["kxy_N_per_m"] * sign > 0] for sign in (1, -1))
+    assert np.allclose(first["kyx_N_per_m"], -second["kyx_N_per_m"])
+    assert len(first) == len(second) == 3
 
 
 def test_tables_stay_in_the_frame_of_the_rig_and_say_how_the_shaft_turns(tmp_path):

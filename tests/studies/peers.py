@@ -107,9 +107,9 @@ CASES = (
     Case("isothermal, rigid pivots at 0.6", (80, 40), pads=AT_06),
     Case("adiabatic, rigid pivots at 0.6", thermal="adiabatic", pads=AT_06),
     Case("isothermal, rigid pivots at 0.6, clockwise", pads=AT_06, rotation="clockwise"),
-    Case("carry-over 0.8, pivots at 0.6", (30, 15), "adiabatic", pads=AT_06, carry_over=0.8),
+    Case("carry-over 0.8, pivots at 0.6", (20, 10), "adiabatic", pads=AT_06, carry_over=0.8),
     Case("carry-over 0.8, pivots at 0.6", thermal="adiabatic", pads=AT_06, carry_over=0.8),
-    Case("carry-over 0.8, pivots at 0.6, clockwise", (30, 15), "adiabatic", 0.0, AT_06, 0.8, "clockwise"),
+    Case("carry-over 0.8, pivots at 0.6, clockwise", (20, 10), "adiabatic", 0.0, AT_06, 0.8, "clockwise"),
     Case("carry-over 0.8, pivots at 0.6, clockwise", (40, 20), "adiabatic", 0.0, AT_06, 0.8, "clockwise"),
     Case("pads that differ, isothermal", pads=DIFFERENT),
     Case("pads that differ, isothermal", (80, 40), pads=DIFFERENT),
@@ -199,7 +199,9 @@ def compared(case: Case, asked: argparse.Namespace) -> list[str]:
     direct = {kind: 0.5 * (getattr(fine, f"{kind}xx") + getattr(fine, f"{kind}yy")) for kind in "kc"}
     shares.append(f"{max(abs(sign * peer[name] - getattr(fine, name)) / direct[name[0]] for name in CROSS):.1%}")
     times = [f"{peer['seconds']:.1f} s", f"{1e3 * seconds:.1f} ms", f"{peer['seconds'] / seconds:.0f}"]
-    return [case.name, f"{case.mesh[0]} x {case.mesh[1]}", *shares, *times]
+    row = [case.name, f"{case.mesh[0]} x {case.mesh[1]}", *shares, *times]
+    print(f"    {' | '.join(row)}", flush=True)
+    return row
 
 
 def main() -> None:

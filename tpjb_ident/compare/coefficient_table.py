@@ -33,6 +33,10 @@ class TableSource:
     id: str
     description: str = "K and C from a table"
 
+    def fingerprint(self) -> dict[str, str]:
+        """None: what was read is an input of the command."""
+        return {}
+
 
 @dataclass(frozen=True)
 class TableRow:

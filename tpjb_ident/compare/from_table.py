@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -55,18 +54,8 @@ def _point(row: TableRow) -> PointResult:
     h, errors = row.k + 1j * omega * row.c, row.errors * np.repeat([1.0, omega], 4)
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
-    counts: tuple[Any, ...] = (0, 0, 0.0, np.nan, np.nan)  # records, windows, outliers, coherence, amplitude
     quality = tuple(Condition(name) for name in row.status if name in KINDS)
     return PointResult(
-        row.point,
-        stiffness,
-        {_METHOD: stiffness},
-        row.point.static_load,
-        nowhere,
-        nowhere,
-        {},
-        *counts,
-        quality,
-        (),
-        (),
-    )
+        row.point, stiffness, {_METHOD: stiffness}, row.point.static_load, nowhere, nowhere, {}, n_records=0,
+        n_windows=0, outlier_fraction=0.0, coherence=np.nan, amplitude=np.nan, quality=quality, rejected=(), runs=(),
+    )  # fmt: skip

@@ -47,8 +47,9 @@ def with_predictions(comparison: Comparison, tables: Sequence[PredictionTable]) 
     points = [measured.point for measured in comparison.identification.points]
     variants, remarks = list(comparison.variants), list(comparison.remarks)
     for table in tables:
-        frames = [pd.DataFrame(map(point_columns, listed)) for listed in (points, [row.point for row in table.rows])]
-        met = [None if index < 0 else table.rows[index] for index in partners(*frames, _ROUNDED)]
+        theirs = pd.DataFrame([point_columns(row.point) for row in table.rows])
+        nearest = partners(pd.DataFrame(map(point_columns, points)), theirs, _ROUNDED)
+        met = [None if index < 0 else table.rows[index] for index in nearest]
         unmet = [row for row in table.rows if not any(row is other for other in met)]
         if len(unmet) == len(table.rows):
             raise BadInputError(

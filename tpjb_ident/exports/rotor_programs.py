@@ -44,6 +44,11 @@ class Grid:
         return self.rows[list(COLUMNS.values())].to_numpy().reshape(len(self.speed), len(self.excitation), -1)
 
     @property
+    def mirrored(self) -> bool:
+        """Whether this is the mirror image, of a shaft that turns clockwise."""
+        return bool(self.rows["mirrored"].iloc[0])
+
+    @property
     def place(self) -> tuple[float, float]:
         """Load [N] and its direction [deg]."""
         return self.rows["static_load_N"].iloc[0], self.rows["static_load_direction_deg"].iloc[0]
@@ -51,7 +56,8 @@ class Grid:
     def name(self, *parts: str) -> str:
         """Name of the file, of its load and what else tells it from the others."""
         load, direction = self.place
-        return "_".join((f"{load:.0f}N", f"{direction:g}deg", *parts))
+        mirrored = ("mirrored",) if self.mirrored else ()
+        return "_".join((f"{load:.0f}N", f"{direction:g}deg", *parts, *mirrored))
 
     @property
     def line(self) -> str:
@@ -60,8 +66,8 @@ class Grid:
 
     def remarks(self, source: str) -> list[str]:
         """The head: source, what it is, where intervals are, and what is not to be trusted."""
-        mirrored, (load, direction) = self.rows["mirrored"].iloc[0], self.place
-        parts = ["mirrored, x to -x"] if mirrored else []
+        load, direction = self.place
+        parts = ["mirrored, x to -x"] if self.mirrored else []
         parts.append(f"static load {amount(load, 'force')} at {direction:g} deg")
         if len(self.excitation) == 1:
             line = "the running speed" if self.line == "synchronous" else f"{self.excitation[0]:g} Hz"
@@ -77,7 +83,7 @@ class Grid:
             *warning,
             f"intervals and flags: {INTERVALS}{'_us' if in_us_units() else ''}.csv",
         ]
-        if mirrored:
+        if self.mirrored:
             remarks.append("the rig's shaft turns clockwise: here, and in the intervals, it turns counter-clockwise")
         return remarks
 

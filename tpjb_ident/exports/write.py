@@ -109,11 +109,14 @@ def export(
         raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
-    module, beside = table, table.NAME
-    if to in ROTOR_PROGRAMS:
-        module, beside, rows = rotor_programs, table.INTERVALS, turning_counter_clockwise(rows)
+    rotor = to in ROTOR_PROGRAMS
+    beside = table.INTERVALS if rotor else table.NAME
+    if rotor:
+        rows = turning_counter_clockwise(rows)
         table.write_csv(target, rows, "", beside)
-    getattr(module, f"write_{to}")(target, rows, f"tpjb-ident: coefficients of {name or origin}", **options)
+    getattr(rotor_programs if rotor else table, f"write_{to}")(
+        target, rows, f"tpjb-ident: coefficients of {name or origin}", **options
+    )
     if in_us_units():
         table.write_us(target, rows, beside)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -39,7 +39,7 @@ _GAPS = {
     "noise_floor": "what noise alone would leave",
 }
 _GROUP = "Where model and measurement part"
-OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
+OVER = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
 )
@@ -81,8 +81,7 @@ def write_diagnosis_report(
 
 def _effects_table(verdict: Verdict) -> Table:
     return Table(
-        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict),
-        frozenset({0, 1}),
+        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict)
     )  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def _gap_table(verdict: Verdict) -> Table:
         for name, words in _GAPS.items()
         if verdict.effects or not name.endswith("after")  # where nothing was added, both are the same
     ]
-    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
+    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
 def _effect_sections(verdict: Verdict) -> list[Section]:
@@ -159,7 +158,7 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
             _GROUP,
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
-            tables=[Table("Largest shares of the squared gap", columns, places, frozenset({0, 1}))],
+            tables=[Table("Largest shares of the squared gap", columns, places)],
         )
     )
     sections += _evidence_sections(verdict)
@@ -184,7 +183,7 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     if len(frame):
         panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), _GROUP)]
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP)]
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
@@ -195,7 +194,7 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
         "model is what the campaign turned out to need."
     )
     columns = ["tolerance", "stated", "source", "fitted", "deviations"]
-    table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions], frozenset({0, 2, 3}))
+    table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions])
     left = Section("What is left", [_left_sentence(verdict.remainder)])
     return [left, Section("What may be off", [note], tables=[table])]
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,13 +13,15 @@ from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, place_of, size, spinning, symbol
 from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
+from tpjb_ident.condition_kinds import KINDS
+from tpjb_ident.conditions import Condition
 from tpjb_ident.report.drawing.colours import INK, LIGHT
 from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with_errors
 from tpjb_ident.report.figure import panel
-from tpjb_ident.report.laboratory_sections import set_points
+from tpjb_ident.report.laboratory_sections import flags_line, set_points
 from tpjb_ident.report.page import Page, Section, Table, write_page
-from tpjb_ident.rounding import counted, significant, with_interval
+from tpjb_ident.rounding import significant, with_interval
 from tpjb_ident.schema import DAMPING, ENTRIES, POINT_KEY, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = (
@@ -44,8 +44,8 @@ def write_difference_report(
         subtitle="Second less first, with 95 % intervals",
         facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
-        flags=_flags(points),
-        picture=panel("difference", _TITLE, functools.partial(_drawn, points), "") if len(points) else None,
+        flags=flags_line([("", _flags(points))], len(points)),
+        picture=panel("difference", _TITLE, _drawn, "", points) if len(points) else None,
         answer=answer,
         more=more,
         then=then,
@@ -78,24 +78,19 @@ def _values_table(difference: Difference) -> Table:
     rows = []
     for kind, entry in itertools.product((STIFFNESS, DAMPING), ENTRIES):
         name, scale = kind.column(entry), kind.display_scale
-        cells = [with_interval(*(side[name + end] for end in ("", "_lo", "_hi")), scale) for side in measured]
+        cells = [with_interval(side[name], side[f"{name}_lo"], side[f"{name}_hi"], scale) for side in measured]
         changed = row[f"{kind.symbol}{entry}_changed"]
         rows.append([f"{kind.symbol}{entry}, {kind.display_unit}", *cells, shown_difference(row, name, scale), changed])
     place = f"{place_of(row['static_load_N'], row['excitation_Hz'])}, shaft at "
     place += spinning(row["shaft_speed_Hz"], row["rotation"])
     columns = ["", "first", "second", "difference", "changed"]
-    return Table(f"At {place}; 95 % intervals", columns, rows, frozenset({0, 4}))
+    return Table(f"At {place}; 95 % intervals", columns, rows)
 
 
-def _flags(points: pd.DataFrame) -> str:
-    """Flags of both sides at the common points, with how often each is there."""
-    parts = []
-    for side, words in (("a", "first"), ("b", "second")):
-        texts = points.get(f"quality_{side}", pd.Series(dtype=str)).astype(str)
-        names = Counter(name for text in texts for name in text.split("; ") if name != "ok")
-        listed = ", ".join(f"{name} ({count})" if count > 1 else name for name, count in names.items())
-        parts.append(f"{words}: {listed or 'none'}")
-    return f"Flags on {counted(len(points), 'common point')}, {'; '.join(parts)}."
+def _flags(points: pd.DataFrame) -> list[Condition]:
+    """Flags of both sides at the common points."""
+    texts = points.reindex(columns=["quality_a", "quality_b"]).to_numpy(str).ravel()
+    return [Condition(name) for name in "; ".join(texts).split("; ") if name in KINDS]
 
 
 def _sections(difference: Difference) -> list[Section]:
@@ -110,12 +105,12 @@ def _sections(difference: Difference) -> list[Section]:
             for row in difference.pivots.to_dict("records")
         ]
         columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
-        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows, frozenset({0, 5}))
+        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows)
         sections.append(Section("Pivots", tables=[table]))
     if not difference.clearance.empty:
         rows = [_row(row, "clearance_m", "length") for row in difference.clearance.to_dict("records")]
         columns = ["pad", *_columns("length")]
-        table = Table("Assembled clearance at zero push load", columns, rows, frozenset({0, 4}))
+        table = Table("Assembled clearance at zero push load", columns, rows)
         sections.append(Section("Clearance", tables=[table]))
     return sections
 
@@ -145,7 +140,7 @@ def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
         rows.append([place, *cells, ", ".join(flags) or "ok"])
     named = [f"{kind.symbol}{entry}, {kind.display_unit}" for entry in ENTRIES]
     caption = f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow"
-    return Table(caption, ["point", *named, "flags of both"], rows, frozenset({0, 5}))
+    return Table(caption, ["point", *named, "flags of both"], rows)
 
 
 def _drawn(points: pd.DataFrame) -> Figure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -95,11 +94,9 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
 def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first."""
     counts = Counter((str(c), c.severity) for _, conditions in named for c in conditions)
-    order = ("error", "warning", "note")
-    texts = [
-        f"{name} ({n})" if n > 1 else name
-        for (name, _), n in sorted(counts.items(), key=lambda c: order.index(c[0][1]))
-    ]
+    texts = []
+    for grave in ("error", "warning", "note"):
+        texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
     return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."
@@ -108,16 +105,10 @@ def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) ->
 def set_up_section(comparison: Comparison) -> Section:
     """Sensors with their calibration, bearing and oil, and what was run."""
     campaign = comparison.campaign
-    if isinstance(campaign, TableSource):
-        return Section("Set-up", tables=_bearing_tables(comparison.bearing))
-    return Section(
-        "Set-up",
-        tables=[
-            _sensor_table(tuple(campaign.channels.values())),
-            *_bearing_tables(comparison.bearing),
-            _run_matrix(campaign.runs),
-        ],
-    )
+    tables = _bearing_tables(comparison.bearing)
+    if not isinstance(campaign, TableSource):
+        tables = [_sensor_table(tuple(campaign.channels.values())), *tables, _run_matrix(campaign.runs)]
+    return Section("Set-up", tables=tables)
 
 
 def _sensor_table(channels: Sequence[Channel]) -> Table:
@@ -140,7 +131,7 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
             ]
         )
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
-    return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
+    return Table("Sensors", columns, rows)
 
 
 def _by_pad(values: Iterable[str]) -> str:
@@ -170,7 +161,7 @@ def _bearing_tables(bearing: Any) -> list[Table]:
         [f"oil, at {degrees(40.0)}",
          f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
     ]  # fmt: skip
-    return [Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))]
+    return [Table("Bearing and oil", ["", "as stated"], rows)]
 
 
 def _run_matrix(runs: Sequence[Run]) -> Table:
@@ -195,10 +186,10 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         "rate, Hz",
         "runs",
     ]
-    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()], frozenset({0}))
+    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()])
 
 
-def evidence_section(campaign: Campaign, result: Identification) -> Section | None:
+def evidence_sections(campaign: Campaign, result: Identification) -> list[Section]:
     """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency.
 
     Coherence of every point.
@@ -206,8 +197,8 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section | No
     panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
     if result.points:
         title = "Force that the displacements do not explain"
-        panels.append(panel("coherence-points", title, functools.partial(coherence, result), _EVIDENCE))
-    return Section(_EVIDENCE, panels=panels) if panels else None
+        panels.append(panel("coherence-points", title, coherence, _EVIDENCE, result))
+    return [Section(_EVIDENCE, panels=panels)] if panels else []
 
 
 def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
@@ -238,12 +229,12 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         title = (
             f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
         )
-        panels.append(panel("h-over-frequency", title, functools.partial(frf, result), _EVIDENCE))
+        panels.append(panel("h-over-frequency", title, frf, _EVIDENCE, result))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
                  f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
-        panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), _EVIDENCE))
+        panels.append(panel(f"h-over-band-{number}", title, frf, _EVIDENCE, band))
     return panels
 
 
@@ -261,4 +252,4 @@ def budget_table(result: Identification) -> Table:
             name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
             rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
-    return Table(caption, ["point", "", "value", *sources], rows, frozenset({0, 1}))
+    return Table(caption, ["point", "", "value", *sources], rows)

@@ -11,13 +11,11 @@ import pandas as pd
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.compare.comparison import Comparison, comparison_frame
 from tpjb_ident.diagnosis.observations.gap import residuals
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
+from tpjb_ident.report.drawing.series import COEFFICIENTS
+from tpjb_ident.schema import POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-
-#: Names of the eight coefficients of a residual: kxx to cyy.
-COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 
 _COLUMNS = ("model", "entry", *POINT_KEY, "z")
 

@@ -13,7 +13,7 @@ from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
 from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
-from tpjb_ident.schema import POINT_KEY, STATIC_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
     from tpjb_ident.dynamic.results.identification import Identification
@@ -28,6 +28,7 @@ _AXES = {
 CURVE = 5
 #: Height of a further line of ticks [inches].
 _LINE = 0.16
+COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
 
@@ -75,27 +76,25 @@ def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
 
 def point_labels(table: pd.DataFrame) -> list[str]:
     """Load and excitation of every row, in words, and what else tells the rows apart."""
-    places = [place_of(*row) for row in table[["static_load_N", "excitation_Hz"]].to_numpy()]
-    return [", ".join([place, *others]) for place, others in zip(places, _other_set_points(table), strict=True)]
+    return [", ".join([place_of(load, excitation), *others]) for load, excitation, others in _set_points(table)]
 
 
 def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
     """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
-    places = [f"{load * per('load'):.4g}\n{f:g}" for load, f in table[["static_load_N", "excitation_Hz"]].to_numpy()]
-    texts = ["\n".join([place, *others]) for place, others in zip(places, _other_set_points(table), strict=True)]
-    axes.set_xticks(range(len(texts)), texts, fontsize=FONT_SIZE - 1.0)
-    shrink(axes, bottom=0.09 + _LINE * max((text.count("\n") for text in texts), default=0))
+    lines = [[f"{load * per('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
+    axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=FONT_SIZE - 1.0)
+    shrink(axes, bottom=0.09 + _LINE * (len(lines[0]) - 1 if lines else 0))
 
 
-def _other_set_points(table: pd.DataFrame) -> list[list[str]]:
-    """Of every row, what of these differs between rows: direction of the load, speed of the shaft, its sense."""
-    words = {
-        "static_load_direction_deg": lambda angle: f"{angle:g}°",
-        "shaft_speed_Hz": lambda speed: f"shaft {speed:g} Hz",
-        "rotation": lambda sense: "cw" if sense == ROTATIONS[1] else "ccw",
-    }
-    varied = [name for name in words if name in table and len(table[name].drop_duplicates()) > 1]
-    return [[words[name](row[name]) for name in varied] for row in table.to_dict("records")]
+def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
+    """Load, excitation and, in words, what of these differs between rows: direction of the load, speed and sense."""
+    forms = {"static_load_direction_deg": "{:g}°", "shaft_speed_Hz": "shaft {:g} Hz", "rotation": "{}"}
+    varied = [name for name in forms if name in table and len(table[name].drop_duplicates()) > 1]
+    short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw"), strict=True))}) if varied else table
+    return [
+        (row["static_load_N"], row["excitation_Hz"], [forms[name].format(row[name]) for name in varied])
+        for row in short.to_dict("records")
+    ]
 
 
 def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from tpjb_ident.columns import symbol
 from tpjb_ident.report.drawing.colours import DIVERGING, INK, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures
-from tpjb_ident.report.drawing.residual_frame import COEFFICIENTS, residual_frame
-from tpjb_ident.report.drawing.series import set_point_ticks
+from tpjb_ident.report.drawing.residual_frame import residual_frame
+from tpjb_ident.report.drawing.series import COEFFICIENTS, set_point_ticks
 from tpjb_ident.schema import POINT_KEY
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
@@ -25,7 +25,7 @@ _DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
 
 def residual_series(
     source: Diagnosis | Comparison | pd.DataFrame,
-    over: Literal["load", "frequency"] = "load",
+    over: str = "load",
     *,
     entries: Sequence[str] | None = None,
     title: str | None = None,
