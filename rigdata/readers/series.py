@@ -16,7 +16,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, Channel
-from rigdata.device import RATE_MISS, Grid, Timing, planned
+from rigdata.device import RATE_MISS, Grid, planned
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import rate_of_time
 
@@ -280,12 +280,12 @@ def arranged(
 ) -> Layout:
     """Put channels that share their times together; what has no usable times is a fault of that channel."""
     faults: dict[str, RigDataError] = {}
-    timings: dict[str, Timing] = {}
+    timings: dict[str, Grid] = {}
     times: dict[str, FloatArray] = {}
     for channel in series:
         place = f"channel {channel.name}"
         if channel.time is None:
-            timings[channel.name] = Timing(len(channel))
+            timings[channel.name] = Grid(len(channel))
         elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
             back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
             fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
@@ -298,7 +298,7 @@ def arranged(
             rate = rate_of_time(times[clock])
             rate = rate if rate > 0 else stated_rate or rate
             label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
-            timings[channel.name] = Timing(len(channel), clock, rate, label)
+            timings[channel.name] = Grid(len(channel), clock, rate, label)
     grids, texts = planned(timings, channels, stated_rate, lambda clock: float(times[clock][0]))
     for name, text in texts.items():
         faults[name] = refuse(file, f"channel {name}", text, "Export it with its times, or correct sample_rate", run)

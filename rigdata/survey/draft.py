@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
@@ -21,7 +22,6 @@ from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
 
-_DIRECTED = ("displacement", "force", "acceleration")
 _EXAMPLE = {
     "displacement": '"7.78 mV/um"',
     "force": '"1 mV/N", or "2.0 mV/V" with full_scale and excitation of the bridge',
@@ -61,7 +61,7 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     for clock, unit in surveyed.clocks.items():
-        spelt = usable_unit(unit.value)
+        spelt = usable_unit(unit.value) or "s"
         lines += [f"[channels.{_key(clock)}]", 'quantity = "time"', _line("unit", f'"{spelt}"', unit), ""]
     for block in [*channel_blocks(surveyed).values(), *(run_lines(run) for run in surveyed.runs)]:
         lines += [*block, ""]
@@ -104,7 +104,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
     source = Entry() if like else guess.quantity  # what it is like bears the mark for both
     lines = [head, _line("quantity", f'"{quantity}"', source)]
-    if quantity in _DIRECTED:
+    if quantity in VECTOR_QUANTITIES:
         lines.append(_axis_line(guess))
     if like:
         lines.append(f"like = {_toml_string(like)}   # (guess) same type; or its own unit, sensitivity, ..")

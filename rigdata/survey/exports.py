@@ -33,6 +33,11 @@ class Export:
     nameless: int = 0
 
     @property
+    def states_times(self) -> bool:
+        """Whether it has no time column, or one of its time columns a unit."""
+        return not self.clocks or any(self.clocks.values())
+
+    @property
     def rate(self) -> float:
         """Rate of the fastest channel [Hz]; NaN if the file knows no times."""
         rates = [s.rate for s in self.series if s.rate > 0]
@@ -41,13 +46,13 @@ class Export:
 
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name."""
-    records = records_below(folder)
-    if not records:
-        unlisted = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
-        hint = suffix_hint(unlisted[0]) if unlisted else f"known are {', '.join((*TEXT, *FORMATS))}"
-        remedy = f"{unlisted[0].name}: {hint}" if unlisted else hint.capitalize()
-        raise refuse(str(folder), "", "holds no records", remedy)
-    return records
+    if records := records_below(folder):
+        return records
+    unlisted = next((p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")), None)
+    remedy = f"Known are {', '.join((*TEXT, *FORMATS))}"
+    if unlisted is not None:
+        remedy = f"{unlisted.name}: {suffix_hint(unlisted)}"
+    raise refuse(str(folder), "", "holds no records", remedy)
 
 
 def records_below(folder: Path) -> list[Path]:
@@ -86,23 +91,23 @@ def in_seconds(
 
     Nobody records a rig slower than the shaft turns: times that would say so are thousandths or millionths.
     """
-    unstated = [export for export in exports if export.clocks and not any(export.clocks.values())]
+    unstated = [export for export in exports if not export.states_times]
     rate = max((export.rate for export in unstated), default=float("nan"))
-    names = {name for export in unstated for name in export.clocks}
-    typed = {described[name].get("unit") for name in names if name in described}
+    units = {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items()}
+    open_ = {name for export in unstated for name in export.clocks}
+    typed = {described[name].get("unit") for name in open_ if name in described}
     likely = next((unit for unit in ("s", "ms", "us") if rate / TIME_FACTORS[unit] >= _SLOWEST), "s")
     unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
     source = "file" if typed or unit == "s" else "guess"
-    units = dict.fromkeys(names, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
-    units |= {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items() if stated}
-    factor = TIME_FACTORS[unit]
+    units |= dict.fromkeys(open_, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
+    if unit == "s":
+        return list(exports), units
     changed = []
     for export in exports:
-        if export in unstated and factor != 1.0:
-            times = {id(s.time): s.time * factor for s in export.series if s.time is not None}
-            series = tuple(replace(s, time=times.get(id(s.time))) for s in export.series)
-            export = replace(export, series=series)
-        changed.append(export)
+        times = {} if export.states_times else {id(s.time): s.time for s in export.series if s.time is not None}
+        scaled = {key: time * TIME_FACTORS[unit] for key, time in times.items()}
+        series = tuple(replace(s, time=scaled.get(id(s.time), s.time)) for s in export.series)
+        changed.append(replace(export, series=series))
     return changed, units
 
 

@@ -49,7 +49,6 @@ class Survey:
     rates: tuple[float, ...]
     channels: dict[str, ChannelGuess]
     runs: tuple[RunGuess, ...]
-    speed_line: float = float("nan")
     clocks: dict[str, Entry] = field(default_factory=dict)  #: unit of every time column, by name
     nameless: int = 0
     per_hertz: dict[str, float] = field(default_factory=dict)
@@ -71,7 +70,6 @@ def survey(
         rates=tuple(e.rate for e in exports),
         channels=folder.channels,
         runs=_set_points(folder.runs),
-        speed_line=speed.number,
         per_hertz=folder.tachometers(speed.number),
         clocks=clocks,
         nameless=max((e.nameless for e in exports), default=0),

@@ -57,7 +57,7 @@ def test_kinds_and_set_points_are_guessed_right(found):
     kinds = {name[0]: run.kind.value for name, run in by_name.items()}
     assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
     assert {name: unit.value for name, unit in found.clocks.items()} == {"Zeit": "s"}
-    assert found.speed_line == pytest.approx(22.0, abs=0.3)
+    assert by_name["d-02500-25-01.csv"].speed.number == pytest.approx(22.0, abs=0.3)
     for name, load, line in (("d-02500-25-01.csv", 2500.0, 25.0), ("d-05000-40-02.csv", 5000.0, 40.0)):
         assert by_name[name].load.value == load
         assert by_name[name].lines[0].frequency == pytest.approx(line, abs=0.2)

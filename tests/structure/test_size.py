@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (133.73, 16_110),
     "model": (91.6, 11_930),
-    "rigdata": (70.95, 9_550),
+    "rigdata": (70.94, 9_495),
     "diagnosis": (39.51, 4_900),
     "cli": (29.25, 4_084),
     "report": (28.29, 3_652),
