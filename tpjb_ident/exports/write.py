@@ -109,18 +109,21 @@ def export(
         raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
+    _write(target, rows, to, f"tpjb-ident: coefficients of {name or origin}", options)
+    files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
+    return Export(target, files, chosen)
+
+
+def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict[str, int]) -> None:
+    """Write rows in one form; intervals, and a table in US units, beside it."""
     rotor = to in ROTOR_PROGRAMS
     beside = table.INTERVALS if rotor else table.NAME
     if rotor:
         rows = turning_counter_clockwise(rows)
         table.write_csv(target, rows, "", beside)
-    getattr(rotor_programs if rotor else table, f"write_{to}")(
-        target, rows, f"tpjb-ident: coefficients of {name or origin}", **options
-    )
+    getattr(rotor_programs if rotor else table, f"write_{to}")(target, rows, source, **options)
     if in_us_units():
         table.write_us(target, rows, beside)
-    files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
-    return Export(target, files, chosen)
 
 
 def _export_bearing(bearing: Any, to: str, target: Path, options: dict[str, int]) -> Export:
