@@ -146,7 +146,7 @@ def partners(rows: pd.DataFrame, others: pd.DataFrame, within: Tolerances) -> In
     apart = np.abs(right[None] - left[:, None])
     apart[..., 1] = np.minimum(apart[..., 1] % 360.0, -apart[..., 1] % 360.0)
     most = np.abs(left) * [within.load, 0.0, within.frequency, within.frequency] + [0.0, within.direction, 0.0, 0.0]
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):  # a load or speed of zero has no share: equal or apart
         distance = np.nan_to_num(apart / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
     senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, others)]
     distance[np.reshape(senses[0], (-1, 1)) != senses[1]] = np.inf
