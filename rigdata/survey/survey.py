@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -333,9 +334,9 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
 
     meant = {
         "direction": (close, rounded),
-        "speed": (_within(_ONE_SPEED), _round_frequency),
-        "excitation": (_within(_ONE_SPEED), _round_frequency),
-        "load": (_within(_ONE_LOAD), lambda middle: float(f"{middle:.2g}")),
+        "speed": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),
+        "excitation": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),
+        "load": (_within(_ONE_LOAD), functools.partial(_round, digits=3)),
     }
     changed = list(runs)
     for name, (is_alike, nearest) in meant.items():
@@ -357,9 +358,9 @@ def _within(factor: float) -> Callable[[list[float], float], bool]:
     return lambda group, value: value <= factor * group[0]
 
 
-def _round_frequency(middle: float) -> float:
+def _round(middle: float, digits: int) -> float:
     nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
-    return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.4g}")
+    return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.{digits}g}")
 
 
 def _common(

@@ -14,7 +14,7 @@ from rigdata.operating_point import OperatingPoint
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, check_magnitudes
+from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, _weight, check_magnitudes
 from tpjb_ident.check.observation import observe
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
@@ -47,6 +47,15 @@ def test_rigs_of_every_size_pass():
     for _ in range(3000):
         sizes = random_rig(rng, demo)
         assert [*_probes(sizes), *_film(sizes), *_housing(sizes)] == [], sizes
+
+
+@pytest.mark.parametrize(("mass", "acceleration", "severity"), [(3000, 0.05, "warning"), (3000, 0.5, "error")])
+def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(mass, acceleration, severity):
+    run = load_campaign(DEMO).of_kind("dynamic")[0]
+    rig = Sizes(run, 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load, {})
+    assert [finding[1] for finding in _weight([rig], mass, 5000.0)] == [severity]
+    assert [*_weight([rig], 30.0, 5000.0)] == []
+    assert [finding[1] for finding in _weight([replace(rig, static=0.0)], mass, 5000.0)] == ["warning"]
 
 
 @pytest.mark.parametrize(
@@ -102,7 +111,9 @@ def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of)
     check_magnitudes(observations, campaign.housing_mass)
     assert sum(len(o.report.found) for o in observations) == count
     check_magnitudes(observations, 1600.0)
-    assert {o.report.found[-1].key for o in observations} == {"weight"}
+    assert {(o.report.found[-1].key, o.report.found[-1].problem.severity) for o in observations} == {
+        ("weight", "warning")
+    }
     slow = replace(campaign.runs[0], reader=replace(campaign.runs[0].reader, stated_rate=4000.0))
     off = replace(observations[0], run=slow)
     check_magnitudes([off], 30.0)

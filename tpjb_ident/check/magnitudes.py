@@ -34,8 +34,9 @@ _CLEARANCE_RATIO, _LEAST_PRESSURE, _CLEARANCE_FLOOR, _NO_CLEARANCE = 1.5e-3, 5e4
 _SAG, _STIFFEST = 5e-4, 1e11
 #: Housings that hang free move against the shaft as much as they accelerate; others may a few times more.
 _FREE_HOUSING = 3.0
-#: A stator's weight over the largest load of a campaign, and gravity [m/s^2].
-_WEIGHT, _GRAVITY = 3.0, 9.81
+#: A stator's weight over the largest load of a campaign, gravity [m/s^2], and the share of the cells' force from which
+#: the inertia of such a stator decides on K and C.
+_WEIGHT, _GRAVITY, _INERTIA = 3.0, 9.81, 0.1
 #: Rate of a file over the manifest's, as a share; clocks differ by less. An error from a decade on.
 _RATE, _RATE_ERROR = 0.01, 10.0
 #: Sizes below this many times their noise say nothing.
@@ -63,6 +64,11 @@ class Sizes:
     def film_length(self) -> float:
         """Static load over dynamic stiffness [m]."""
         return self.run.point.static_load * self.motion / self.film if self.film > 0 else math.nan
+
+    @property
+    def carried(self) -> bool:
+        """Whether the cells carry the static load."""
+        return self.static > 0.5 * self.run.point.static_load > 0
 
     @property
     def cell_stiffness(self) -> float:
@@ -98,17 +104,13 @@ def _length(vector: NDArray[Any] | None) -> float:
 def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:
     """Hold every run against what a rig can show; findings go to the runs' reports."""
     largest = max((observation.run.point.static_load for observation in observations), default=0.0)
-    heavy = largest > 0 and mass * _GRAVITY > _WEIGHT * largest
+    sines = [o for o in observations if o.run.kind == "dynamic" and o.run.excitation_kind == "sine"]
+    measured = {id(observation): sizes(observation, mass) for observation in sines}
+    weight = [*_weight([*measured.values()], mass, largest)]
     for observation in observations:
         findings = [*_rate(observation.run)]
-        if observation.run.kind == "dynamic" and observation.run.excitation_kind == "sine":
-            measured = sizes(observation, mass)
-            findings += [*_probes(measured), *_film(measured), *_housing(measured)]
-            if heavy:
-                text = (
-                    f"a stator of {mass:g} kg weighs {mass * _GRAVITY:.4g} N, the largest static load is {largest:g} N"
-                )
-                findings.append(("weight", "warning", "[housing] mass", text, "Check the mass and its unit"))
+        if (size := measured.get(id(observation))) is not None:
+            findings += [*_probes(size), *_film(size), *_housing(size), *weight]
         for finding in findings:
             observation.report.say(*finding)
 
@@ -140,13 +142,22 @@ def _housing(measured: Sizes) -> Iterator[Finding]:
     """Cells are the springs that the housing stands on: neither so soft nor so stiff."""
     stiffness, load, place = measured.cell_stiffness, measured.run.point.static_load, "acceleration and force"
     free = measured.acceleration < _FREE_HOUSING * measured.run.point.excitation**2 * measured.motion
-    carried = measured.static > 0.5 * load > 0
+    carried = measured.carried
     if carried and not free and load > _SAG * stiffness:
         text = f"cells that give way by {1e3 * load / stiffness:.2g} mm under the static load carry no bearing"
         yield "soft cells", "error", place, f"{text}: the accelerations are too large for the forces", _CALIBRATION
     if carried and stiffness > _STIFFEST:
         text = "the housing hardly accelerates for the forces on its cells"
         yield "stiff cells", "warning", place, text, _CALIBRATION
+
+
+def _weight(measured: Sequence[Sizes], mass: float, largest: float) -> Iterator[Finding]:
+    """A stator that stands on its cells is made for the loads, and its inertia is no large part of their force."""
+    if mass * _GRAVITY > _WEIGHT * largest > 0:
+        decides = any(run.carried and mass * run.acceleration > _INERTIA * run.cells for run in measured)
+        severity: Severity = "error" if decides else "warning"
+        text = f"a stator of {mass:g} kg weighs {mass * _GRAVITY:.4g} N, the largest static load is {largest:g} N"
+        yield "weight", severity, "[housing] mass", text, "Check the mass and its unit"
 
 
 def _rate(run: Run) -> Iterator[Finding]:

@@ -120,6 +120,6 @@ def _show(c: Command, result: CampaignPlan) -> None:
     blind = ", ".join(label_in_words(name) for name in result.below_floor)
     c.print(f"Below the floor at a size that would not surprise: {blind or 'nothing'}.")
     c.print(
-        "Pairs are told apart from d' = 6 on: the distance in standard deviations between what the two leave in the "
-        "data, each at the size at which they look most alike (docs/guide/planning.md)."
+        "Pairs are told apart from a distance of 3 on: standard deviations between what the two leave in the "
+        "data, each at the size at which they look most alike, seen with 6 (docs/guide/planning.md)."
     )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _WINDOW_COLUMNS = ("run", "time_s", "excitation_direction_deg", "weight", "reason", *POINT_KEY)
 #: Sources that scatter from run to run; all others are common to the runs.
-_RANDOM = ("random", "load miss", "mains")
+_RANDOM = ("random", "load miss", "load direction", "mains")
 _BUDGET_COLUMNS = ("coefficient", "unit", "source", "kind", "standard_uncertainty", "share", "dof")
 
 
