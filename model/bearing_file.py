@@ -71,7 +71,7 @@ _TOLERANCES = {
     "viscosity": "ratio", "viscosity_exponent": "ratio", "supply_temperature": "temperature difference",
     "assembled_clearance": "length", "pad_clearance": "length", "clearance_scatter": "length",
     "pivot_stiffness_scatter": "ratio", "film_heat": "ratio", "thermometer": "temperature difference",
-    "probe_gain": "ratio", "model": "ratio",
+    "probe_gain": "ratio", "model": "ratio", "pivot_offset": "ratio",
 }  # fmt: skip
 _KEYS["tolerances"] = _TOLERANCES
 _MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",

@@ -35,7 +35,7 @@ _LISTED: dict[Severity, dict[str, str]] = {
     },
     "note": {
         "idle pads {pads}": "they carry nothing and take no part in the dynamics",
-        "pads {pads} cannot keep their load": "carrying, they would push the journal off, or friction holds them off",
+        "pads {pads} cannot keep their load": "carrying, they would push the journal off; or friction, or want of oil",
         "pads {pads} stand concentric": "without load, their films take part in the dynamics",
         "pads {pads} on the edge of carrying": "a finer mesh may let them carry or idle",
         "another equilibrium exists": "in it pads {pads} idle; this one leaves the last pads idle",

@@ -6,6 +6,7 @@ measurement add maps here; everything else in the model is about the bearing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,8 @@ class Instruments:
     force: tuple[SensorMap, ...] = ()
     housing_mass: float = 30.0
     cell_stiffness: tuple[float, float] = (4.0e8, 6.0e8)
+    probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
+    thermometers: tuple[tuple[int, float], ...] = ()
 
     def displacement_map(self, omega: float) -> ComplexArray:
         """S(omega): read displacement = S @ true displacement."""
@@ -48,6 +51,13 @@ class Instruments:
     def shown_load(self, force: FloatArray) -> FloatArray:
         """G(0) force (2,) [N]: the static load that the cells tell."""
         return np.asarray((self.force_map(0.0) @ force).real)
+
+    def shown_temperature(self, temperature: FloatArray) -> FloatArray:
+        """Temperatures of the pads (pads,) [degC] as their thermometers read them."""
+        shown = temperature.copy()
+        for pad, offset in self.thermometers:
+            shown[pad - 1] += offset
+        return shown
 
     def read_displacement(self, one: SensorMap) -> Instruments:
         """Return a copy whose displacement readings pass through one more map."""

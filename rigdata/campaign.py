@@ -284,12 +284,14 @@ def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, 
 
 
 def _load_hdf5(path: Path) -> Campaign:
-    from rigdata.readers.hdf5.reader import Hdf5Reader, read_texts, refuse_claims
+    from rigdata.readers.hdf5.guards import refuse_claims
+    from rigdata.readers.hdf5.reader import Hdf5Reader, open_readonly, read_texts
 
     text, bearing = read_texts(path, path.name)
     files = {path.name: path}
     manifest = parse_manifest(text, f"{path.name}:manifest", _named_file(path.parent, path.name, files))
-    refuse_claims(path, [run.id for run in manifest.runs], list(manifest.channels))
+    with open_readonly(path, path.name) as handle:
+        refuse_claims(handle, path, [run.id for run in manifest.runs], list(manifest.channels))
     problems: list[Problem] = []
     if not bearing or len(bearing) > _MAX_BEARING:
         cure = "Store the bearing's TOML text there, or give --bearing where one is needed"

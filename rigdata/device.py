@@ -44,30 +44,20 @@ class Device:
 
 
 @dataclass(frozen=True)
-class Timing:
-    """What a file says of the samples of one channel."""
-
-    length: int
-    clock: str = ""  #: names its times; "" where there are none
-    rate: float = float("nan")  #: of these [Hz]
-    label: str = ""
-    times: int | None = None  #: of a time column that should serve it but has not its length
-
-
-@dataclass(frozen=True)
 class Grid:
-    """Channels of one file at the same times."""
+    """Channels of one file at the same times; to begin with, what the file says of the samples of one channel."""
 
     length: int
-    clock: str  #: names the times; "" where they are counted
-    rate: float  #: Hz
+    clock: str = ""  #: names the times; "" where they are counted, or there are none
+    rate: float = float("nan")  #: of the times [Hz]
     label: str = ""
     begin: float = 0.0  #: of counted times [s]
+    times: int | None = None  #: of a time column that should serve it but has not its length
     channels: list[str] = field(default_factory=list)
 
 
 def planned(
-    timings: Mapping[str, Timing],
+    timings: Mapping[str, Grid],
     channels: Mapping[str, Channel],
     run_rate: float | None,
     first_time: Callable[[str], float],
@@ -83,8 +73,7 @@ def planned(
     shared: list[Grid] = []  # whose times are those of channels without a clock
     for name, timing in timings.items():
         if timing.clock:
-            grid = Grid(timing.length, timing.clock, timing.rate, timing.label)
-            grid = grids.setdefault((timing.length, timing.clock), grid)
+            grid = grids.setdefault((timing.length, timing.clock), timing)
             grid.channels.append(name)
             if grid not in shared and (name not in lettered or run_rate is None):
                 shared.append(grid)
@@ -132,7 +121,7 @@ def _add_stated(
         if first.length and first.clock:
             begin = first_time(first.clock)
         begin = begin if math.isfinite(begin) else first.begin
-    grids[length, rate] = Grid(length, "", rate, f"{rate:.6g} Hz", begin, [name])
+    grids[length, rate] = Grid(length, "", rate, f"{rate:.6g} Hz", begin, channels=[name])
     return ""
 
 

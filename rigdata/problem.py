@@ -111,8 +111,7 @@ def refuse(file: str, place: str, what: str, cure: str, run: str | None = None) 
 def shown(value: object) -> str:
     """`value` in a message: quoted, short, on one line, controls escaped."""
     if isinstance(value, str):
-        # right-to-left marks and control characters could make a message read otherwise than it is
-        text = repr("".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in value[:200]))
+        text = repr(value[:200])  # which escapes control characters and marks of direction
     elif isinstance(value, (dict, list)):  # may be nested too deeply to be printed
         text = "a table" if isinstance(value, dict) else "an array"
     elif isinstance(value, int) and abs(value) > 10**60:  # may have more digits than Python prints

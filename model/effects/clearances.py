@@ -88,6 +88,62 @@ def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
 
 @effect_on(
     "bearing",
+    PAD,
+    Parameter("pad_clearance_change", "m", "length", 0.0, -0.0001, 0.0002, 1.2e-05),
+    source="Boring tolerance of a pad of 100 mm: IT6 to IT7",
+    words=EffectWords(
+        finding="{pad} is bored {pad_clearance_change:size} {pad_clearance_change:wider|tighter} than drawn",
+        physics="One pad has another radius, so another preload. Its film converges more or less than the others'.",
+        on_the_rig="The clearance polygon agrees with the drawing; coefficients are off along that pad's direction.",
+        check="the bore of that pad, and whether it belongs to this set",
+    ),
+)
+def pad_bore(setup: Setup, pad: int, pad_clearance_change: float) -> Setup:
+    """Cp of one pad changes by this; Cb stays."""
+    return setup.change_pads(
+        lambda k, p: replace(p, pad_clearance=p.pad_clearance + pad_clearance_change) if k == pad else p
+    )
+
+
+@effect_on(
+    "bearing",
+    Parameter("assembled_clearance_change", "m", "length", 0.0, -0.0002, 0.0005, 8e-06),
+    source="Drawings state clearances as radius or as diameter; shims and seats move them by some micrometres",
+    words=EffectWords(
+        finding=(
+            "the assembled clearance is {assembled_clearance_change:size} {assembled_clearance_change:larger|smaller} "
+            "than the bearing file says, cold already"
+        ),
+        physics="Every pad stands further out or in than drawn, so film thickness and preload differ at all loads.",
+        on_the_rig="The cold clearance polygon is larger or smaller than the drawing, and so is the running locus.",
+        check="the bearing file against the drawing: radius or diameter; then the clearance sweep",
+    ),
+)
+def clearance_error(setup: Setup, assembled_clearance_change: float) -> Setup:
+    """Cb of every pad changes by this, cold and running."""
+    return setup.change_pads(
+        lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + assembled_clearance_change)
+    )
+
+
+@effect_on(
+    "bearing",
+    Parameter("offset_change", "1", "ratio", 0.0, -0.25, 0.25, 0.05),
+    source="Central pivots are at 0.5, offset ones at 0.55 to 0.65 of the arc",
+    words=EffectWords(
+        finding="the pivots sit {offset_change:size} of the arc {offset_change:behind|before} their place in the file",
+        physics="An offset pivot lets the pad tilt further open. Films are thicker at the same load and run cooler.",
+        on_the_rig="Stiffness, eccentricity and temperatures differ alike on all pads, and with the sense of rotation.",
+        check="the bearing file's pivot_offset against the drawing: central or offset, and from which edge",
+    ),
+)
+def pivot_offset_error(setup: Setup, offset_change: float) -> Setup:
+    """The pivots are this share of the arc further from the leading edge than the bearing file says."""
+    return setup.change_pads(lambda k, p: replace(p, pivot_offset=p.pivot_offset + offset_change))
+
+
+@effect_on(
+    "bearing",
     Parameter("clearance_change", "m", "length", 0.0, -6e-05, 6e-05, 8e-06),
     source="12e-6 1/K x 66 mm x 8 K = 6 um if only the housing heats",
     words=EffectWords(

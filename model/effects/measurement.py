@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from model.effects.kind import EffectWords, Parameter, effect_on
+from model.effects.kind import PAD, EffectWords, Parameter, effect_on
 from model.setup import Setup
 from rigdata.arrays import ComplexArray
 
@@ -126,3 +127,59 @@ def loadcell_crosstalk(setup: Setup, fraction: float) -> Setup:
 def housing_mass(setup: Setup, mass_error: float) -> Setup:
     """True housing mass = stated mass + mass_error."""
     return setup.change(instruments=setup.instruments.weigh_housing(mass_error))
+
+
+@effect_on(
+    "measurement",
+    Parameter("probe", "1", "ratio", math.nan, 1, 2, options=(1, 2)),
+    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03),
+    source="Eddy-current probes: 5 % for another target steel, more for another driver",
+    words=EffectWords(
+        finding="probe {probe:0} reads {factor:size} {factor:more|less} than true",
+        physics="One probe has another sensitivity. What moves along its axis is off, what moves across it is not.",
+        on_the_rig="The clearance polygon is stretched along that probe, and direct coefficients part.",
+        check="that probe's calibration on this shaft, its driver and its cable",
+    ),
+)
+def one_probe_gain(setup: Setup, probe: float, factor: float) -> Setup:
+    """Readings of one displacement probe are factor times the truth."""
+    rows = np.array([[math.cos(a), math.sin(a)] for a in setup.instruments.probe_axes])
+    gains = np.where(np.arange(1, 3) == probe, factor, 1.0)
+    read = np.linalg.solve(rows, gains[:, None] * rows)
+    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: read))
+
+
+@effect_on(
+    "measurement",
+    Parameter("cell", "1", "ratio", math.nan, 1, 2, options=(1, 2)),
+    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02),
+    source="A parallel load path (hoses, leaf springs) takes 0.5 to 5 %",
+    words=EffectWords(
+        finding="cell {cell:0} reads {factor:size} {factor:more|less} than true",
+        physics="One cell has another sensitivity, or a load path beside it. One row of the coefficients is off.",
+        on_the_rig="Coefficients of one force direction are off alike; the loads that were set seem to turn.",
+        check="that cell's calibration, and hoses or springs beside it",
+    ),
+)
+def one_cell_gain(setup: Setup, cell: float, factor: float) -> Setup:
+    """Readings of one load cell (1: X, 2: Y) are factor times the truth."""
+    gains = np.where(np.arange(1, 3) == cell, factor, 1.0)
+    return setup.change(instruments=setup.instruments.read_cells(np.diag(gains)))
+
+
+@effect_on(
+    "measurement",
+    PAD,
+    Parameter("offset", "K", "temperature difference", 0.0, -50.0, 50.0, 3.0),
+    source="Thermocouples of class 2 are 2.5 K off, badly seated ones more",
+    words=EffectWords(
+        finding="the thermometer of {pad} reads {offset:size} too {offset:warm|cold}",
+        physics="One thermometer is off, or sits elsewhere than stated. Nothing else of the bearing changes.",
+        on_the_rig="One pad's temperature is off by the same amount at all points.",
+        check="that thermometer at standstill beside the others, and where it sits",
+    ),
+)
+def thermometer_offset(setup: Setup, pad: int, offset: float) -> Setup:
+    """The thermometer of one pad reads this much more than the truth."""
+    readings = (*setup.instruments.thermometers, (pad, offset))
+    return setup.change(instruments=replace(setup.instruments, thermometers=readings))

@@ -58,14 +58,17 @@ def _limit(film: PadFilm) -> float:
 
 
 def starved(films: Sequence[PadFilm]) -> list[int]:
-    """Numbers of the pads that carry and ask for more oil than their grooves give."""
-    carrying = [f for f in films if f.forces is not None and math.isfinite(f.supplied)]
-    asked = [edge_flows(f.grid, f.work, math.inf)[0] for f in carrying]
-    return [
-        f.number
-        for f, flow in zip(carrying, asked, strict=True)
-        if flow > (1.0 + _PLENTY) * f.supplied * float(f.grid.z[-1] - f.grid.z[0]) * (2.0 if f.grid.first == 0 else 1.0)
-    ]
+    """Numbers of the pads that ask for more oil than their grooves give: that carry, or cannot for want of it."""
+    short = []
+    for film in films:
+        if film.forces is not None:
+            asked = edge_flows(film.grid, film.work, math.inf)[0]
+        else:
+            asked = through_flow(film)[0] if film.rupture == "jfo" else 0.0
+        length = float(film.grid.z[-1] - film.grid.z[0]) * (2.0 if film.grid.first == 0 else 1.0)
+        if asked > (1.0 + _PLENTY) * film.supplied * length:
+            short.append(film.number)
+    return short
 
 
 def side_flow(film: PadFilm) -> float:

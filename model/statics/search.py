@@ -283,6 +283,10 @@ class Search:
                 even.append(film.number)
         return even
 
+    def dry_pads(self) -> frozenset[int]:
+        """Pads (from 0) that idle where a full gap at their leading edge would take more oil than there is."""
+        return frozenset(k - 1 for k in starved(self.films) if self.films[k - 1].idle)
+
     def not_held(self) -> bool:
         """Whether nothing holds the journal across its load: all pads with films push along one line."""
         normals = np.array([f.normal for f in self.films if f.forces is not None])

@@ -55,7 +55,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
     for what in ("load", "speed", "want"):
         if not result.converged:
             result = _raise(setup, load, speed, what)[0] or result
-    if not result.converged and setup.friction:
+    if not result.converged and (setup.friction or math.isfinite(setup.bearing.oil.supply_flow)):
         result = _let_held_idle(setup, load, speed, result)
     if not result.converged and _may_try_sets(setup, result):
         result = _try_sets(setup, load, speed, result)
@@ -88,7 +88,7 @@ def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium)
 def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozenset()) -> Equilibrium:
     """An equilibrium with the most pads loaded: idle ones near or above their folds are put on their films and tried.
 
-    `held` are pads (from 0) that friction holds off.
+    `held` are pads (from 0) that friction holds off, or that lack oil.
     """
     if not result.converged or not any(f.idle for f in result.films):
         return result
@@ -148,11 +148,14 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
 
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
-    """Let pads idle that friction holds where their film loses its load: they have no other rest."""
+    """Let pads idle that friction holds where their film loses its load, or whose oil fills no gap: nothing else is."""
     search = Search(setup, load, speed)
     search.stand()
     result, held = search.run(), frozenset[int]()
     for _ in search.films:
+        held |= search.dry_pads()
+        if result.converged:
+            return _settled(search, result, held)
         swinging = [
             k - 1
             for k in pads_of("pads {pads} neither stick nor slide at rest", result.status)
@@ -163,9 +166,7 @@ def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilib
         held |= frozenset(swinging)
         search.let_idle(swinging)
         result = search.run()
-        if result.converged:
-            return _settled(search, result, held)
-    return failed
+    return _settled(search, result, held) if result.converged else failed
 
 
 def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:

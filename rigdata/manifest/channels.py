@@ -269,9 +269,6 @@ def _check_together(channels: Mapping[str, Channel], findings: Findings) -> None
     for quantity in VECTOR_QUANTITIES:
         planes = {channel.plane: channel.name for channel in used if channel.quantity == quantity}
         if len(planes) > _MOST_PLANES:
-            text = f"{quantity} channels are in {len(planes)} planes ({_millimetres(planes)})"
+            listed = ", ".join(f"{1e3 * plane:g} mm" for plane in list(planes)[:6])
+            text = f"{quantity} channels are in {len(planes)} planes ({listed})"
             findings.error(("channels", list(planes.values())[-1], "plane"), text, "Describe two planes at most")
-
-
-def _millimetres(planes: Mapping[float, str]) -> str:
-    return ", ".join(f"{1e3 * plane:g} mm" for plane in list(planes)[:6])

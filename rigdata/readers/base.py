@@ -31,17 +31,17 @@ SAMPLE = 8
 LEAST_RATE, MOST_RATE = 1e-6, 1e12
 #: Text in any national spelling.
 TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
-#: Suffix -> module of `rigdata.readers`, extra that brings its library.
+#: Suffix -> module of `rigdata.readers`, its function, and the extra that brings its library.
 FORMATS = {
-    ".tdms": ("formats.tdms", "tdms"),
-    ".lvm": ("text.lvm", ""),
-    ".uff": ("formats.uff58", "uff"),
-    ".unv": ("formats.uff58", "uff"),
-    ".58": ("formats.uff58", "uff"),
-    ".mf4": ("formats.mdf4", "mdf"),
-    ".mdf": ("formats.mdf4", "mdf"),
-    ".mat": ("formats.mat", ""),
-    ".parquet": ("formats.parquet", ""),
+    ".tdms": ("formats.loggers", "read_tdms", "tdms"),
+    ".lvm": ("text.lvm", "read_lvm", ""),
+    ".uff": ("formats.loggers", "read_uff", "uff"),
+    ".unv": ("formats.loggers", "read_uff", "uff"),
+    ".58": ("formats.loggers", "read_uff", "uff"),
+    ".mf4": ("formats.loggers", "read_mdf", "mdf"),
+    ".mdf": ("formats.loggers", "read_mdf", "mdf"),
+    ".mat": ("formats.mat", "read_mat", ""),
+    ".parquet": ("formats.loggers", "read_parquet", ""),
 }
 #: Suffixes of loggers and programs that write one of the known kinds on request.
 _EXPORTABLE = {
@@ -156,7 +156,7 @@ class RunReader(RecordFile):
     def _along(self, name: str, start: int, stop: int) -> FloatArray:
         """Readings of another device along the run's own times, for those who look at all channels together.
 
-        Straight lines, missing before the first sample and after the last; no phasor may come from it.
+        Straight lines, missing from a step before the first sample and after the last; no phasor may come from it.
         """
         length = self._grid(name).length
         (values,) = self.read_device([name], 0, length)
@@ -164,7 +164,11 @@ class RunReader(RecordFile):
         finite = np.isfinite(values)
         if not finite.any():
             return np.full(stop - start, np.nan)
-        return np.interp(self.time(start, stop), at[finite], values[finite], left=np.nan, right=np.nan)
+        at, time = at[finite], self.time(start, stop)
+        within = np.clip(time, at[0], at[-1])
+        readings = np.interp(within, at, values[finite])
+        readings[np.abs(time - within) > 1.0 / self._grid(name).rate] = np.nan
+        return readings
 
     def _notes(self, members: str, names: Sequence[str], units: Mapping[str, str]) -> tuple[Problem, ...]:
         """Units other than the manifest's, channels that are sampled apart, and those that nobody describes."""

@@ -75,12 +75,12 @@ def read_contents(record: RecordFile) -> Contents:
     size = path.stat().st_size
     if size == 0:
         raise record.refuse("", "is empty", again)
-    name, extra = FORMATS.get(path.suffix.lower(), ("", ""))
+    name, function, extra = FORMATS.get(path.suffix.lower(), ("", "", ""))
     if name and size > LARGEST:
         raise record.refuse("", f"is larger than {LARGEST >> 30} GB", "Split the run")
     try:
         if name:
-            contents = Contents(importlib.import_module(f"rigdata.readers.{name}").read_series(path))
+            contents = Contents(getattr(importlib.import_module(f"rigdata.readers.{name}"), function)(path))
         else:
             contents = importlib.import_module("rigdata.readers.text.csv").read_text(record)
     except RigDataError as error:
@@ -98,10 +98,10 @@ def read_contents(record: RecordFile) -> Contents:
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         fault = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
         raise record.refuse("", fault, again) from error
-    series = table(contents.series, record.channels, record.stated_rate)
-    if not series:
+    contents = table(contents, record.channels, record.stated_rate)
+    if not contents.series:
         raise record.refuse("", "holds no channel of numbers", "Export the run again, with its channels")
-    return replace(contents, series=series)
+    return contents
 
 
 @dataclass(frozen=True)

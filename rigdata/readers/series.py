@@ -16,7 +16,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, Channel
-from rigdata.device import RATE_MISS, Grid, Timing, planned
+from rigdata.device import RATE_MISS, Grid, planned
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import rate_of_time
 
@@ -26,9 +26,12 @@ _WORDS = (
     r"date[ /_-]*time|date and time|datum[ /_+-]*(?:und )?(?:uhr)?zeit|time|zeit(?:stempel)?|temps|tempo|tiempo|uhrzeit"
     r"|timestamps?|elapsed ?time|relative ?time"
 )
+#: Seconds of what loggers count times in.
+TIME_FACTORS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_UNITS = "|".join(TIME_FACTORS)
 # a lone t is a time, T and T1 are thermometers
-_TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t$|t\s*[\[(])")
-_FACTORS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t\s*[\[(]|(?:(?i:{_WORDS})|t)(?:_(?:{_UNITS}))?$)")
+_TIME_UNIT = re.compile(rf"(?:[\[(]\s*|_)({_UNITS})\s*[\])]?$")
 #: Two clocks whose samples differ by this share of a step count as one.
 _SAME = 0.01
 _MOST_TIMES = 1000
@@ -71,7 +74,7 @@ class Contents:
     """What was read of a file."""
 
     series: Sequence[Series]
-    clock: str = ""  #: name of a text's first time column
+    clocks: Mapping[str, str] = field(default_factory=dict)  #: unit of every time column, by name; "" if not stated
     unread: tuple[str, ...] = ()  #: columns of numbers or texts that nobody describes
     problems: tuple[Problem, ...] = ()
 
@@ -135,10 +138,17 @@ def is_time(name: str) -> bool:
     return bool(_TIME.match(name.strip()))
 
 
-def seconds(values: FloatArray, unit: str) -> FloatArray:
-    """Times (n,) in seconds; an unknown unit counts as seconds."""
+def time_unit(name: str, unit: str) -> str:
+    """Unit of a time column: stated, or in its name (``time_ms``, ``Zeit [ms]``); "" where there is none."""
+    stated = unit.strip().strip("[]()")
+    in_name = _TIME_UNIT.search(name.strip())
+    return stated if stated in TIME_FACTORS else in_name[1] if in_name else ""
+
+
+def seconds(column: Series) -> FloatArray:
+    """Times (n,) of a column in seconds, which count where it has no unit."""
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing value as well
-        return values * _FACTORS.get(unit.strip().strip("[]()"), 1.0)
+        return column.values * TIME_FACTORS.get(time_unit(column.name, column.unit), 1.0)
 
 
 @dataclass(frozen=True)
@@ -187,14 +197,16 @@ def _letter(name: str, channels: Mapping[str, Channel]) -> str:
     return channels[name].clock if name in channels else ""
 
 
-def table(series: Sequence[Series], channels: Mapping[str, Channel], stated_rate: float | None = None) -> list[Series]:
+def table(contents: Contents, channels: Mapping[str, Channel], stated_rate: float | None = None) -> Contents:
     """Channels of a table at the times of their time columns; of these, only those that are described stay channels.
 
     Where not all columns have one time column, rows without a cell of a device are none of its samples.
     """
-    names = [column.name for column in series]
+    series, names = list(contents.series), [column.name for column in contents.series]
     clocks = time_columns(names, channels)
     groups: dict[int | None, list[int]] = {i: [] for i in (None, *clocks)}
+    for i in clocks:
+        series[i] = replace(series[i], unit=time_unit(names[i], series[i].unit))
     for i, clock in enumerate(serving(names, clocks, channels)):
         if clock is not None and len(series[clock]) != len(series[i]):
             clock = next((other for other in clocks if len(series[other]) == len(series[i])), None)
@@ -208,7 +220,7 @@ def table(series: Sequence[Series], channels: Mapping[str, Channel], stated_rate
     for clock, members in groups.items():
         column = series[clock or 0]
         known = channels.get(column.name)
-        time = seconds(column.values, column.unit) if known is None else known.to_si(column.values)
+        time = seconds(column) if known is None else known.to_si(column.values)
         label = "" if is_shared else column.name
         rows = slice(None) if is_shared else _filled_rows([time, *(series[i].values for i in members)])
         time = _without_gaps(time[rows])
@@ -216,7 +228,9 @@ def table(series: Sequence[Series], channels: Mapping[str, Channel], stated_rate
             values = to_temporary_file(series[i].values[rows])
             placed[i] = replace(series[i], values=values, time=time, group=label or series[i].group)
     ordered = [placed[i] for i in sorted(placed)]
-    return _slow_columns(ordered, channels, stated_rate) if is_shared or not clocks else ordered
+    if is_shared or not clocks:
+        ordered = _slow_columns(ordered, channels, stated_rate)
+    return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})
 
 
 def _slow_columns(series: Sequence[Series], channels: Mapping[str, Channel], rows_rate: float | None) -> list[Series]:
@@ -266,12 +280,12 @@ def arranged(
 ) -> Layout:
     """Put channels that share their times together; what has no usable times is a fault of that channel."""
     faults: dict[str, RigDataError] = {}
-    timings: dict[str, Timing] = {}
+    timings: dict[str, Grid] = {}
     times: dict[str, FloatArray] = {}
     for channel in series:
         place = f"channel {channel.name}"
         if channel.time is None:
-            timings[channel.name] = Timing(len(channel))
+            timings[channel.name] = Grid(len(channel))
         elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
             back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
             fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
@@ -284,7 +298,7 @@ def arranged(
             rate = rate_of_time(times[clock])
             rate = rate if rate > 0 else stated_rate or rate
             label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
-            timings[channel.name] = Timing(len(channel), clock, rate, label)
+            timings[channel.name] = Grid(len(channel), clock, rate, label)
     grids, texts = planned(timings, channels, stated_rate, lambda clock: float(times[clock][0]))
     for name, text in texts.items():
         faults[name] = refuse(file, f"channel {name}", text, "Export it with its times, or correct sample_rate", run)

@@ -107,24 +107,13 @@ def folded(angle: float) -> float:
     return round(180.0 - (180.0 - angle) % 360.0, 1) + 0.0  # no minus before zero
 
 
-def ends(series: Sequence[Series]) -> FloatArray:
-    """Means of two channels (2,) over the last tenth of a record."""
-    return np.array([float(np.nanmean(s.values[-max(1, len(s) // 10) :])) for s in series])
-
-
-def changes(series: Sequence[Series]) -> FloatArray:
-    """Difference of two channels (2,) between the last and the first tenth of a record."""
-    parts = []
+def part_means(series: Sequence[Series], parts: int = 10) -> FloatArray:
+    """Means (parts, n_channels) over equal shares of a record; NaN where a share has no value."""
+    columns = []
     for channel in series:
-        good = channel.values[np.isfinite(channel.values)]
-        tenth = max(1, len(good) // 10)
-        parts.append(float(good[-tenth:].mean() - good[:tenth].mean()) if len(good) else math.nan)
-    return np.array(parts)
-
-
-def means(series: Sequence[Series]) -> FloatArray:
-    """Means of two channels (2,)."""
-    return np.array([float(np.nanmean(s.values)) if np.isfinite(s.values).any() else math.nan for s in series])
+        shares = [share[np.isfinite(share)] for share in np.array_split(channel.values, parts)]
+        columns.append([float(share.mean()) if len(share) else math.nan for share in shares])
+    return np.array(columns).T
 
 
 def line_phasors(series: Sequence[Series], frequency: float) -> ComplexArray:
@@ -144,12 +133,3 @@ def along(cells: ComplexArray, housing: ComplexArray) -> tuple[FloatArray, Float
     phase = 0.5 * np.angle(np.sum(cells**2))
     turn = np.exp(-1j * phase)
     return (cells * turn).real, -(housing * turn).real
-
-
-def sweep_readings(series: Sequence[Series], blocks: int = 120) -> FloatArray:
-    """Readings (blocks, 2) of two channels in equal shares of a record, from the middle of what they run around."""
-    columns = []
-    for channel in series:
-        parts = np.array([np.nanmean(part) for part in np.array_split(channel.values, blocks)])
-        columns.append(parts - 0.5 * (parts.max() + parts.min()))
-    return np.stack(columns, axis=1)

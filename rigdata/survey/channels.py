@@ -29,11 +29,18 @@ _SPELT = {
     "degf": "degF", "deg f": "degF", "f": "degF", "m/s2": "m/s^2", "volts": "V", "volt": "V", "newtons": "N",
     "newton": "N", "mils": "mil", "microns": "um", "micron": "um", "lbs": "lbf", "lb": "lbf", "pounds": "lbf",
     "g's": "g", "gs": "g", "psig": "psi", "hertz": "Hz",
+    "n": "N", "kn": "kN", "klb": "klbf", "m_s2": "m/s^2", "mps2": "m/s^2",
 }  # fmt: skip
 #: Units that a name may end with after an underscore; V, H and A there are directions and numbers of sensors.
 _SUFFIXES = "um|mm|mils?|k?N|lbf|m_s2|m/s2|mps2|g|deg[CF]|rpm|Hz|mV|bar|k?Pa|MPa|psi"
 _UNIT_IN_NAME = re.compile(rf"^(.*?)(?:\s*[(\[]([^)\]]{{1,12}})[)\]]|_({_SUFFIXES}))\s*$")
-_SPELT_IN_NAMES = {"m_s2": "m/s^2", "mps2": "m/s^2"}
+#: What rigs call a pad.
+PAD = "(?:pad|shoe|segment|schuh|klotz|patin)"
+#: Directions [deg] that the end of a name hints at.
+_HINTS = {
+    0.0: r"(?:horiz|waa?ge?r)\w*$|(?:^[fdal]?|[\d_\-. ])[xh]$",
+    90.0: r"(?:vert|senkr|lotr)\w*$|(?:^[fdal]?|[\d_\-. ])[yv]$",
+}
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,6 @@ def guess_channel(name: str, unit: str) -> ChannelGuess:
     """Guess what a channel measures, by its unit first."""
     parts = _UNIT_IN_NAME.match(name.strip())
     bare, in_name = (parts[1], parts[2] or parts[3]) if parts else (name.strip(), "")
-    in_name = _SPELT_IN_NAMES.get(in_name, in_name)
     usable = usable_unit(unit) or usable_unit(in_name)
     if is_time(name):
         return ChannelGuess(Entry("time", "file"), usable or "s")
@@ -113,12 +119,7 @@ def _hint(name: str, quantity: str) -> float:
     """Direction [deg] that the end of a name hints at, for quantities that have one."""
     if quantity not in VECTOR_QUANTITIES:
         return math.nan
-    if word := re.search(r"(horiz|vert)\w*$", name, re.IGNORECASE):
-        return 0.0 if word[1].lower() == "horiz" else 90.0
-    end = re.search(r"(?:^|[\d_\-. ]|^[fdal])([xyhv])$", name, re.IGNORECASE)
-    if end is None:
-        return math.nan
-    return 0.0 if end[1].lower() in "xh" else 90.0
+    return next((angle for angle, end in _HINTS.items() if re.search(end, name, re.IGNORECASE)), math.nan)
 
 
 def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:

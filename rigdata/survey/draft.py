@@ -1,17 +1,27 @@
-"""A commented draft of a manifest: what the exports show is filled in, the remainder is marked."""
+"""A commented draft of a manifest, what the exports show filled in; and one that was edited by hand, carried on.
+
+Carried on, open places and guesses are filled in; what was typed stays.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field
-from rigdata.survey.channels import ChannelGuess, Entry, quantity_of_unit
+from rigdata.calibration import VECTOR_QUANTITIES
+from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
+from rigdata.manifest.manifest import parse_manifest
+from rigdata.problem import RigDataError, refuse
+from rigdata.survey.channels import PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
-from rigdata.survey.survey import Survey
+from rigdata.survey.survey import Survey, survey
 
-_DIRECTED = ("displacement", "force", "acceleration")
 _EXAMPLE = {
     "displacement": '"7.78 mV/um"',
     "force": '"1 mV/N", or "2.0 mV/V" with full_scale and excitation of the bridge',
@@ -34,6 +44,10 @@ _TOLD = (
 _TURNS = 'rotation = "counter-clockwise"   # (guess) with X to the right and Y up; or "clockwise"'
 _MOUNT = '# mount = "floating"   # hung on stingers, or "cells": on its load cells; else found in the records'
 _SOURCES = {"records": "(records) ", "guess": "(guess) "}
+#: What a line of `tpjb init` bears that was no person's.
+_OWN = re.compile(r"#\s*\((?:guess|records)\)")
+#: Entries that a sensor has of the one that it is like.
+_OF_MODEL = {"unit", "sensitivity", "full_scale", "excitation", "polarity", "zero"}
 
 
 def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
@@ -46,8 +60,9 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     if surveyed.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
-    if surveyed.clock:
-        lines += [f"[channels.{_key(surveyed.clock)}]", 'quantity = "time"', 'unit = "s"', ""]
+    for clock, unit in surveyed.clocks.items():
+        spelt = usable_unit(unit.value) or "s"
+        lines += [f"[channels.{_key(clock)}]", 'quantity = "time"', _line("unit", f'"{spelt}"', unit), ""]
     for block in [*channel_blocks(surveyed).values(), *(run_lines(run) for run in surveyed.runs)]:
         lines += [*block, ""]
     return "\n".join(_explained_once(lines)).rstrip() + "\n"
@@ -89,7 +104,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
     source = Entry() if like else guess.quantity  # what it is like bears the mark for both
     lines = [head, _line("quantity", f'"{quantity}"', source)]
-    if quantity in _DIRECTED:
+    if quantity in VECTOR_QUANTITIES:
         lines.append(_axis_line(guess))
     if like:
         lines.append(f"like = {_toml_string(like)}   # (guess) same type; or its own unit, sensitivity, ..")
@@ -100,7 +115,7 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     if guess.axis.value is not None and (guess.polarity < 0 or (like and guess.polarity != polarity)):
         lines.append(f"polarity = {guess.polarity}")
     if quantity == "temperature":
-        pad = re.search(r"(?:pad|t|tc|temp\w*?)[-_ #]*(\d{1,2})(?!\d)", name, re.IGNORECASE)
+        pad = re.search(rf"(?:{PAD}|t|tc|temp\w*?)[-_ #]*(\d{{1,2}})(?!\d)", name, re.IGNORECASE)
         lines.append(f"pad = {int(pad[1])}   # (guess) its name" if pad and int(pad[1]) else "# pad = 1")
     return lines
 
@@ -157,3 +172,169 @@ def _toml_string(text: str) -> str:
 def _key(name: str) -> str:
     bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
     return name if bare else _toml_string(name)
+
+
+@dataclass
+class _Block:
+    """A table of a manifest: its kind, the channel's name or the run's file, its lines and what they mean."""
+
+    kind: str
+    name: str
+    lines: list[str]
+    data: dict[str, Any]
+
+
+def _described_channels(text: str) -> dict[str, dict[str, Any]]:
+    """Tables of the channels that a manifest describes; what is `like` another has that one's calibration."""
+    try:
+        tables = tomllib.loads(text).get("channels", {})
+    except tomllib.TOMLDecodeError as error:
+        raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
+    described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
+    for name, table in described.items():
+        model = described.get(str(table.get("like", "")), {})
+        described[name] = {key: model[key] for key in _OF_MODEL if key in model} | table
+    return described
+
+
+def column_names(text: str) -> tuple[str, ...]:
+    """Names that a manifest gives to the columns of files that have none."""
+    try:
+        names = tomllib.loads(text).get("csv", {}).get("names", ())
+    except (tomllib.TOMLDecodeError, AttributeError):
+        return ()
+    return tuple(str(n) for n in names) if isinstance(names, list) else ()
+
+
+def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[float] = ()) -> tuple[str, list[str]]:
+    """Carry a manifest on: entries for open places, guesses made anew, tables for new channels and records.
+
+    A line is a guess while it bears the mark of one and the value that `tpjb init` had given it; all others stay. A
+    manifest is never left with errors that it had not: then new records are added and nothing else.
+    """
+    described = _described_channels(text)
+    before, after = survey(exports, pivots=pivots), survey(exports, described, pivots)
+    for merges in (True, False):
+        blocks = _blocks(text)
+        changes = _update(blocks, _tables(before) if merges else None, _tables(after))
+        new = "\n".join("\n".join(block.lines).rstrip() + "\n" for block in blocks if block.lines)
+        if not merges or _faults(new) <= _faults(text):
+            break
+    return new, changes
+
+
+def _faults(text: str) -> int:
+    """Errors of a manifest beyond its open places."""
+    try:
+        parse_manifest(text)
+    except RigDataError as error:
+        count = sum(problem.severity == "error" for problem in error.problems)
+        return count - (1 if open_paths(tomllib.loads(text)) else 0)
+    return 0
+
+
+def _blocks(text: str) -> list[_Block]:
+    """The head of a manifest and its tables, in order."""
+    parts: list[list[str]] = [[]]
+    for line in text.splitlines():
+        if line.startswith("["):
+            parts.append([])
+        parts[-1].append(line)
+    return [_block(lines) for lines in parts]
+
+
+def _block(lines: list[str]) -> _Block:
+    """A table by its heading; what is neither a channel nor a run has no kind."""
+    heading = lines[0].replace(" ", "") if lines else ""
+    try:
+        data = tomllib.loads("\n".join(lines))
+    except tomllib.TOMLDecodeError:  # a text over several lines that begins one with a bracket
+        heading = ""
+    if heading.startswith("[[runs]]"):
+        (run,) = data["runs"]
+        return _Block("runs", str(run.get("file", "")), lines, run)
+    if heading.startswith("[channels."):
+        ((name, channel),) = data["channels"].items()
+        return _Block("channels", name, lines, channel)
+    return _Block("", "", lines, {})
+
+
+def _tables(surveyed: Survey) -> dict[tuple[str, str], list[str]]:
+    """Lines of all tables that a draft has for channels and runs, by kind and name."""
+    tables = {("channels", name): lines for name, lines in channel_blocks(surveyed).items()}
+    return tables | {("runs", run.file): run_lines(run) for run in surveyed.runs}
+
+
+def _update(
+    blocks: list[_Block],
+    old: dict[tuple[str, str], list[str]] | None,
+    new: dict[tuple[str, str], list[str]],
+) -> list[str]:
+    """Merge the tables of a draft into the blocks; the `old` ones tell guesses from what was typed. Add new tables."""
+    changes: list[str] = []
+    for block in blocks:
+        key = block.kind, block.name
+        place = f"channel {block.name}" if block.kind == "channels" else f"run {block.data.get('id', block.name)}"
+        if old is not None and key in new:
+            _merge(block, new[key], old.get(key, []), place, changes)
+        elif block.kind == "runs" and block.name and key not in new:
+            changes.append(f"{place}: its file {block.name} is not there; left as it is")
+    present = {(block.kind, block.name) for block in blocks}
+    first_run = next((i for i, block in enumerate(blocks) if block.kind == "runs"), len(blocks))
+    for (kind, name), lines in new.items():
+        if (kind, name) in present:
+            continue
+        changes.append(f"{kind.removesuffix('s')} {name}: new")
+        at = len(blocks)
+        if kind == "channels":
+            at, first_run = first_run, first_run + 1
+        blocks.insert(at, _Block(kind, name, lines, {}))
+    return changes
+
+
+def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
+    """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
+    guessed, wanted = _values(old), _values(new)
+    lines, present = [], set()
+    for line in block.lines:
+        key, value = _entry(line)
+        present.add(key)
+        is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
+        if key in wanted and (MARK in value or is_guess) and wanted[key][0] != value and MARK not in wanted[key][0]:
+            changes.append(f"{place}: {key} {value} becomes {wanted[key][0]}")
+            line = wanted[key][1]
+        lines.append(line)
+    while lines and not lines[-1].strip():
+        lines.pop()
+    # a sensor is described in full or by another one of its type
+    if "like" in present:
+        present |= _OF_MODEL - {"polarity"}
+    if "unit" in present:
+        present.add("like")
+        if "sensitivity" in wanted and "sensitivity" not in guessed:
+            present.add("sensitivity")
+    for key, (value, line) in wanted.items():
+        if key not in present:
+            lines.append(line)
+            changes.append(f"{place}: {key} {value} added")
+    block.lines = lines
+
+
+def _entry(line: str) -> tuple[str, str]:
+    """Key and value of a line, without its comment; "" where it is none."""
+    if line.startswith(("[", "#")) or "=" not in line:
+        return "", ""
+    try:
+        ((key, value),) = tomllib.loads(line).items()
+    except (tomllib.TOMLDecodeError, ValueError):
+        return "", ""
+    return key, repr(value)
+
+
+def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
+    entries = {}
+    for line in lines:
+        key, value = _entry(line)
+        if key:
+            entries[key] = (value, line)
+    return entries

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from rigdata.manifest.manifest import CsvSpec
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import FORMATS, TEXT, RecordFile, suffix_hint
 from rigdata.readers.file_reader import read_contents
-from rigdata.readers.series import Series, with_unique_names
+from rigdata.readers.series import TIME_FACTORS, Series, with_unique_names
 from rigdata.readers.text.head import find_head
 from rigdata.safe_path import inside
+from rigdata.survey.channels import Entry
 
 _MOST_FILES = 5000
+#: Slower records of a whole folder are none of a turning shaft [Hz].
+_SLOWEST = 20.0
 
 
 @dataclass(frozen=True)
@@ -25,8 +29,13 @@ class Export:
 
     name: str
     series: tuple[Series, ...] = field(repr=False)
-    clock: str = ""
+    clocks: Mapping[str, str] = field(default_factory=dict)  #: unit of every time column, by name; "" if not stated
     nameless: int = 0
+
+    @property
+    def states_times(self) -> bool:
+        """Whether it has no time column, or one of its time columns a unit."""
+        return not self.clocks or any(self.clocks.values())
 
     @property
     def rate(self) -> float:
@@ -37,13 +46,13 @@ class Export:
 
 def record_files(folder: Path) -> list[Path]:
     """List files below `folder` that may be records, by suffix, in order of name."""
-    records = records_below(folder)
-    if not records:
-        unlisted = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")][:1]
-        hint = suffix_hint(unlisted[0]) if unlisted else f"known are {', '.join((*TEXT, *FORMATS))}"
-        remedy = f"{unlisted[0].name}: {hint}" if unlisted else hint.capitalize()
-        raise refuse(str(folder), "", "holds no records", remedy)
-    return records
+    if records := records_below(folder):
+        return records
+    unlisted = next((p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.startswith(".")), None)
+    remedy = f"Known are {', '.join((*TEXT, *FORMATS))}"
+    if unlisted is not None:
+        remedy = f"{unlisted.name}: {suffix_hint(unlisted)}"
+    raise refuse(str(folder), "", "holds no records", remedy)
 
 
 def records_below(folder: Path) -> list[Path]:
@@ -67,12 +76,39 @@ def read_export(path: Path, name: str | None = None, names: Sequence[str] = ()) 
         if not head.header_line:
             record, nameless = replace(record, spec=CsvSpec(names=tuple(names))), len(head.names)
     contents = read_contents(record)
-    series, clock = tuple(with_unique_names(contents.series)), contents.clock
+    series, clocks = tuple(with_unique_names(contents.series)), contents.clocks
     times = next((s for s in series if _counts_evenly(s)), None)
-    if nameless and not clock and times is not None:
+    if nameless and not clocks and times is not None:
         series = tuple(replace(s, time=times.values) for s in series if s is not times)
-        clock = times.name
-    return Export(record.file, series, clock, nameless)
+        clocks = {times.name: ""}
+    return Export(record.file, series, clocks, nameless)
+
+
+def in_seconds(
+    exports: Sequence[Export], described: Mapping[str, Mapping[str, Any]]
+) -> tuple[list[Export], dict[str, Entry]]:
+    """Exports and the units of their time columns; one that the file does not state is the manifest's, or guessed.
+
+    Nobody records a rig slower than the shaft turns: times that would say so are thousandths or millionths.
+    """
+    unstated = [export for export in exports if not export.states_times]
+    rate = max((export.rate for export in unstated), default=float("nan"))
+    units = {name: Entry(stated, "file") for export in exports for name, stated in export.clocks.items()}
+    open_ = {name for export in unstated for name in export.clocks}
+    typed = {described[name].get("unit") for name in open_ if name in described}
+    likely = next((unit for unit in ("s", "ms", "us") if rate / TIME_FACTORS[unit] >= _SLOWEST), "s")
+    unit = next((unit for unit in TIME_FACTORS if unit in typed), likely)
+    source = "file" if typed or unit == "s" else "guess"
+    units |= dict.fromkeys(open_, Entry(unit, source, f"not stated: as seconds it would be {rate:.3g} Hz"))
+    if unit == "s":
+        return list(exports), units
+    changed = []
+    for export in exports:
+        times = {} if export.states_times else {id(s.time): s.time for s in export.series if s.time is not None}
+        scaled = {key: time * TIME_FACTORS[unit] for key, time in times.items()}
+        series = tuple(replace(s, time=scaled.get(id(s.time), s.time)) for s in export.series)
+        changed.append(replace(export, series=series))
+    return changed, units
 
 
 def _counts_evenly(series: Series) -> bool:

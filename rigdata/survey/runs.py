@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, ChannelGuess, Entry
+from rigdata.survey.axes import part_means
+from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
-from rigdata.units import unit_factor
+from rigdata.units import UnitError, unit_factor
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
 _SLOW, _STRAIGHT = 0.9, 0.97
@@ -25,8 +27,8 @@ _BLOCK = 0.25
 NEAR = 0.02
 #: Units of a tachometer, in Hz.
 _TURNS = {"rpm": 1.0 / 60.0, "Hz": 1.0, "1/s": 1.0, "rad/s": 1.0 / (2.0 * math.pi)}
-#: Units of a load in the names of files.
-_LOADS = (("kN", "kN"), ("klbf?", "klbf"), ("lbf|lbs?", "lbf"), ("N", "N"))
+#: A number and what may be its unit in a file's name; a sign behind a letter is a hyphen.
+_NUMBER = r"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?"
 _BY_NAME = (
     ("dry_pivot", r"pivot|dry|trocken|steps?|stufen|^p-"),
     ("clearance", r"clear|spiel|^c-"),
@@ -61,7 +63,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     moves = of_quantity(export, channels, "displacement")
     lines = strongest_lines(forces) or strongest_lines(moves)
     stem = export.name.rpartition("/")[2].rpartition(".")[0]
-    pad = re.search(r"(?:^p|pad)[-_ #]?(\d{1,2})(?!\d)", stem, re.IGNORECASE)
+    pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     load, text = _load_of(stem)
     angle = _number_before(stem, r"deg(?:ree)?s?|°|grad")
     return RunGuess(
@@ -99,22 +101,20 @@ def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[Spe
 
 def _number_before(stem: str, unit: str) -> float:
     """Number before a unit in a file's name: ``-90deg``, ``1320_rpm``; NaN without one."""
-    match = re.search(rf"(?<![\d.,])((?<![a-z0-9])[-+])?(\d+(?:[.,]\d+)?)[ _]?(?:{unit})(?![a-z])", stem, re.IGNORECASE)
+    match = re.search(rf"{_NUMBER}(?:{unit})(?![a-z])", stem, re.IGNORECASE)
     if match is None:
         return float("nan")
     size = float(match[2].replace(",", "."))
-    return -size if match[1] == "-" else size  # behind a letter it is a hyphen
+    return -size if match[1] == "-" else size
 
 
 def _load_of(stem: str) -> tuple[Entry, str]:
     """Static load that a file's name states, in N and as text: ``5kN``, ``1349lbf``, or a bare number of newtons."""
-    for pattern, unit in _LOADS:
-        number = _number_before(stem, pattern)
-        if math.isfinite(number):
-            factor = 1e3 * unit_factor("lbf", "force") if unit == "klbf" else unit_factor(unit, "force")
-            text = f"{1e3 * number:g} lbf" if unit == "klbf" else f"{number:g} {unit}"
-            return Entry(abs(number) * factor, "file"), text.lstrip("-")
-    bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.])", stem)]
+    for _, number, letters in re.findall(rf"{_NUMBER}([a-z]+)", stem, re.IGNORECASE):
+        unit, size = usable_unit(letters), float(number.replace(",", "."))
+        with contextlib.suppress(UnitError):
+            return Entry(size * unit_factor(unit, "force"), "file"), f"{size:g} {unit}"
+    bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.a-z])", stem, re.IGNORECASE)]
     newtons = next((n for n in bare if 100.0 <= n <= 200_000.0), math.nan)
     if math.isnan(newtons):
         return Entry(), ""
@@ -149,7 +149,7 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
     total = sum(float(np.nanvar(s.values)) for s in pair)
     if total <= 0:
         return "", ""
-    share = sum(float(np.var(b)) for b in slow) / total
+    share = sum(float(np.var(b)) for b in slow if len(b)) / total
     driven = bool(lines) and 0.5 * lines[0].amplitude ** 2 > _DRIVEN * total  # mains pick-up drives nothing
     if share > _SLOW or (share > _MOSTLY and not driven):
         if len(slow) == 2 and len(slow[0]) == len(slow[1]) > 3:
@@ -164,13 +164,9 @@ def _slow(series: Series) -> FloatArray:
     """Means over blocks of a quarter of a second."""
     step = max(1, round(_BLOCK * series.rate))
     count = len(series.values) // step
-    blocks = series.values[: count * step].reshape(count, step)
-    means = []
-    for block in blocks:
-        finite = block[np.isfinite(block)]
-        if len(finite):
-            means.append(float(np.mean(finite)))
-    return np.array(means)
+    blocks = replace(series, values=series.values[: count * step])
+    means = part_means([blocks], count)[:, 0] if count else np.empty(0)
+    return np.asarray(means[np.isfinite(means)])
 
 
 def strongest_lines(channels: Sequence[Series]) -> tuple[SpectralPeak, ...]:

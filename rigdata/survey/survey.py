@@ -15,19 +15,16 @@ from rigdata.readers.series import Series
 from rigdata.survey.axes import (
     Frame,
     along,
-    changes,
-    ends,
     fitted_frame,
     folded,
     line_phasors,
-    means,
     pairs,
+    part_means,
     stated_frame,
-    sweep_readings,
     with_axes,
 )
 from rigdata.survey.channels import ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
-from rigdata.survey.exports import Export
+from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
 
 #: Directions [deg] no farther apart than this are meant to be one; a dry test so near a pad's is toward that pad.
@@ -35,6 +32,8 @@ _ALIKE, _TOWARD = 3.0, 15.0
 _MAINS_NEAR = 0.005
 #: In a clearance sweep the shaft lies in the corners, up to half a pad from where it is pushed [deg].
 _CORNERS = 25.0
+#: Shares that a sweep is looked at in.
+_SWEPT = 120
 #: Loads and speeds that differ by no more than this factor are one set point; a round number so near is meant.
 _ONE_LOAD, _ONE_SPEED, _ROUND = 1.03, 1.015, 0.003
 #: Share of the running records in which the shaft speed must show.
@@ -50,8 +49,7 @@ class Survey:
     rates: tuple[float, ...]
     channels: dict[str, ChannelGuess]
     runs: tuple[RunGuess, ...]
-    speed_line: float = float("nan")
-    clock: str = ""
+    clocks: dict[str, Entry] = field(default_factory=dict)  #: unit of every time column, by name
     nameless: int = 0
     per_hertz: dict[str, float] = field(default_factory=dict)
 
@@ -62,6 +60,7 @@ def survey(
     pivots: Sequence[float] = (),
 ) -> Survey:
     """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
+    exports, clocks = in_seconds(exports, described or {})
     folder = _Folder(exports, described or {}, pivots)
     folder.find_loads()
     speed = folder.common_line()
@@ -71,9 +70,8 @@ def survey(
         rates=tuple(e.rate for e in exports),
         channels=folder.channels,
         runs=_set_points(folder.runs),
-        speed_line=speed.number,
         per_hertz=folder.tachometers(speed.number),
-        clock=next((e.clock for e in exports if e.clock), ""),
+        clocks=clocks,
         nameless=max((e.nameless for e in exports), default=0),
     )
 
@@ -102,7 +100,8 @@ class _Folder:
         steps = {}
         for run in self._of_kind("dry_pivot"):
             series = _pair(run, names)
-            if series and np.isfinite(change := changes(series)).all() and change.any():
+            change = _change(series) if series else np.zeros(2)
+            if np.isfinite(change).all() and change.any():
                 steps[run.file] = change
         return steps
 
@@ -150,7 +149,7 @@ class _Folder:
         if not series or run.kind.value == "clearance":
             return run
         is_dry = run.kind.value == "dry_pivot"
-        force = changes(series) if is_dry else means(series)
+        force = _change(series) if is_dry else part_means(series, 1)[0]
         if not force.any() or not np.isfinite(force).all():
             return run
         angle = float(cells.direction(force))
@@ -182,7 +181,7 @@ class _Folder:
             toward = self._pads_toward(steps)
             if all(toward):
                 directions = np.array([self.pivots[pad - 1] for pad in toward])
-            places = np.array([ends(_pair(run, pair)) for run in self.runs if run.file in steps])
+            places = np.array([part_means(_pair(run, pair))[-1] for run in self.runs if run.file in steps])
             frames = [
                 fitted_frame(pair, np.array(list(steps.values())), directions, f"{len(steps)} dry steps"),
                 _frame_by_contacts(pair, places, directions),
@@ -200,8 +199,8 @@ class _Folder:
         for run in self._of_kind("clearance"):
             probes, forces = _pair(run, pair), _pair(run, cells.names)
             if probes and forces:
-                directions = cells.direction(sweep_readings(forces))
-                return fitted_frame(pair, sweep_readings(probes), directions, "the clearance sweep", _CORNERS)
+                readings, pushes = (_around_middle(part_means(channels, _SWEPT)) for channels in (probes, forces))
+                return fitted_frame(pair, readings, cells.direction(pushes), "the clearance sweep", _CORNERS)
         return None
 
     def _frame_by_excitation(self, pair: tuple[str, str], cells: Frame) -> Frame | None:
@@ -276,6 +275,17 @@ def _pair(run: RunGuess, names: tuple[str, str]) -> list[Series]:
     return chosen if len(chosen) == 2 and any(np.isfinite(s.values).any() for s in chosen) else []
 
 
+def _change(series: Sequence[Series]) -> FloatArray:
+    """Difference of two channels (2,) between the last and the first tenth of a record."""
+    tenths = part_means(series)
+    return np.asarray(tenths[-1] - tenths[0])
+
+
+def _around_middle(readings: FloatArray) -> FloatArray:
+    """Readings (n, 2) from the middle of what they run around."""
+    return readings - 0.5 * (readings.max(axis=0) + readings.min(axis=0))
+
+
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
     kilonewtons = f"{load / 1e3:.3g} kN"
@@ -321,26 +331,25 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
         nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
         return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
 
-    angles = _common([r.direction.number for r in runs], close, rounded)
-    speeds = _common([r.speed.number for r in runs], _within(_ONE_SPEED), _round_frequency)
-    lines = _common([r.excitation.number for r in runs], _within(_ONE_SPEED), _round_frequency)
-    measured = [r.load.number for r in runs if r.load.source == "records"]
-    loads = _common(measured, _within(_ONE_LOAD), lambda middle: float(f"{middle:.2g}"))
-    changed = []
-    for run in runs:
-        load = run.load
-        if load.source == "records":
-            load = replace(load, value=loads[load.value])
-        changed.append(
-            replace(
-                run,
-                direction=_moved(run.direction, angles),
-                speed=_moved(run.speed, speeds),
-                excitation=_moved(run.excitation, lines),
-                load=load,
-                load_text=run.load_text or (f"{load.number / 1e3:.4g} kN" if load.source else ""),
-            )
-        )
+    meant = {
+        "direction": (close, rounded),
+        "speed": (_within(_ONE_SPEED), _round_frequency),
+        "excitation": (_within(_ONE_SPEED), _round_frequency),
+        "load": (_within(_ONE_LOAD), lambda middle: float(f"{middle:.2g}")),
+    }
+    changed = list(runs)
+    for name, (is_alike, nearest) in meant.items():
+        entries: list[Entry] = [getattr(run, name) for run in changed]
+        movable = [name != "load" or entry.source == "records" for entry in entries]
+        values = [entry.number for entry, moves in zip(entries, movable, strict=True) if moves]
+        points = _common(values, is_alike, nearest)
+        for i, entry in enumerate(entries):
+            if movable[i]:
+                moved: Any = {name: replace(entry, value=points.get(entry.value, entry.value))}
+                changed[i] = replace(changed[i], **moved)
+    for i, run in enumerate(changed):
+        if run.load.source and not run.load_text:
+            changed[i] = replace(run, load_text=f"{run.load.number / 1e3:.4g} kN")
     return tuple(changed)
 
 
@@ -351,10 +360,6 @@ def _within(factor: float) -> Callable[[list[float], float], bool]:
 def _round_frequency(middle: float) -> float:
     nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
     return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.4g}")
-
-
-def _moved(entry: Entry, set_points: Mapping[float, float]) -> Entry:
-    return replace(entry, value=set_points.get(entry.value, entry.value))
 
 
 def _common(

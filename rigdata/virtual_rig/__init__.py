@@ -6,11 +6,10 @@
 >>> truth = write_campaign("campaign.h5", rig)  # doctest: +SKIP
 """
 
-from rigdata.virtual_rig.campaign import write_campaign
+from rigdata.virtual_rig.campaign import CampaignTruth, write_campaign
 from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout
-from rigdata.virtual_rig.ledger import CampaignTruth
 from rigdata.virtual_rig.noise import (
     ActuatorDefects,
     ChannelNoise,

@@ -85,8 +85,7 @@ class Sensor:
         """Unit vector (2,) along which it really reads, or is stated to read."""
         if self.axis is None:
             raise VirtualRigError(f"channel {self.name} has no axis")
-        angle = self.axis + (0.0 if stated else self.error.angle)
-        return directions(angle)
+        return directions(self.axis + (0.0 if stated else self.error.angle))
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,9 @@ class Instruments:
         With a `seed`, gap voltages and the zeros of accelerometers and Pt100s are random; without, the probes
         are at 8 V and everything else is at zero.
         """
-        rng = None if seed is None else np.random.default_rng([seed, 0])
-        gaps = (8.0, 8.0) if rng is None else tuple(rng.normal(8.0, 0.2, 2))
-        gravity = (0.0, 0.0) if rng is None else tuple(rng.normal(0.0, 1.5, 2))
-        pt100 = (0.0,) * n_pads if rng is None else tuple(rng.normal(0.0, 0.2, n_pads))
+        rng, share = np.random.default_rng([seed or 0, 0]), 0.0 if seed is None else 1.0
+        gaps = (8.0 + share * rng.normal(0.0, 0.2, 2)).tolist()
+        gravity, pt100 = ((share * rng.normal(0.0, size, n) + 0.0).tolist() for size, n in ((1.5, 2), (0.2, n_pads)))
         quarter = radians(90.0)
         thermometers = [Sensor.thermometer(f"T{i + 1}", i + 1).with_error(offset=zero) for i, zero in enumerate(pt100)]
         return cls(

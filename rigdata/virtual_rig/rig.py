@@ -6,12 +6,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from rigdata.virtual_rig.faults import Fault, check_faults, faulty_instruments, spoil_record
+from rigdata.virtual_rig.faults import Fault, check_faults
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun, RigPlan
-from rigdata.virtual_rig.sensing import Glitch, Readings, add_glitches, analogue_readings, converted, draw_glitches
+from rigdata.virtual_rig.sensing import (
+    Glitch,
+    Readings,
+    add_glitches,
+    analogue_readings,
+    converted,
+    draw_glitches,
+    faulty_instruments,
+    spoil_record,
+)
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 

@@ -1,14 +1,15 @@
-"""From motion to readings: axes, gains, delays, runout, noise, glitches, zero, then the converter."""
+"""From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len
 
 from rigdata.arrays import FloatArray
+from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
@@ -170,3 +171,70 @@ def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: s
             phase = order * start + cabling.uniform(0, 2 * np.pi)
             out[row] += strength * share * np.cos(2 * np.pi * order * frequency * time + phase)
     return out
+
+
+def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
+    """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
+    sensors = list(instruments.sensors)
+    for fault in faults:
+        for i, sensor in enumerate(sensors):
+            if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
+                sensors[i] = _faulty_sensor(sensor, fault.kind, fault.value)
+    return replace(instruments, sensors=tuple(sensors))
+
+
+def _faulty_sensor(sensor: Sensor, kind: str, value: float) -> Sensor:
+    names = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
+    error = getattr(sensor.error, names[kind])
+    return sensor.with_error(**{names[kind]: error * value if kind == "scaled" else error + value})
+
+
+def spoil_record(
+    readings: Readings,
+    instruments: Instruments,
+    faults: Iterable[Fault],
+    rng: np.random.Generator,
+) -> Readings:
+    """Readings with the record faults of their run; the given ones stay as they are."""
+    columns = dict(readings.columns)
+    time = readings.time
+    for fault in faults:
+        if fault.place != "record":
+            continue
+        if fault.kind == "time_gap":
+            recorded = ~_window(fault, time)
+            time, columns = time[recorded], {name: v[recorded] for name, v in columns.items()}
+        elif fault.kind == "time_jitter":
+            spread = 0.2 if fault.value is None else fault.value
+            time = time + np.clip(spread * rng.standard_normal(len(time)), -0.45, 0.45) / readings.rate
+        elif fault.kind == "swapped" and fault.channel is not None and fault.other is not None:
+            columns[fault.channel], columns[fault.other] = columns[fault.other], columns[fault.channel]
+        else:
+            for name in columns:
+                if fault.is_in(name):
+                    columns[name] = _spoilt(columns[name], fault, instruments.named(name), time)
+    return Readings(time, columns, readings.rate)
+
+
+def _window(fault: Fault, time: FloatArray) -> np.ndarray:
+    return (time >= fault.start) & (time < fault.start + fault.length)
+
+
+def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
+    """Readings (n,) of one channel with a fault of its record."""
+    inside = _window(fault, time)
+    if fault.kind == "dead":
+        return np.full_like(v, fault.value or 0.0)
+    if fault.kind == "stuck":
+        return np.where(inside, v[np.argmax(inside)], v)
+    if fault.kind == "clipped":
+        low, high = float(v.min()), float(v.max())
+        middle = 0.5 * (low + high)
+        reach = 0.5 * (high - low) * (0.6 if fault.value is None else fault.value)
+        return np.clip(v, middle - reach, middle + reach)
+    if fault.kind == "inverted":
+        # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
+        return 2 * sensor.zero - v
+    if fault.kind == "nan_gap":
+        return np.where(inside, np.nan, v)
+    return v + sensor.polarity * sensor.scale * (fault.value or 0.0) * inside  # a glitch

@@ -23,7 +23,7 @@ from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
-from tpjb_ident.check.lines import excitation_line, steady_level, strongest_line
+from tpjb_ident.check.lines import excitation_line, other_line, steady_level
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
@@ -122,12 +122,16 @@ def test_the_mean_of_a_run_without_excitation_leaves_the_shafts_lines_out():
     assert np.isnan(lines.phasor).all()
 
 
-def test_strongest_line():
-    time = np.arange(2000) / 1000
-    values = np.sin(2 * np.pi * 25 * time) + 5 * np.sin(2 * np.pi * 22 * time)
-    assert strongest_line(time, values, [22.0]) == pytest.approx(25.0, abs=0.6)
-    assert math.isnan(strongest_line(time[:5], values[:5], []))
-    assert math.isnan(strongest_line(time, np.full(2000, np.nan), []))
+def test_the_strongest_line_that_nobody_mentioned():
+    time = np.arange(4000) / 1000
+    wave = sum(a * np.sin(2 * np.pi * f * time) for a, f in ((1.0, 25.0), (5.0, 22.0), (0.5, 37.0), (2.0, 31.0)))
+    described = channels(("displacement", "force"))
+    noise = 0.01 * np.random.default_rng(3).normal(size=(4, 4000))
+    data = {name: wave + row for name, row in zip(described, noise, strict=True)}
+    assert other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)) == pytest.approx(31.0, abs=0.1)
+    data = {name: np.sin(2 * np.pi * 25 * time) + row for name, row in zip(described, noise, strict=True)}
+    assert math.isnan(other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)))
+    assert math.isnan(other_line(None))
 
 
 @pytest.mark.parametrize("index", range(4))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +11,9 @@ import pandas as pd
 import pytest
 
 from rigdata.calibration import Channel
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.compare.difference import Side, difference_of, difference_sentences, recorded_side
+from tpjb_ident.report.difference_page import write_difference_report
 from tpjb_ident.runtime.tables import write_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
 
@@ -111,3 +114,26 @@ def test_pivots_and_clearances_come_from_folders_of_results(tmp_path):
     texts = difference_sentences(difference)
     assert "Clearance changed: pad #1 by 4.00 ± 0.55 µm." in texts
     assert texts[-1] == "No calibration is known to be common to both: the intervals hold that of each."
+
+
+def test_the_first_screen_says_what_was_tested_and_each_value_with_its_interval(tmp_path):
+    moved = TRUE.copy()
+    moved[7] *= 0.5
+    sides = [side("a", TRUE), side("b", moved, quality="large-amplitude")]
+    both = [[s.coefficients.assign(rotation=sense) for sense in ROTATIONS] for s in sides]
+    sides = [
+        replace(s, campaign=None, coefficients=pd.concat(frames, ignore_index=True))
+        for s, frames in zip(sides, both, strict=True)
+    ]
+    page = write_difference_report(tmp_path, difference_of(*sides), {}, {}, "tpjb view o").read_text("utf-8")
+    first = re.sub(r"<[^>]+>", " ", page[page.index("<main>") : page.index("<nav")])
+    words = " ".join(first.split())
+    assert "Static load: 5 kN at -90°" in words
+    assert "Shaft: 22 Hz (1320 rpm) clockwise, 22 Hz (1320 rpm) Excitation: 25 Hz" in words
+    assert "At 5 kN, 25 Hz, shaft at 22 Hz (1320 rpm) clockwise; 95 % intervals" in words
+    assert "cyy, kN s/m 700 ± 14 350 ± 14 −350" in words
+    assert "Flags on 2 points, none forbids trust: large-amplitude (2)." in words
+    assert "operating point: load in kN, excitation in Hz" in words
+    table = " ".join(re.sub(r"<[^>]+>", " ", page[page.index('id="s1"') :]).split())
+    assert "5 kN, 25 Hz, ccw" in table
+    assert "5 kN, 25 Hz, cw" in table

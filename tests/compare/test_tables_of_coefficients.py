@@ -13,7 +13,7 @@ from tests.command_line import tpjb
 from tpjb_ident.compare.comparison import CompareSettings, comparison_frame
 from tpjb_ident.compare.from_table import compare_table
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
-from tpjb_ident.diagnosis.observations.from_table import observe_table
+from tpjb_ident.diagnosis.observations.observe import observe_table
 
 HEAD = "static_load_N,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m,cyy_Ns_per_m_se"
 
@@ -67,3 +67,14 @@ def test_what_is_missing_is_said(table, more, said):
     result = tpjb("compare", *(table if m == "T" else m for m in more))
     assert result.exit_code == 2
     assert said in " ".join(result.output.split())
+
+
+def test_our_own_table_keeps_its_whole_interval_and_its_flags(tmp_path):
+    path = tmp_path / "coefficients.csv"
+    path.write_text("static_load_N,shaft_speed_Hz,kyy_N_per_m,kyy_N_per_m_se,kyy_N_per_m_lo,kyy_N_per_m_hi,quality\n"
+                    "5000,22,2e8,1e6,1.9e8,2.1e8,large-amplitude\n8750,22,3e8,2e6,,,ok\n", "utf-8")  # fmt: skip
+    first, second = compare_table(path, None).identification.points
+    assert first.stiffness.half_width()[3] == pytest.approx(1e7, rel=1e-4)
+    assert second.stiffness.half_width()[3] == pytest.approx(1.96 * 2e6, rel=1e-4)
+    assert [str(c) for c in first.quality] == ["large-amplitude"]
+    assert second.quality == ()

@@ -6,8 +6,8 @@ import pytest
 from model.effects import Effect, known_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
-from tpjb_ident.diagnosis.comparison.amplitude_path import path_through
 from tpjb_ident.diagnosis.comparison.fit import Start, fitted
+from tpjb_ident.diagnosis.comparison.paths import path_through
 from tpjb_ident.diagnosis.comparison.search import compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import prediction

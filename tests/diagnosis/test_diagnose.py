@@ -1,6 +1,7 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,18 +9,20 @@ import pytest
 from model.effects import Effect, known_effects, load_effects
 from model.setup import Mesh
 from tests.diagnosis.rocker_case import SPEED, noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison.problem import faults_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.diagnose import diagnose
+from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
+from tpjb_ident.diagnosis.diagnose import before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.candidates import candidates
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
+from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.next_test import Design, ranked, say, separated
-from tpjb_ident.diagnosis.observations.folds import folds, held_out
-from tpjb_ident.diagnosis.observations.gap import gap, residuals
+from tpjb_ident.diagnosis.observations.folds import held_out
+from tpjb_ident.diagnosis.observations.gap import contradictions, gap, localise, residuals
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.diagnosis.plan import plan
 from tpjb_ident.diagnosis.planned import dynamic, planned_observations
-from tpjb_ident.diagnosis.verdict.remainder import localise
 
 #: A part of the library, so that a test takes seconds.
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "oil_viscosity", "probe_gain", "channel_delay"}
@@ -73,19 +76,15 @@ def test_candidate_amplitude_is_kept_inside_its_physical_bounds(setup):
 
 def test_held_out_points_are_whole_operating_points_to_which_a_model_must_extrapolate(observations):
     held = held_out(observations)
-    for fold in folds(observations):
-        assert held[fold.members].all() == held[fold.members].any()
+    for where in {e.where for e in observations.elements if e.family in {"h", "temperature"}}:
+        assert len({bool(h) for e, h in zip(observations.elements, held, strict=True) if e.where == where}) == 1
+    assert not all(held)
     loads = {e.place("load") for e, h in zip(observations.elements, held, strict=True) if h and e.family == "h"}
     assert loads == {5000.0, 8750.0}
     lines = {round(e.place("excitation") / 2 / math.pi)
              for e, h in zip(observations.elements, held, strict=True)
              if h and e.family == "h" and e.place("load") == 5000.0}  # fmt: skip
     assert lines == {15, 45}
-
-
-def test_folds_cover_every_element_once(observations):
-    members = np.concatenate([fold.members for fold in folds(observations)])
-    assert sorted(members) == list(range(len(observations)))
 
 
 def test_where_nothing_can_be_held_out_the_gap_is_over_everything(setup):
@@ -209,3 +208,45 @@ def test_a_direction_between_those_of_the_grid_is_named_where_a_generic_term_lea
     assert found.name == "structure_compliance"
     assert found.parameters["direction"].value == pytest.approx(math.radians(20.0), abs=0.02)
     assert found.parameters["stiffness"].lo < 5e8 < found.parameters["stiffness"].hi
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.5, True), (2.0, True), (0.95, False)])
+def test_a_polygon_of_half_or_twice_the_drawing_is_said_before_any_search(observations, factor, said):
+    sides = np.array([e.observable == "clearance_pushed" for e in observations.elements])
+    value = np.where(sides, factor, 1.0) * observations.value
+    sentences = contradictions(replace(observations, value=value), observations.value)
+    assert [("diameter for a radius" in sentence) for sentence in sentences] == [True] * said
+
+
+def test_cells_that_read_other_loads_than_were_set_are_said(observations):
+    loads = np.array([e.observable == "load_ratio" for e in observations.elements])
+    (sentence,) = contradictions(
+        replace(observations, value=np.where(loads, 0.9, 1.0) * observations.value), observations.value
+    )
+    assert "90 % of the loads" in sentence
+
+
+def test_a_fault_on_a_tolerance_is_that_number_with_a_wide_prior(setup, observations):
+    listed = nuisances(observations.elements, setup, Tolerances())
+    oil = next(f for f in faults_of(candidates(setup.bearing), listed) if f.label == "oil_viscosity")
+    unknowns = Unknowns(SimpleNamespace(nuisances=listed), (oil,))
+    (at,) = unknowns.slices
+    assert len(unknowns.width) == len(listed)
+    assert unknowns.width[at] == oil.width > 1.0
+    assert at.start not in unknowns.tolerances
+    theta = np.zeros(len(listed))
+    theta[at] = math.log(0.8) / 0.05
+    (effect,) = unknowns.effects(theta)
+    assert effect.parameters["factor"] == pytest.approx(0.8)
+
+
+def test_a_table_of_coefficients_has_rows_before_and_after_as_a_campaign_has(observations):
+    found = SimpleNamespace(
+        observations=observations, problem=SimpleNamespace(base=1.1 * observations.value),
+        verdict=SimpleNamespace(effects=("one",)), after=observations.value,
+    )  # fmt: skip
+    table = before_and_after(found, None)
+    points = {e.where for e in observations.elements if e.family == "h"}
+    assert len(table) == 2 * len(points)
+    assert median_deviations(table)["kyy"] == pytest.approx((0.1, 0.0), abs=1e-9)
+    assert (table["kxx_N_per_m_lo"] < table["kxx_N_per_m"]).all()

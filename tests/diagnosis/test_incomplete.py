@@ -9,7 +9,7 @@ import pytest
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.campaign import unknown_centre
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import _mains_on_excitation, observe
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 

@@ -8,9 +8,12 @@ import pytest
 
 from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects, kind_of
-from tests.diagnosis.rocker_case import ROCKER, rocker_setup
+from tests.diagnosis.rocker_case import ROCKER, points, rocker_setup
+from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Shift, nuisances
 from tpjb_ident.diagnosis.forward.tolerances import DEFAULTS, Tolerances
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.diagnosis.planned import planned_observations
 from tpjb_ident.errors import BadInputError
 
 
@@ -60,13 +63,26 @@ def test_a_tolerance_that_an_effect_says_does_what_the_effect_does():
     oil = replace(drawn.bearing.oil, supply_temperature=50.0)  # where an exponent about 40 °C is another one
     setup = drawn.change(bearing=replace(drawn.bearing, oil=oil))
     said = [n for n in nuisances((), setup, Tolerances()) if n.effect]
-    assert {n.effect.split()[0] for n in said} == set(OWN_NUMBERS)
+    assert {n.effect.split()[0] for n in said} == set(OWN_NUMBERS) - {"thermometer_offset"}
     for nuisance in said:
-        name, _, pad = nuisance.effect.partition(" pad ")
+        name, *where = nuisance.effect.split()
         number = OWN_NUMBERS[name]
         parameter = kind_of(name).parameters[-1].name
-        place = {"pad": int(pad)} if pad else {}
+        place = {where[0]: int(where[1])} if where else {}
         size = number.change(number.parameter(-nuisance.sigma))
         assert size == pytest.approx(-nuisance.sigma)
         effect = Effect(name, **place, **{parameter: number.parameter(size)})
-        assert nuisance.change(setup, size) == apply_effects(setup, [effect])
+        changed, other = nuisance.change(setup, size), apply_effects(setup, [effect])
+        for seen in ("displacement_map", "force_map"):
+            assert np.array_equal(getattr(changed.instruments, seen)(9.0), getattr(other.instruments, seen)(9.0))
+        assert changed.change(instruments=setup.instruments) == other.change(instruments=setup.instruments)
+
+
+def test_a_thermometer_has_its_own_number():
+    setup, layout = rocker_setup(), Layout(points([5000.0], 5))
+    elements = planned_observations(setup, layout).elements
+    listed = [n for n in nuisances(elements, setup, Tolerances()) if n.name == "thermometer"]
+    assert [n.effect for n in listed] == [f"thermometer_offset pad {k}" for k in range(1, 6)]
+    forward = Forward(setup, layout, elements)
+    shown = forward([Effect("thermometer_offset", pad=2, offset=0.5)]) - forward()
+    assert np.allclose(shown, listed[1].column, atol=1e-9)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tpjb_ident.diagnosis.observations.from_table import observe_table
+from tpjb_ident.diagnosis.observations.observe import observe_table
 from tpjb_ident.errors import BadInputError
 
 HEAD = "static_load_N,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m,cyy_Ns_per_m_se"

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
@@ -13,9 +14,15 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
 from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.run_data import RunPhasors, vector_channels
+from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
 
 H = np.array([[2.0 + 0.7j, 0.3 - 0.2j], [-0.4 + 0.1j, 1.5 + 0.9j]])
+
+
+def vector_channels(quantities: tuple[str, ...] = QUANTITIES) -> tuple[Channel, ...]:
+    """Channels along X and Y of some quantities: what stands for vectors that were never channels."""
+    names = [(quantity, axis) for quantity in quantities for axis in (0, 1)]
+    return tuple(Channel(f"{quantity} {'xy'[axis]}", quantity, axis=axis * np.pi / 2) for quantity, axis in names)
 
 
 def complex_normal(rng, *shape):

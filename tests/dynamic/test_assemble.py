@@ -48,17 +48,12 @@ def run_at(name, direction, load, turn, rng, noise):
 
 
 class Kept:
-    """Finished runs, all in memory."""
-
-    all_in_memory = True
+    """Finished runs."""
 
     def __init__(self, runs, left_out=()):
-        self._runs, self.left_out = runs, left_out
+        self.left_out = left_out
         self.digests = [digest(RunResult(run, {1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)]
         self.places = list(range(len(runs)))
-
-    def take(self, place):
-        return self._runs[place]
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +70,7 @@ def runs():
 def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
     named = {c.name: c for c in channels}
     campaign = SimpleNamespace(
-        id="c", channels=named, of_kind=lambda kind: [], housing_mass=30.0, mass_uncertainty=0.0, mount=None
+        id="c", channels=named, of_kind=lambda kind: [], housing_mass=3.0, mass_uncertainty=0.0, mount=None
     )
     chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
     return assemble(campaign, Kept(runs, left_out), chosen, progress or (lambda text, done, total: None))

@@ -12,6 +12,7 @@ import pytest
 from rigdata import load_campaign
 from rigdata.operating_point import OperatingPoint
 from tests.command_line import tpjb
+from tests.dynamic.phasor_cases import vector_channels
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
@@ -23,7 +24,7 @@ from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors, vector_channels
+from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.terms.distortion import band_change
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])

@@ -17,8 +17,7 @@ from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, w
 from tpjb_ident.dynamic.results.frequency_model import chance_of
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
-from tpjb_ident.phasors.compensation import slower_channel
-from tpjb_ident.phasors.filled import SlowerChannel
+from tpjb_ident.phasors.compensation import SlowerChannel, slower_channel
 
 ONE_LOAD = plans_of(loads=(5000.0,))
 QUICK = replace(Rig(), seconds=2.0, rate=1000.0)

@@ -19,8 +19,9 @@ from rigdata.virtual_rig import Timing, write_campaign
 from tests.dynamic.test_identify import rig
 from tests.good_campaigns import directions, written
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.dynamic.runs import finished_runs, run_jobs
-from tpjb_ident.dynamic.runs.run_jobs import all_runs as shelved_runs
+from tpjb_ident.dynamic.runs import run_jobs
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
+from tpjb_ident.dynamic.runs.run_jobs import all_runs as gathered_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.phasors.run_phasors import PhasorSettings
 from tpjb_ident.runtime.executors import local_workers
@@ -60,8 +61,7 @@ def counted(monkeypatch):
 
 def all_runs(*arguments, **named):
     """What `FinishedRuns` gives back of every run: its digest and the phasors of its excitation lines."""
-    with shelved_runs(*arguments, **named) as finished:
-        return [(finished.take(i), digest) for i, digest in enumerate(finished.digests)]
+    return [(digest.phasors, digest) for digest in gathered_runs(*arguments, **named).digests]
 
 
 def silent(text, done, total):
@@ -110,16 +110,12 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, t
 
 
 @pytest.mark.slow
-def test_what_waits_on_disk_comes_back_bit_for_bit(path, whole, tmp_path, monkeypatch, counted):
-    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
-    monkeypatch.setattr(finished_runs, "ROOM", 0)  # as if the campaign were large
-    counted.clear()
-    assert same(all_runs(campaign, settings, silent), whole)  # in a temporary folder
-    assert same(all_runs(campaign, settings, silent, store=store), whole)  # in the store
-    assert len(counted) == 12  # all six twice
-    with shelved_runs(campaign, settings, silent, store=store) as finished:
-        store.clear()  # another command has ended
-        assert np.array_equal(finished.take(3).displacement.phasors, whole[3][0].displacement.phasors)
+def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_path):
+    campaign, settings = load_campaign(path), PhasorSettings()
+    runs, mass = campaign.of_kind("dynamic"), campaign.housing_mass
+    finished = FinishedRuns(runs, mass, lambda run: run_jobs.one_run(run, mass, settings), RunStore(tmp_path / "kept"))
+    finished.put(3, None, "the fingerprint that it had")
+    assert same([(finished.digests[0].phasors, finished.digests[0])], [whole[3]])
 
 
 @pytest.mark.slow

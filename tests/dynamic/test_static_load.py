@@ -33,7 +33,7 @@ def test_a_ratio_is_size_and_angle_whatever_the_direction():
 
 
 def test_misses_are_relative_to_what_all_runs_share():
-    """A gain and a rotation of the cells move nothing; the mean's own uncertainty is told."""
+    """A gain and a rotation of the cells move nothing."""
     scatter = np.array([0.01 + 0.003j, -0.01 - 0.003j, 0.01 - 0.003j, -0.01 + 0.003j])
     for common in (1.0, 1.3 * np.exp(0.1j), 0.55):
         points = [loaded(common * (1 + scatter)), loaded(common * (1 - scatter), 8000.0, 30.0)]
@@ -42,9 +42,6 @@ def test_misses_are_relative_to_what_all_runs_share():
         np.testing.assert_allclose(first.size, scatter.real, atol=1e-12)
         np.testing.assert_allclose(first.sideways, scatter.imag, atol=1e-12)
         np.testing.assert_allclose(second.size, -scatter.real, atol=1e-12)
-        spread = np.concatenate([scatter, -scatter])
-        assert first.uncertainty == second.uncertainty == pytest.approx(np.std(spread.real, ddof=1) / math.sqrt(8))
-        assert first.turn_uncertainty == pytest.approx(np.std(spread.imag, ddof=1) / math.sqrt(8))
 
 
 def test_one_run_far_off_does_not_move_what_all_share():
@@ -53,7 +50,6 @@ def test_one_run_far_off_does_not_move_what_all_share():
     np.testing.assert_allclose(miss.size, [-0.01, 0.01, -0.01, 0.01, 0.0, 0.06], atol=1e-12)
     (exact,), _ = load_misses([loaded([1.1, 1.1, 1.1, 1.6])])
     np.testing.assert_allclose(exact.size, [0.0, 0.0, 0.0, 0.5 / 1.1], atol=1e-12)
-    assert exact.uncertainty == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("common", [0.45, 2.2, 1.0j, -0.3])
@@ -61,7 +57,6 @@ def test_cells_that_cannot_be_right_correct_nothing_but_are_told(common):
     (miss,), found = load_misses([loaded(common * np.array([0.98, 1.0, 1.02]))])
     np.testing.assert_array_equal(miss.size, 0.0)
     np.testing.assert_array_equal(miss.sideways, 0.0)
-    assert miss.uncertainty == 0.0
     assert found == pytest.approx(common)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rigdata.operating_point import OperatingPoint
-from tests.dynamic.phasor_cases import complex_normal
-from tpjb_ident.phasors import extra_lines
+from tests.dynamic.phasor_cases import complex_normal, vector_channels
+from tpjb_ident.phasors import found_lines
 from tpjb_ident.phasors.channel_times import Samples
-from tpjb_ident.phasors.extra_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
+from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
 from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,
@@ -24,7 +24,7 @@ from tpjb_ident.phasors.frequency import (
 )
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import known_lines
-from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors, vector_channels
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.whole_record import fitted_whole
 
 RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
@@ -281,7 +281,7 @@ def test_no_more_lines_are_taken_than_can_be_fitted_the_lowest_first():
 
 def test_the_top_of_a_parabola_of_logarithms():
     for top in (-0.4, 0.0, 0.3):
-        assert extra_lines._vertex(np.exp(-((np.arange(-1, 2) - top) ** 2))) == pytest.approx(top)
-    assert extra_lines._vertex(np.ones(3)) == 0.0
-    assert extra_lines._vertex(np.array([2.0, 1.0, 2.0])) == 0.0
-    assert np.isfinite(extra_lines._vertex(np.array([0.0, 1.0, 0.0])))
+        assert found_lines.vertex(np.exp(-((np.arange(-1, 2) - top) ** 2))) == pytest.approx(top)
+    assert found_lines.vertex(np.ones(3)) == 0.0
+    assert found_lines.vertex(np.array([2.0, 1.0, 2.0])) == 0.0
+    assert np.isfinite(found_lines.vertex(np.array([0.0, 1.0, 0.0])))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.estimate.block_cases import Case, made, solved
-from tpjb_ident.estimate.arrowhead import CONSIDERED, NUMBERS, Sums, step
+from tpjb_ident.estimate.arrowhead import CONSIDERED, NUMBERS, Prior, Sums, step
 
 POINTS, PARAMETERS, BLOCKS, ROWS = 3, 5, 12, 6
 
@@ -29,6 +29,10 @@ def taken(point, r, J_h, J_t):
     return sums
 
 
+def shared(to_prior, precision, always=False):
+    return Prior(to_prior, precision, np.broadcast_to(always, to_prior.shape))
+
+
 def dense(point, r, J_h, J_t, to_prior, precision):
     """Least squares of all unknowns at once: rows of the blocks and of the priors."""
     rows = np.zeros((BLOCKS * ROWS + PARAMETERS, NUMBERS * POINTS + PARAMETERS))
@@ -45,7 +49,7 @@ def dense(point, r, J_h, J_t, to_prior, precision):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_step_is_the_dense_solve(seed):
     point, r, J_h, J_t, to_prior, precision = problem(seed)
-    found = step(taken(point, r, J_h, J_t), to_prior, precision, np.ones(PARAMETERS, dtype=bool))
+    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision, True), Prior.none(POINTS))
     unknowns, covariance = dense(point, r, J_h, J_t, to_prior, precision)
     numbers = NUMBERS * POINTS
     np.testing.assert_allclose(found.h.ravel(), unknowns[:numbers], rtol=1e-10, atol=1e-10)
@@ -55,7 +59,7 @@ def test_a_step_is_the_dense_solve(seed):
     factors = found.factors()
     for p in range(POINTS):
         part = slice(NUMBERS * p, NUMBERS * (p + 1))
-        total = found.records()[p] + factors[:, p].T @ factors[:, p]
+        total = found.records[p] + factors[:, p].T @ factors[:, p]
         np.testing.assert_allclose(total, covariance[part, part], rtol=1e-10, atol=1e-10)
 
 
@@ -63,7 +67,7 @@ def test_a_step_is_the_dense_solve(seed):
 def test_what_the_rows_do_not_tell_is_considered(weak):
     """Its value stays at its prior; the covariance is that of an estimator which takes it for known, and is wrong."""
     point, r, J_h, J_t, to_prior, precision = problem(7, weak)
-    found = step(taken(point, r, J_h, J_t), to_prior, precision, np.zeros(PARAMETERS, dtype=bool))
+    found = step(taken(point, r, J_h, J_t), shared(to_prior, precision), Prior.none(POINTS))
     np.testing.assert_array_equal(np.flatnonzero(~found.estimated), weak)
     np.testing.assert_array_equal(found.theta[list(weak)], to_prior[list(weak)])
     np.testing.assert_allclose(found.deviation[list(weak)], 1 / np.sqrt(precision[list(weak)]))
@@ -85,16 +89,56 @@ def test_what_the_rows_do_not_tell_is_considered(weak):
     factors = found.factors()
     for p in range(POINTS):
         part = slice(NUMBERS * p, NUMBERS * (p + 1))
-        total = found.records()[p] + factors[:, p].T @ factors[:, p]
+        total = found.records[p] + factors[:, p].T @ factors[:, p]
         np.testing.assert_allclose(total, covariance[part, part], rtol=1e-9, atol=1e-10)
     across = np.einsum("qa,qb->ab", factors[:, 0], factors[:, 1])[np.ix_(range(8), range(8))]
     assert np.isfinite(across).all()
 
 
+OWN = 3
+
+
+@pytest.mark.parametrize("weak", [(), (1,), (0, 2)])
+def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(weak):
+    """Value, deviation and every share of the covariance; what tells little is considered in either."""
+    point, r, J_h, J_t, to_prior, precision = problem(11, (3,))
+    rng = np.random.default_rng(12)
+    J_own, distance = rng.standard_normal((BLOCKS, ROWS, OWN)), rng.standard_normal((POINTS, OWN))
+    J_own[:, :, list(weak)] *= 1e-3
+    own = Prior(distance, rng.uniform(0.2, 2.0, (POINTS, OWN)), np.zeros((POINTS, OWN), dtype=bool))
+    sums = Sums.empty(POINTS, PARAMETERS, NUMBERS + OWN)
+    sums.add(point, r, np.concatenate([J_h, J_own], axis=2), J_t)
+    found = step(sums, shared(to_prior, precision), own)
+    everywhere = np.zeros((BLOCKS, ROWS, POINTS, OWN))
+    everywhere[np.arange(BLOCKS), :, point] = J_own
+    border = np.concatenate([J_t, everywhere.reshape(BLOCKS, ROWS, -1)], axis=2)
+    all_sums = Sums.empty(POINTS, PARAMETERS + POINTS * OWN)
+    all_sums.add(point, r, J_h, border)
+    joined = (np.concatenate([to_prior, distance.ravel()]), np.concatenate([precision, own.precision.ravel()]))
+    bordered = step(all_sums, shared(*joined), Prior.none(POINTS))
+    np.testing.assert_array_equal(found.own.estimated.ravel(), bordered.estimated[PARAMETERS:])
+    assert found.own.estimated.sum() <= POINTS * (OWN - len(weak))
+    for value, other in (
+        (found.h, bordered.h),
+        (found.theta, bordered.theta[:PARAMETERS]),
+        (found.own.change.ravel(), bordered.theta[PARAMETERS:]),
+        (found.own.deviation.ravel(), bordered.deviation[PARAMETERS:]),
+        (found.deviation, bordered.deviation[:PARAMETERS]),
+        (found.given, bordered.given),
+        (found.records, bordered.records),
+        (found.factors(), bordered.factors()[:PARAMETERS]),
+    ):
+        np.testing.assert_allclose(value, other, rtol=1e-9, atol=1e-10)
+    own_factors = bordered.factors()[PARAMETERS:].reshape(POINTS, OWN, POINTS, NUMBERS)
+    for k in range(OWN):
+        share = np.einsum("rpa,rpb->pab", own_factors[:, k], own_factors[:, k])
+        np.testing.assert_allclose(found.own_share(np.arange(OWN) == np.full((POINTS, 1), k)), share, atol=1e-10)
+
+
 def test_always_means_always():
     point, r, J_h, J_t, to_prior, precision = problem(8, (2,))
     always = np.arange(PARAMETERS) == 2
-    assert step(taken(point, r, J_h, J_t), to_prior, precision, always).estimated.all()
+    assert step(taken(point, r, J_h, J_t), shared(to_prior, precision, always), Prior.none(POINTS)).estimated.all()
 
 
 def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
@@ -102,14 +146,14 @@ def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
     for tells, estimated in ((0.81, False), (0.79, True)):
         assert (tells < CONSIDERED) is estimated
         sums = Sums(np.eye(8)[None], np.zeros((1, 8, 1)), np.zeros((1, 8)), np.array([[tells**-2 - 1]]), np.zeros(1))
-        assert step(sums, np.zeros(1), np.ones(1), np.array([False])).estimated[0] == estimated
+        assert step(sums, shared(np.zeros(1), np.ones(1)), Prior.none(1)).estimated[0] == estimated
 
 
 def test_without_any_parameter_the_points_stand_alone():
     point, r, J_h, _, _, _ = problem(9)
     sums = Sums.empty(POINTS, 0)
     sums.add(point, r, J_h, np.zeros((BLOCKS, ROWS, 0)))
-    found = step(sums, np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
+    found = step(sums, shared(np.zeros(0), np.zeros(0)), Prior.none(POINTS))
     for p in range(POINTS):
         mine = point == p
         alone = np.linalg.lstsq(J_h[mine].reshape(-1, NUMBERS), r[mine].ravel(), rcond=None)[0]

@@ -11,9 +11,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import use_units
+from tpjb_ident.compare.coefficient_table import read_rows
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports.formats import COLUMNS, FORMATS, ExportError, export_format, static_points
+from tpjb_ident.exports.formats import (
+    COLUMNS,
+    FORMATS,
+    ExportError,
+    check_format,
+    chosen_rows,
+    turning_counter_clockwise,
+)
 from tpjb_ident.exports.rotor_programs import (
     grids,
     ross_version,
@@ -23,7 +32,7 @@ from tpjb_ident.exports.rotor_programs import (
     write_xltrc,
 )
 from tpjb_ident.exports.structural import sep005
-from tpjb_ident.exports.table import write_csv, write_excel, write_mat, write_parquet
+from tpjb_ident.exports.table import write_csv, write_excel, write_mat, write_parquet, write_us
 from tpjb_ident.exports.write import export
 
 
@@ -41,9 +50,14 @@ SERIES = [(5000.0, 25.0), (5000.0, 10.0), (5000.0, 40.0), (2500.0, 25.0)]
 SIX = [(5000.0, f) for f in (10.0, 20.0, 25.0, 30.0, 40.0, 50.0)]
 
 
+def rows_of(frame):
+    """Rows as a writer gets them."""
+    return turning_counter_clockwise(chosen_rows(frame).table)
+
+
 @pytest.fixture
 def points():
-    return static_points(table(SERIES)).points
+    return rows_of(table(SERIES))
 
 
 @pytest.fixture(params=sorted(FORMATS))
@@ -55,19 +69,18 @@ def to(request):
 
 
 def test_points_are_grouped_and_sorted():
-    chosen = static_points(table(SERIES))
-    points = chosen.points
-    assert [(p.load, len(p.frequency)) for p in points] == [(2500.0, 1), (5000.0, 3)]
-    assert np.allclose(points[1].frequency, 2 * math.pi * np.array([10.0, 25.0, 40.0]))
-    assert points[1].coefficients["kxx"].tolist() == [5e8 + 10, 5e8 + 25, 5e8 + 40]
+    chosen = chosen_rows(table(SERIES))
+    assert chosen.table["static_load_N"].tolist() == [2500.0, 5000.0, 5000.0, 5000.0]
+    assert chosen.table["excitation_Hz"].tolist() == [25.0, 10.0, 25.0, 40.0]
+    assert chosen.table["kxx_N_per_m"].tolist()[1:] == [5e8 + 10, 5e8 + 25, 5e8 + 40]
     assert chosen.left_out == chosen.doubtful == ()
 
 
 def test_points_without_an_answer_are_left_out_aloud():
     frame = table(SERIES)
     frame.loc[3, "cyy_Ns_per_m"] = math.nan
-    chosen = static_points(frame)
-    assert [p.load for p in chosen.points] == [5000.0]
+    chosen = chosen_rows(frame)
+    assert chosen.table["static_load_N"].tolist() == [5000.0] * 3
     assert chosen.left_out == ("2.5 kN, 25 Hz",)
 
 
@@ -89,8 +102,8 @@ def test_ross_2_takes_the_excitation_for_its_frequency_and_says_not_to_migrate_i
     elements, heads = ross_elements(tmp_path, points, 2)
     element = elements["5000N_-90deg_22Hz_excitation"]
     assert {len(element[key]) for key in element if key[0] in "kc"} == {3}
-    assert np.allclose(element["frequency"], points[1].frequency)
-    assert element["kyx"] == points[1].coefficients["kyx"].tolist()
+    assert np.allclose(element["frequency"], 2 * math.pi * points["excitation_Hz"][1:])
+    assert element["kyx"] == points["kyx_N_per_m"].tolist()[1:]
     head = heads["5000N_-90deg_22Hz_excitation"]
     assert "# For ROSS 2, as chosen." in head
     assert "Do not migrate" in head
@@ -108,7 +121,7 @@ def over_speeds(frequencies):
         frame = table([(5000.0, line) for line in lines]).assign(shaft_speed_Hz=speed)
         frame["kxy_N_per_m"] = 1e6 * speed + 1e3 * frame["excitation_Hz"]
         frames.append(frame)
-    return static_points(pd.concat(frames)).points
+    return rows_of(pd.concat(frames))
 
 
 @pytest.mark.parametrize(
@@ -183,7 +196,23 @@ def test_rotor_programs_get_the_mirror_image_of_a_shaft_that_turns_clockwise(to,
     assert "mirrored, x to -x" in text
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+(?:[eE][+-]?\d+)?", text)]
     assert np.isclose(numbers, -frame["kxy_N_per_m"].iloc[0]).any()
-    assert written.chosen.points[0].direction == -60.0
+    assert set(written.chosen.table["static_load_direction_deg"]) == {-60.0}
+
+
+@pytest.mark.parametrize("to", ["ross", "xltrc", "dyrobes", "ansys"])
+def test_a_campaign_of_both_senses_leaves_with_both(to, tmp_path):
+    senses = [table(SERIES[:3]).assign(rotation=sense) for sense in ROTATIONS]
+    written = export(pd.concat(senses, ignore_index=True), to, tmp_path)
+    files = [name for name in written.files if name.startswith(to)]
+    mirrored = [name for name in files if "_mirrored" in name]
+    assert 2 * len(mirrored) == len(files) > 0
+    assert {name.replace("_mirrored", "") for name in mirrored} == set(files) - set(mirrored)
+    for name in files:
+        assert ("mirrored, x to -x" in (tmp_path / name).read_text(encoding="utf-8")) == (name in mirrored)
+    intervals = pd.read_csv(tmp_path / "bearing_coefficients_intervals.csv")
+    first, second = (intervals[intervals["kxy_N_per_m"] * sign > 0] for sign in (1, -1))
+    assert np.allclose(first["kyx_N_per_m"], -second["kyx_N_per_m"])
+    assert len(first) == len(second) == 3
 
 
 def test_tables_stay_in_the_frame_of_the_rig_and_say_how_the_shaft_turns(tmp_path):
@@ -201,14 +230,24 @@ def test_csv_has_speed_in_rpm_and_frequency_in_rad_per_s(tmp_path, points):
     assert frame["frequency_rad_per_s"].iloc[0] == pytest.approx(2 * math.pi * 25)
 
 
+def test_exported_tables_are_read_back_at_their_own_frequencies(tmp_path, points):
+    write_csv(tmp_path, points, "c")
+    write_us(tmp_path, points, "bearing_coefficients")
+    for name in ("bearing_coefficients.csv", "bearing_coefficients_us.csv"):
+        rows = read_rows(tmp_path / name)
+        assert [row.point.excitation / (2 * math.pi) for row in rows] == pytest.approx(list(points["excitation_Hz"]))
+        assert [row.point.static_load for row in rows] == pytest.approx(list(points["static_load_N"]))
+        assert [row.k[1, 1] for row in rows] == pytest.approx(list(points["kyy_N_per_m"]))
+
+
 def test_matlab_gets_matrices(tmp_path, points):
     from scipy.io import loadmat
 
     write_mat(tmp_path, points, "c")
     bearing = loadmat(tmp_path / "bearing_coefficients.mat")["bearing"].ravel()
     assert bearing[1]["K"].shape == (2, 2, 3)
-    assert bearing[1]["K"][0, 1, 2] == points[1].coefficients["kxy"][2]
-    assert bearing[1]["C"][1, 0, 0] == points[1].coefficients["cyx"][0]
+    assert bearing[1]["K"][0, 1, 2] == points["kxy_N_per_m"][3]
+    assert bearing[1]["C"][1, 0, 0] == points["cyx_Ns_per_m"][1]
 
 
 @pytest.mark.parametrize(
@@ -221,12 +260,12 @@ def test_matlab_gets_matrices(tmp_path, points):
 )
 def test_what_cannot_be_exported_is_refused(change, says):
     with pytest.raises(ExportError, match=says):
-        static_points(change(table(SERIES)))
+        chosen_rows(change(table(SERIES)))
 
 
 def test_an_unknown_format_is_answered_with_the_nearest():
     with pytest.raises(ExportError, match="Did you mean 'dyrobes'"):
-        export_format("dyrobe")
+        check_format("dyrobe")
 
 
 def doubtful_table():
@@ -242,7 +281,7 @@ def doubtful_table():
 
 def test_what_is_not_to_be_trusted_stays_behind(to, tmp_path):
     written = export(doubtful_table(), to, tmp_path)
-    assert [len(p.frequency) for p in written.chosen.points] == [2]
+    assert written.chosen.table["excitation_Hz"].tolist() == [10.0, 25.0]
     assert len(written.chosen.doubtful) == 2
     assert "kxx is negative (-64 MN/m)" in written.chosen.doubtful[0]
     assert "ill-conditioned" in written.chosen.doubtful[1]
@@ -301,7 +340,7 @@ def test_parquet_keeps_the_numbers_and_their_source(tmp_path, points):
     read = pq.read_table(tmp_path / "bearing_coefficients.parquet")
     assert read.num_rows == 4
     assert read.schema.metadata[b"source"] == b"campaign x"
-    assert read.column("kxx_N_per_m")[1].as_py() == points[1].coefficients["kxx"][0]
+    assert read.column("kxx_N_per_m")[1].as_py() == points["kxx_N_per_m"][1]
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@"])
@@ -315,7 +354,7 @@ def test_no_text_of_an_excel_file_is_a_formula(tmp_path, points, start):
     sheet = book["coefficients"]
     assert sheet.max_row == 5
     names = [cell.value for cell in sheet[1]]
-    assert sheet.cell(3, names.index("kxx_N_per_m") + 1).value == points[1].coefficients["kxx"][0]
+    assert sheet.cell(3, names.index("kxx_N_per_m") + 1).value == points["kxx_N_per_m"][1]
 
 
 def test_an_excel_file_without_its_library_names_the_extra(tmp_path, points, monkeypatch):
@@ -329,7 +368,7 @@ def test_an_excel_file_without_its_library_names_the_extra(tmp_path, points, mon
 def speeds():
     frame = pd.concat([table([(5000.0, 25.0), (2500.0, 25.0)]).assign(shaft_speed_Hz=s) for s in (33.0, 22.0)])
     frame["kyx_N_per_m"] = frame["shaft_speed_Hz"] * 1e6
-    return static_points(frame).points
+    return rows_of(frame)
 
 
 def test_programs_over_speed_get_one_file_per_load_and_frequency(tmp_path):
@@ -395,16 +434,16 @@ def test_every_format_writes_us_units_or_refuses_them_by_name(to, tmp_path):
     stem = "bearing_coefficients_intervals" if rotor else "bearing_coefficients"
     assert f"{stem}_us.csv" in written.files
     table_us = pd.read_csv(tmp_path / f"{stem}_us.csv")
-    point = written.chosen.points[1]
+    point = written.chosen.table.query("static_load_N == 5000")
     at_point = np.isclose(table_us["static_load_lbf"], 5000.0 / 4.4482216152605)
-    assert np.allclose(table_us["kxy_lbf_per_in_hi"][at_point], point.high["kxy"] / LBF_PER_INCH)
-    assert np.allclose(table_us["cyy_lbfs_per_in"][at_point], point.coefficients["cyy"] / LBF_PER_INCH)
+    assert np.allclose(table_us["kxy_lbf_per_in_hi"][at_point], point["kxy_N_per_m_hi"] / LBF_PER_INCH)
+    assert np.allclose(table_us["cyy_lbfs_per_in"][at_point], point["cyy_Ns_per_m"] / LBF_PER_INCH)
     assert table_us["shaft_speed_rpm"].unique().tolist() == [1320.0]
     assert not [name for name in table_us if re.search(r"_N\b|_N_|_Ns_|_m\b", name)]
     if rotor:
         path = tmp_path / f"{to}_5000N_-90deg_25Hz.txt"
         cells, units = rows_of_a_rotor_program(path, to)
-        at_25_hz = [values[1] for values in point.coefficients.values()]
+        at_25_hz = point[list(COLUMNS.values())].iloc[1]
         assert np.allclose(cells[0], [1320.0, *(value / LBF_PER_INCH for value in at_25_hz)], rtol=1e-6)
         assert units == {"xltrc": ["rpm", *["lbf/in"] * 4, *["lbf-s/in"] * 4], "dyrobes": 2, "ansys": 1}[to]
         text = path.read_text(encoding="utf-8")
@@ -442,7 +481,7 @@ def test_the_command_line_exports_us_units_and_refuses_them_for_ross(tmp_path):
 
 def test_a_synchronous_prediction_is_named_so():
     frame = pd.concat([table([(5000.0, s)]).assign(shaft_speed_Hz=s) for s in (20.0, 30.0)])
-    (grid,) = grids(static_points(frame).points, "speed")
+    (grid,) = grids(rows_of(frame), "speed")
     assert grid.name(grid.line) == "5000N_-90deg_synchronous"
     assert grid.speed.tolist() == [20.0, 30.0]
 
@@ -507,9 +546,9 @@ def test_ross_itself_reads_what_was_written(tmp_path):
     python = os.environ.get("TPJB_ROSS_PYTHON", sys.executable)
     if subprocess.run([python, "-c", "import ross"], capture_output=True, cwd=tmp_path).returncode:
         pytest.skip("ross-rotordynamics is not installed; TPJB_ROSS_PYTHON can name a Python that has it")
-    write_ross(tmp_path, static_points(table([*SIX, (2500.0, 25.0)])).points, "c", 2)
+    write_ross(tmp_path, rows_of(table([*SIX, (2500.0, 25.0)])), "c", 2)
     campaign = ti.load_campaign("rigdata/samples/demo.h5")
-    write_ross(tmp_path, static_points(ti.identify(campaign).to_frame()).points, "demo", 2)
+    write_ross(tmp_path, rows_of(ti.identify(campaign).to_frame()), "demo", 2)
     done = subprocess.run([python, "-c", ROSS, str(tmp_path)], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.count("read ross_") == len(list(tmp_path.glob("ross_*.toml")))

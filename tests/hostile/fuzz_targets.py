@@ -302,7 +302,7 @@ def table_target(folder: Path) -> Target:
     """A table of coefficients that comes back: what is taken is finite, possible and within its intervals."""
     from tpjb_ident.compare.coefficient_table import read_coefficients
     from tpjb_ident.errors import BadInputError
-    from tpjb_ident.exports.formats import ExportError, static_points
+    from tpjb_ident.exports.formats import COLUMNS, ExportError, chosen_rows
     from tpjb_ident.runtime.table_reader import read_table
 
     path = folder / "coefficients.csv"
@@ -315,11 +315,11 @@ def table_target(folder: Path) -> Target:
                 assert 0 < row.point.static_load < math.inf
                 assert 0 < row.point.shaft_speed < math.inf
                 assert all(math.isfinite(v) and 0 <= e < math.inf for v, e in row.coefficients.values())
-        for point in static_points(frame).points:
-            assert (point.frequency >= 0).all()
-            for name, values in point.coefficients.items():
-                low, high = point.low[name], point.high[name]
-                assert not ((values < low) | (values > high) | (low > high)).any()
+        points = chosen_rows(frame).table
+        assert (points["excitation_Hz"] >= 0).all()
+        for name in COLUMNS.values():
+            values, low, high = (points[name + end] for end in ("", "_lo", "_hi"))
+            assert not ((values < low) | (values > high) | (low > high)).any()
 
     return Target("table", _coefficient_tables(), feed, (BadInputError, ExportError))
 

@@ -21,7 +21,8 @@ DAMAGED = Path(__file__).parent / "damaged"
 
 def through_the_wall(folder, monkeypatch, read_in_sandbox):
     """What a reader of that kind gives, written and read back."""
-    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.talks", SimpleNamespace(read_in_sandbox=read_in_sandbox))
+    talks = SimpleNamespace(talks=read_in_sandbox)
+    monkeypatch.setitem(sys.modules, "rigdata.readers.formats.loggers", talks)
     monkeypatch.setattr(sandbox, "_limit_memory", lambda path: None)
     sandbox.main("talks", folder, folder / "answer.npz")
     return sandbox._answered(folder / "answer.npz")
@@ -71,7 +72,7 @@ def test_a_child_that_does_not_end_is_ended(tmp_path, monkeypatch):
     path.write_bytes(b"x")
     monkeypatch.setattr(sandbox, "SECONDS", 0.001)  # ten times that: less than Python takes to start
     with pytest.raises(RigDataError, match="took longer than 0 s"):
-        sandbox.read_sandboxed("mdf4", path)
+        sandbox.read_sandboxed("mdf_in_sandbox", path)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell script stands for the child")
@@ -84,7 +85,7 @@ def test_what_a_dying_child_leaves_in_the_temporary_folder_is_cleared_away(tmp_p
     monkeypatch.setattr(tempfile, "tempdir", str(shelf))
     monkeypatch.setattr(sys, "executable", str(dying))
     with pytest.raises(RigDataError, match="exit status 9"):
-        sandbox.read_sandboxed("mdf4", path)
+        sandbox.read_sandboxed("mdf_in_sandbox", path)
     assert Path(told.read_text().strip()).parent == shelf
     assert list(shelf.iterdir()) == []
 

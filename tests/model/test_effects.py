@@ -36,7 +36,8 @@ NAMES = {
     "supply_temperature", "hot_oil_carryover", "pad_bending", "housing_flexibility", "fluid_inertia",
     "pivot_rotation", "pivot_damping", "misalignment", "starvation", "probe_gain", "probe_rotation",
     "loadcell_gain", "loadcell_crosstalk", "channel_delay", "housing_mass", "structure_compliance", "uneven_pads",
-    "viscosity_law", "heat_loss", "pad_conduction", "pivot_rolling", "pivot_friction",
+    "viscosity_law", "heat_loss", "pad_conduction", "pivot_rolling", "pivot_friction", "one_probe_gain",
+    "one_cell_gain", "thermometer_offset", "pad_bore", "clearance_error", "pivot_offset_error",
 }  # fmt: skip
 HOUSING_MASS, CELLS = 30.0, np.array([4.0e8, 6.0e8])
 
@@ -60,7 +61,8 @@ def same(p: Prediction, q: Prediction, tolerance: float = 1e-10) -> None:
 
 def neutral(name: str) -> Effect:
     values = {p.name: p.neutral for p in known_effects()[name].parameters_of(5)}
-    return Effect(name, **{k: (2 if k == "pad" else 0.3) if math.isnan(v) else v for k, v in values.items()})
+    places = {"pad": 2, "probe": 1, "cell": 2}
+    return Effect(name, **{k: places.get(k, 0.3) if math.isnan(v) else v for k, v in values.items()})
 
 
 def typical(name: str) -> Effect:

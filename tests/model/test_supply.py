@@ -15,9 +15,11 @@ from model.bearing_file import load_bearing, parse_bearing
 from model.effects import Effect
 from model.film.cavitation import solve_film_jfo
 from model.film.mesh import film_grid, film_work
+from model.film.oil_state import set_viscosity
 from model.film.reynolds import solve_film
 from model.options import Options
 from model.predict import predict
+from model.statics.pad_film import oil_constants
 
 SPEED, DOWN, COARSE = 2 * math.pi * 60.0, -math.pi / 2, (40, 4)
 CLEARANCE, SURFACE = 1e-4, 20.0
@@ -143,3 +145,42 @@ def test_a_bearing_file_states_flow_and_pressure(rocker):
     with pytest.raises(BearingError, match=r"\[oil\] supply_flow: must be positive"):
         parse_bearing(text.replace("[oil]", '[oil]\nsupply_flow = "0 L/min"'), "bearing.toml")
     assert rocker.oil.supply_flow == math.inf
+
+
+def attitudes_without_moment(p, pad: int) -> int:
+    """How many wedges of a pad's film, at the journal's place and its groove's flow, leave no moment."""
+    film = p.equilibrium.films[pad - 1]
+    oil = p.setup.bearing.oil
+    set_viscosity(film.work, oil_constants(oil))
+    surface, approach = p.speed * p.setup.bearing.journal_radius, film.rigid_approach(p.equilibrium.position)
+    moments = []
+    for wedge in np.linspace(-4e-5, 1.2e-4, 161).tolist():
+        film.work.ruptured[:] = False
+        shape = (film.pad.pad_clearance, approach, wedge)
+        forces = solve_film_jfo(film.grid, film.work, shape, surface, False, (1.0, film.supplied))
+        moments.append(forces.force[1] if forces.steps > 0 and forces.force[0] > 1.0 else math.nan)
+    signs = np.sign(moments)
+    return int(np.sum(signs[1:] * signs[:-1] < 0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rocker", "spherical"])
+def test_a_pad_whose_oil_fills_no_gap_idles(request, name):
+    bearing = request.getfixturevalue(name)
+    point = {"load_direction": DOWN, "speed": 138.23, "mesh": COARSE, "thermal": "isothermal", **CONSERVING}
+    flooded = predict(bearing, 5000.0, **point)
+    drawn = sum(flow.inflow for flow in flooded.pad_flow)
+    idle = []
+    for share in (1.4, 1.0, 0.9, 0.75, 0.6):
+        p = predict(fed(bearing, 60e3 * share * drawn), 5000.0, **point)
+        assert p.converged, (share, p.status)
+        idle.append(set(p.idle_pads))
+        for pad in p.idle_pads:
+            assert attitudes_without_moment(p, pad) == 0
+        (said,) = [c for c in p.status if "short of oil" in c] or [None]
+        assert idle[-1] <= set(said.pads if said else ())
+        carried = sum(p.pad_load[k] * np.array([math.cos(x.pivot_angle), math.sin(x.pivot_angle)])
+                      for k, x in enumerate(bearing.pads))  # fmt: skip
+        np.testing.assert_allclose(carried, [0.0, -5000.0], atol=5.0)
+    assert idle[0] <= idle[1] <= idle[2] <= idle[3] <= idle[4]
+    assert idle[-1]

@@ -13,6 +13,8 @@ import pytest
 from rigdata.problem import RigDataError
 from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import refuse_flat_channels
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
@@ -36,8 +38,6 @@ from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_behind
 from tpjb_ident.pivot.steps import Hold
-from tpjb_ident.slow_records.bad_samples import refuse_flat_channels
-from tpjb_ident.slow_records.noise import NoiseModel
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LEVELS = np.arange(500.0, 5001.0, 500.0)

@@ -13,10 +13,10 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError
 from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, record, vectors
 from tests.pivot.test_assemble import Run as FirstPad
+from tpjb_ident.phasors.slow_samples import _repeated, refuse_flat_channels
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import check_placement
-from tpjb_ident.slow_records.bad_samples import _repeated, refuse_flat_channels
 
 LEVELS = 500.0 * np.arange(1, 9)
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from tpjb_ident.phasors.slow_noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.blocks import Blocks
 from tpjb_ident.pivot.dry_record import PickupSignature, measure_pickup, noise_about_curve, noise_within_holds
 from tpjb_ident.pivot.refusals import _mismatch, mistakes
-from tpjb_ident.slow_records.noise import DRIFT_OVER_FLICKER, NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 BLOCK = 0.1
 

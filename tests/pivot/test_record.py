@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tpjb_ident.phasors.slow_samples import good_samples
 from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
 from tpjb_ident.pivot.steps import Hold, find_holds
-from tpjb_ident.slow_records.bad_samples import good_samples
 
 RATE = 500.0
 

@@ -22,12 +22,12 @@ from rigdata.record import VectorRecord
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.clearance.polygon import corners
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.curve import PivotCurve, PivotSteps
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.report import plots
-from tpjb_ident.slow_records.noise import NoiseModel
 
 PICTURES = Path(__file__).parent / "pictures"
 DPI = 60

@@ -11,7 +11,8 @@ from model.effects import kind_of, known_effects
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, words_of
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 from tpjb_ident.report.diagnosis_page import _evidence_sections, _other_explanations, _row
-from tpjb_ident.report.diagnosis_words import in_words, place
+from tpjb_ident.report.diagnosis_words import in_words, place, verdict_sentences
+from tpjb_ident.rounding import signed
 
 
 def found(value, half, unit):
@@ -117,12 +118,14 @@ def test_a_rival_that_the_data_do_not_rule_out_stands_beside_the_name(alone, bot
     assert section.notes[0].endswith(says)
 
 
-def test_a_tolerance_beyond_three_deviations_is_said_under_its_table():
+def test_a_tolerance_beyond_three_deviations_is_said_with_its_size():
     assumptions = tuple(Assumption(name, 0.05, -0.1, "1", "default", far) for name, far in (
         ("viscosity", -3.2), ("film_heat", 2.9), ("probe_gain", 0.0),
     ))  # fmt: skip
     left = Remainder(0.2, 0.0, "kyy", 0.5)
     verdict = Verdict("consistent", (), (), (), "", (), (), {}, {}, left, assumptions=assumptions)
     section = _evidence_sections(verdict)[-1]
-    assert section.notes[1:] == ["The viscosity is 3.2 standard deviations from what is stated: check it."]
+    beyond = [sentence for sentence in verdict_sentences("rig", verdict) if "without a name" in sentence]
+    size = signed(-10.0)
+    assert beyond == [f"Beyond what is stated, without a name: viscosity {size} %, 3.2 standard deviations."]
     assert [row[-1] for row in section.tables[0].rows] == ["−3.2", "+2.9", ""]

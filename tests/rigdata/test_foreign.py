@@ -173,7 +173,7 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
 
     (tmp_path / "a.tdms").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    monkeypatch.delitem(sys.modules, "rigdata.readers.formats.tdms", raising=False)
+    monkeypatch.delitem(sys.modules, "rigdata.readers.formats.loggers", raising=False)
     with pytest.raises(RigDataError, match=r'pip install "tpjb-ident\[tdms\]"'):
         read_series(tmp_path / "a.tdms", "a.tdms")
 
@@ -269,9 +269,11 @@ def test_times_by_name(name):
 
 
 def test_times_in_other_units():
-    np.testing.assert_allclose(seconds(np.array([1.0, 2.0]), "[ms]"), [1e-3, 2e-3])
+    for name, unit in (("Zeit", "[ms]"), ("time_ms", ""), ("time (ms)", ""), ("t [ms]", "")):
+        np.testing.assert_allclose(seconds(Series(name, unit, np.array([1.0, 2.0]))), [1e-3, 2e-3])
+    np.testing.assert_allclose(seconds(Series("t", "", np.array([1.0, 2.0]))), [1.0, 2.0])
 
 
 def test_a_signalling_nan_among_times_is_a_missing_time():
     times = np.array([0, 0x7FF0000000000001, 0x4000000000000000], dtype="u8").view("f8")
-    np.testing.assert_array_equal(seconds(times, "ms"), [0.0, np.nan, 0.002])
+    np.testing.assert_array_equal(seconds(Series("t", "ms", times)), [0.0, np.nan, 0.002])

@@ -44,7 +44,7 @@ def test_stamps_of_several_countries_are_seconds_from_the_first(tmp_path, stamp,
     np.testing.assert_allclose(record.time, TIME, atol=1e-7)
     np.testing.assert_allclose(record.values, 1e-6 * X, atol=1e-14)
     export = read_export(tmp_path / "one.csv")
-    assert export.clock == name
+    assert list(export.clocks) == [name]
     assert [s.name for s in export.series] == ["X1A"]
     assert export.rate == pytest.approx(RATE, rel=1e-6)
 
@@ -53,7 +53,7 @@ def test_a_column_of_dates_beside_the_times_is_no_trouble(tmp_path):
     rows = [f"22.07.2019;11:31:{22 + t:09.6f};{x:.9f}" for t, x in zip(TIME, X)]
     (tmp_path / "one.csv").write_text("\n".join(["Datum;Uhrzeit;X1A", *rows]) + "\n")
     export = read_export(tmp_path / "one.csv")
-    assert (export.clock, [s.name for s in export.series]) == ("Uhrzeit", ["X1A"])
+    assert (list(export.clocks), [s.name for s in export.series]) == (["Uhrzeit"], ["X1A"])
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from rigdata.readers.text.head import find_head
 from rigdata.survey.channels import guess_channel, usable_unit
 from rigdata.survey.draft import draft_manifest
 from rigdata.survey.exports import Export, read_exports, record_files
-from rigdata.survey.runs import guess_run
+from rigdata.survey.runs import _load_of, guess_run
 from rigdata.survey.spectrum import look_at
 from rigdata.survey.survey import survey
 from rigdata.virtual_rig import DryTest, locus_points, operating_points
@@ -56,8 +56,8 @@ def test_kinds_and_set_points_are_guessed_right(found):
     by_name = {run.file.rpartition("/")[2]: run for run in found.runs}
     kinds = {name[0]: run.kind.value for name, run in by_name.items()}
     assert kinds == {"c": "clearance", "d": "dynamic", "l": "locus", "p": "dry_pivot"}
-    assert found.clock == "Zeit"
-    assert found.speed_line == pytest.approx(22.0, abs=0.3)
+    assert {name: unit.value for name, unit in found.clocks.items()} == {"Zeit": "s"}
+    assert by_name["d-02500-25-01.csv"].speed.number == pytest.approx(22.0, abs=0.3)
     for name, load, line in (("d-02500-25-01.csv", 2500.0, 25.0), ("d-05000-40-02.csv", 5000.0, 40.0)):
         assert by_name[name].load.value == load
         assert by_name[name].lines[0].frequency == pytest.approx(line, abs=0.2)
@@ -118,6 +118,9 @@ def _calibrations(manifest: str) -> dict[str, str]:
         ("oil", "°C", "temperature", ""),
         ("p_supply", "bar", "pressure", ""),
         ("Zeit", "s", "time", ""),
+        ("time_ms", "", "time", ""),
+        ("Kraft waagrecht", "kN", "force", "0 deg"),
+        ("Stützkraft senkrecht", "N", "force", "90 deg"),
         ("spare", "V", "", ""),
         ("=cmd|' /C calc'!A0", "sheep", "", ""),
     ],
@@ -127,6 +130,51 @@ def test_channels_are_guessed_by_unit_first_then_by_name(name, unit, quantity, a
     assert (guess.quantity.value or "") == quantity
     assert (f"{guess.hint:g} deg" if math.isfinite(guess.hint) else "") == axis
     assert guess.axis.value is None  # a name is no measurement
+
+
+def _table(times, clock):
+    """A text of 2000 samples of a probe, its times in a column `clock`."""
+    return "\n".join([f"{clock},X1A", *(f"{time:.6g},{np.sin(0.2 * i):.5f}" for i, time in enumerate(times))]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("clock", "step", "unit", "rate", "mark"),
+    [
+        ("t", 0.001, "s", 1000.0, ""),
+        ("t", 1.0, "ms", 1000.0, "guess"),  # nobody records a shaft at 1 Hz
+        ("t", 0.1, "ms", 10_000.0, "guess"),
+        ("time_ms", 1.0, "ms", 1000.0, ""),
+        ("Zeit (ms)", 1.0, "ms", 1000.0, ""),
+        ("time (s)", 1.0, "s", 1.0, ""),  # stated, so it holds
+    ],
+)
+def test_times_without_a_unit_are_those_of_a_recorder(tmp_path, clock, step, unit, rate, mark):
+    (tmp_path / "a.csv").write_text(_table(step * np.arange(2000), clock), "utf-8")
+    exports = list(read_exports(tmp_path, []))
+    found = survey(exports)
+    (entry,) = found.clocks.values()
+    assert (entry.value, entry.source.removeprefix("file")) == (unit, mark)
+    assert found.rates == (pytest.approx(rate),)
+    text = draft_manifest(found, "a", "b.toml")
+    assert (f'unit = "{unit}"   # (guess) not stated' in text) == bool(mark)
+    typed = survey(exports, {clock.partition(" ")[0]: {"unit": "s"}})
+    assert typed.rates == (pytest.approx(1.0 / step if mark else rate),)
+
+
+@pytest.mark.parametrize(
+    ("stem", "newtons", "text", "source"),
+    [
+        ("dyn_1349lbf_25Hz", 1349 * 4.4482216152605, "1349 lbf", "file"),
+        ("306kgf 25Hz", 306 * 9.80665, "306 kgf", "file"),
+        ("5,5kn-1320rpm", 5500.0, "5.5 kN", "file"),
+        ("1.5klbf", 6672.3324228907, "1.5 klbf", "file"),
+        ("d-05000-25-01", 5000.0, "5 kN", "guess"),
+        ("run 1320rpm 03", math.nan, "", ""),
+    ],
+)
+def test_loads_in_names_of_files_have_any_unit_of_force(stem, newtons, text, source):
+    entry, written = _load_of(stem)
+    assert (entry.number, written, entry.source) == (pytest.approx(newtons, nan_ok=True), text, source)
 
 
 def test_units_are_spelt_as_a_manifest_spells_them():

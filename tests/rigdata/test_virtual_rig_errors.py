@@ -19,7 +19,7 @@ from rigdata.virtual_rig import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.ledger import apparent_stiffness, campaign_truth
+from rigdata.virtual_rig.campaign import apparent_stiffness, campaign_truth
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 

@@ -79,7 +79,7 @@ def test_channel_faults_change_that_channel_of_that_run(kind):
 
 
 def test_every_spoiling_fault_is_tested_here():
-    of_records = {kind for kind, (place, _) in KINDS.items() if place == "record"}
+    of_records = {kind for kind, (place, _, _) in KINDS.items() if place == "record"}
     assert of_records - {"swapped", "time_gap", "time_jitter"} == set(CHANNEL_FAULTS) | {"clipped"}
 
 
@@ -218,7 +218,7 @@ def test_the_truth_tells_all_faults(tmp_path):
     fault = Fault("dead", FIRST, "X1A")
     truth = write_campaign(tmp_path / "c.h5", rig(fault))
     assert truth.faults == ({"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0},)
-    assert all(text for _, text in KINDS.values())
+    assert all(text for _, _, text in KINDS.values())
     assert replace(fault, run="*").affects(SECOND)
     assert fault.is_in("X1A")
     assert not fault.is_in("X1B")

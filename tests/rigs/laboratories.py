@@ -1,4 +1,4 @@
-"""Exports of five laboratories, each from its files to the coefficients by the README and the guide alone.
+"""Exports of six laboratories, each from its files to the coefficients by the README and the guide alone.
 
     python -m tests.rigs.laboratories [--docs]
 

@@ -1,4 +1,4 @@
-"""Exports of five laboratories, of a rig in closed form: numbers are chosen here, nothing of the toolkit takes part.
+"""Exports of six laboratories, of a rig in closed form: numbers are chosen here, nothing of the toolkit takes part.
 
 A five-pad bearing with known K and C, pivots and clearances is loaded in dry steps toward every pad, swept around its
 clearance and shaken at two loads and two frequencies in two directions; each laboratory has probes, cells, units, names
@@ -7,6 +7,8 @@ of columns and names of files of its own.
 
 from __future__ import annotations
 
+import datetime
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +26,7 @@ ASIDE = (0.4, -0.6, 0.2, -0.3, 0.5)  #: how far the dry steps pull beside their 
 STEPS = tuple(500.0 * (i + 1) for i in range(10))
 PUSH = 200.0
 RATE, SLOW_RATE = 1000.0, 250.0
-LBF, MIL, G = 4.4482216152605, 25.4e-6, 9.80665
+LBF, KGF, MIL, G = 4.4482216152605, 9.80665, 25.4e-6, 9.80665
 Table = dict[str, np.ndarray]
 
 
@@ -188,6 +190,20 @@ def _german(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     path.with_suffix(".csv").write_text("\r\n".join(lines) + "\r\n", "cp1252", newline="")
 
 
+def _times_of_day(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
+    """Two devices side by side, one at half the rate, each with its times of day; an empty column between them."""
+    start = datetime.datetime(2021, 3, 12, 23, 59, 58)  # midnight comes in between
+    columns = []
+    for title, table, every in (("Uhrzeit Gerät A", fast, 1), ("", {}, 1), ("Uhrzeit Gerät B", other, 2)):
+        stamps = [start + datetime.timedelta(seconds=float(second)) for second in time[::every]]
+        columns.append([title, *(f"{stamp:%H:%M:%S,%f}"[:-2] for stamp in stamps if title)])
+        for name, values in table.items():
+            columns.append([name, *(f"{value:.5f}".replace(".", ",") for value in values[::every])])
+    lines = ["Prüfling: ölgeschmiertes Kippsegmentlager; Prüfer: Jörg Groß", "Gerät A: 1 kHz; Gerät B: 500 Hz", ""]
+    lines += [";".join(row) for row in itertools.zip_longest(*columns, fillvalue="")]
+    path.with_suffix(".csv").write_text("\r\n".join(lines) + "\r\n", "cp1252", newline="")
+
+
 def _tdms(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """Two devices: probes of one, everything else of another at half the rate; units as properties."""
     import nptdms
@@ -235,8 +251,10 @@ def _parquet(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
 def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Planned], str]:
     def title(test: Planned) -> str:
         form = {"dynamic": dynamic, "dry": dry, "clearance": sweep}[test.kind]
-        kn, lbf = f"{test.load / 1e3:g}", f"{test.load / LBF:.0f}"
-        return form.format(kn=kn, lbf=lbf, n=f"{test.load:.0f}", f=f"{test.frequency:g}", pad=test.pad, i=test.number)
+        kn, lbf, kgf = f"{test.load / 1e3:g}", f"{test.load / LBF:.0f}", f"{test.load / KGF:.0f}"
+        return form.format(
+            kn=kn, lbf=lbf, kgf=kgf, n=f"{test.load:.0f}", f=f"{test.frequency:g}", pad=test.pad, i=test.number
+        )
 
     return title
 
@@ -313,6 +331,17 @@ LABORATORIES = (
         _named("dyn_{lbf}lbf_{f}Hz_{i}", "pad{pad}_dry_steps", "clearance_sweep"),
         _parquet,
         loads=(674 * LBF, 1349 * LBF),
+        edits=_MASS,
+    ),
+    Laboratory(
+        "CSV of two devices, times of day",
+        _rig(_channels("Abstand oben links [mil], Abstand oben rechts [mil], Stützkraft waagrecht [kgf], "
+                       "Stützkraft senkrecht [kgf], Gehäuse waagrecht [m/s²], Gehäuse senkrecht [m/s²], "
+                       "Öltemperatur [°C], Welle [U/min]"),
+             (135.0, 45.0), {"x": 1 / MIL, "f": 1 / KGF, "a": 1.0, "t": 1.0, "n": 60.0}),
+        _named("Erregung {kgf}kgf {f}Hz Nr {i:02d}", "Kippsegment {pad} trocken", "Lagerspiel"),
+        _times_of_day,
+        loads=(306 * KGF, 612 * KGF),
         edits=_MASS,
     ),
 )  # fmt: skip

@@ -21,10 +21,10 @@ EXTENSION_POINTS = {
     "an effect": ("model/effects/kind.py:EffectKind", "model/setup.py:Setup"),
     "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
     "a film": ("model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
-    "a reader": ("rigdata/readers/formats/*.py:read_series", "rigdata/readers/*.py:Series"),
+    "a reader": ("rigdata/readers/formats/*.py:read_[!s]*", "rigdata/readers/*.py:Series"),
     "an estimator": ("tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",),
     "a term": ("tpjb_ident/estimate/term.py:Term",),
-    "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "StaticPoint", "Export", "Format")),
+    "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "Chosen", "Export")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
     "a plot": ("tpjb_ident/report/plots/*.py:=",),
     "what a face returns": (

@@ -25,13 +25,12 @@ FILES_TOO_LONG, FUNCTIONS_WITH_MANY_PARAMETERS = 0, 3
 #: What each room of `tpjb_ident` may import of the others; single files (errors, arrays, ...) are free to all.
 MAY_IMPORT = {
     "runtime": set(),
-    "slow_records": {"rigdata"},
     "estimate": {"rigdata"},
     "terms": {"rigdata", "estimate"},
     "phasors": {"rigdata"},
     "check": {"rigdata", "phasors", "estimate", "terms"},
-    "pivot": {"rigdata", "runtime", "slow_records"},
-    "clearance": {"rigdata", "runtime", "slow_records", "pivot"},
+    "pivot": {"rigdata", "runtime", "phasors"},
+    "clearance": {"rigdata", "runtime", "phasors", "pivot"},
     "dynamic": {"rigdata", "runtime", "phasors", "check", "estimate", "terms"},
     "identification": {"rigdata", "runtime", "phasors", "check", "dynamic", "estimate", "terms"},
     "exports": {"dynamic", "runtime"},

@@ -6,7 +6,8 @@ ROSS is not a dependency: it runs in an interpreter of its own choice, with `ros
 (in its repository since 2026-08; releases up to 2.3.0 lack it). Without one there is nothing to compare with, and a
 message says so. The case is the references' (`../shared/references`): the paper's rocker bearing, isoviscous,
 1320 rpm, 5 kN on pad #1, synchronous; and adiabatic, where the two models differ in what enters a pad (ROSS mixes a
-groove: its carry-over is set to zero). Times are processor times of the solution alone, least of the repeats.
+groove: its carry-over is set to zero, or to the same share). Cross terms: the largest of the four, over the mean direct
+coefficient. Times are processor times of the solution alone, least of the repeats.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ import math
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from model.bearing import Bearing
 from model.bearing_file import load_bearing
+from model.effects import Effect
 from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Mesh
@@ -31,6 +34,7 @@ from tests.studies.results import table, write_section
 FILE = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.toml"
 VISCOSITY, SPEED, LOAD = 0.03956, 2 * math.pi * 22.0, 5000.0
 NAMES = ("kxx", "kyy", "cxx", "cyy")
+CROSS = ("kxy", "kyx", "cxy", "cyx")
 CHILD = """
 import json, sys, time, warnings
 case = json.loads(sys.stdin.read())
@@ -45,7 +49,8 @@ for _ in range(case.pop("repeats") + 1):  # the first one compiles
     wall, began = time.perf_counter(), time.process_time()
     bearing = FluidFilmBearing(n=0, **case)
     times.append((time.process_time() - began, time.perf_counter() - wall))
-out = {name: float(getattr(bearing, name)[0]) for name in ("kxx", "kyy", "cxx", "cyy")}
+names = [kind + entry for kind in "kc" for entry in ("xx", "xy", "yx", "yy")]
+out = {name: float(getattr(bearing, name)[0]) for name in names}
 out["seconds"], out["wall"] = min(times[1:] or times)
 import ross
 out["version"] = ross.__version__
@@ -55,38 +60,69 @@ print(json.dumps(out))
 
 @dataclass(frozen=True)
 class Case:
-    """What both programs solve: `offset` is the pivot's place from the leading edge, as a share of the arc."""
+    """What both programs solve: `pads` is what each pad has of its own; offsets count from the edge that leads.
+
+    Leading edges are stated for a shaft that turns counter-clockwise.
+    """
 
     name: str
     mesh: tuple[int, int] = (40, 20)
     thermal: str = "isothermal"
     pivots: float = 0.0
-    offset: float = 0.5
+    pads: tuple[Mapping[str, float], ...] = ({},)
+    carry_over: float = 0.0
+    rotation: str = "counter-clockwise"
 
     @property
     def bearing(self) -> Bearing:
         """The rocker bearing with the references' oil."""
         drawn = load_bearing(FILE)
-        moved = drawn.with_pads(tuple(replace(pad, pivot_offset=self.offset) for pad in drawn.pads))
-        return replace(moved, oil=replace(drawn.oil, viscosity_40=VISCOSITY))
+        own = self.pads * (len(drawn.pads) // len(self.pads))
+        moved = drawn.with_pads(tuple(replace(pad, **entries) for pad, entries in zip(drawn.pads, own, strict=True)))
+        return replace(moved, oil=replace(drawn.oil, viscosity_40=VISCOSITY), rotation="counter-clockwise")
+
+    @property
+    def seen_by_peer(self) -> Bearing:
+        """As ROSS, whose shafts turn counter-clockwise, has to be told: the mirror image where this one does not."""
+        b = self.bearing
+        if self.rotation == b.rotation:
+            return b
+        turned = [replace(p, pivot_angle=math.pi - p.pivot_angle, pivot_offset=1.0 - p.pivot_offset) for p in b.pads]
+        return b.with_pads(tuple(reversed(turned)))
 
 
+AT_06 = ({"pivot_offset": 0.6},)
+#: Five pads, each with a clearance, an arc and an offset of its own.
+DIFFERENT = tuple(
+    {"assembled_clearance": 65e-6, "pad_clearance": 1e-6 * cp, "arc": math.radians(arc), "pivot_offset": offset}
+    for cp, arc, offset in ((70, 60, 0.5), (76, 55, 0.6), (82, 50, 0.55), (88, 58, 0.6), (95, 52, 0.5))
+)
 CASES = (
     Case("isothermal, rigid pivots"),
     Case("isothermal, rigid pivots", (80, 40)),
     Case("isothermal, pivots of 5e8 N/m", pivots=5e8),
     Case("adiabatic, rigid pivots", thermal="adiabatic"),
-    Case("isothermal, rigid pivots at 0.6", (20, 10), offset=0.6),
-    Case("isothermal, rigid pivots at 0.6", offset=0.6),
-    Case("isothermal, rigid pivots at 0.6", (80, 40), offset=0.6),
-    Case("adiabatic, rigid pivots at 0.6", thermal="adiabatic", offset=0.6),
-    Case("isothermal, rigid pivots at 0.4", offset=0.4),
+    Case("isothermal, rigid pivots at 0.6", (20, 10), pads=AT_06),
+    Case("isothermal, rigid pivots at 0.6", pads=AT_06),
+    Case("isothermal, rigid pivots at 0.6", (80, 40), pads=AT_06),
+    Case("adiabatic, rigid pivots at 0.6", thermal="adiabatic", pads=AT_06),
+    Case("isothermal, rigid pivots at 0.6, clockwise", pads=AT_06, rotation="clockwise"),
+    Case("carry-over 0.8, pivots at 0.6", (20, 10), "adiabatic", pads=AT_06, carry_over=0.8),
+    Case("carry-over 0.8, pivots at 0.6", thermal="adiabatic", pads=AT_06, carry_over=0.8),
+    Case("carry-over 0.8, pivots at 0.6, clockwise", (20, 10), "adiabatic", 0.0, AT_06, 0.8, "clockwise"),
+    Case("carry-over 0.8, pivots at 0.6, clockwise", (40, 20), "adiabatic", 0.0, AT_06, 0.8, "clockwise"),
+    Case("pads that differ, isothermal", pads=DIFFERENT),
+    Case("pads that differ, isothermal", (80, 40), pads=DIFFERENT),
+    Case("pads that differ, isothermal, clockwise", pads=DIFFERENT, rotation="clockwise"),
+    Case("pads that differ, adiabatic", thermal="adiabatic", pads=DIFFERENT),
+    Case("pads that differ, carry-over 0.8", thermal="adiabatic", pads=DIFFERENT, carry_over=0.8),
+    Case("pads that differ, carry-over 0.8, clockwise", (40, 20), "adiabatic", 0.0, DIFFERENT, 0.8, "clockwise"),
 )
 
 
 def peer_case(case: Case) -> dict[str, Any]:
     """Arguments of the peer's constructor, SI."""
-    b, mesh, pivots = case.bearing, case.mesh, case.pivots
+    b, mesh, pivots = case.seen_by_peer, case.mesh, case.pivots
     pads, oil = b.pads, b.oil
     return {
         "frequency": [SPEED],
@@ -119,7 +155,7 @@ def peer_case(case: Case) -> dict[str, Any]:
         "total_ey_film": 10,
         "total_ez_film": mesh[1],
         "total_ey_pad": 10,
-        "hot_oil_lambda": 0.0,
+        "hot_oil_lambda": case.carry_over,
         "initial_position": [0.0, -0.4],
     }
 
@@ -137,10 +173,14 @@ def run_peer(python: str, case: dict[str, Any], repeats: int) -> dict[str, Any]:
 def run_ours(case: Case, repeats: int, mesh: Mesh | None = None) -> tuple[Prediction, float]:
     """The same point here, and its least processor time [s]."""
     b, pivots = case.bearing, case.pivots or "rigid"
+    effects = [Effect("hot_oil_carryover", fraction=case.carry_over)] if case.carry_over else []
     times = []
     for _ in range(repeats + 1):
         began = time.process_time()
-        p = predict(b, LOAD, -math.pi / 2, SPEED, pivots=pivots, thermal=case.thermal, mesh=mesh)
+        p = predict(
+            b, LOAD, -math.pi / 2, SPEED, pivots=pivots, thermal=case.thermal, effects=effects, mesh=mesh,
+            rotation=case.rotation,
+        )  # fmt: skip
         times.append(time.process_time() - began)
     return p, min(times[1:])
 
@@ -155,18 +195,24 @@ def compared(case: Case, asked: argparse.Namespace) -> list[str]:
     own = max(abs(getattr(ours, key) / getattr(fine, key) - 1.0) for key in NAMES)
     print(f"{case.name}: ROSS {peer['version']}, default mesh here within {own:.2%} of 320 x 24", flush=True)
     shares = [f"{peer[key] / getattr(fine, key) - 1.0:+.1%}" for key in NAMES]
+    sign = 1.0 if case.rotation == "counter-clockwise" else -1.0
+    direct = {kind: 0.5 * (getattr(fine, f"{kind}xx") + getattr(fine, f"{kind}yy")) for kind in "kc"}
+    shares.append(f"{max(abs(sign * peer[name] - getattr(fine, name)) / direct[name[0]] for name in CROSS):.1%}")
     times = [f"{peer['seconds']:.1f} s", f"{1e3 * seconds:.1f} ms", f"{peer['seconds'] / seconds:.0f}"]
-    return [case.name, f"{case.mesh[0]} x {case.mesh[1]}", *shares, *times]
+    row = [case.name, f"{case.mesh[0]} x {case.mesh[1]}", *shares, *times]
+    print(f"    {' | '.join(row)}", flush=True)
+    return row
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--python", default=sys.executable, help="an interpreter that can import ross")
     parser.add_argument("--repeats", type=int, default=10)
+    parser.add_argument("--only", default="", help="cases whose name holds this text")
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
-    rows = [compared(case, asked) for case in CASES]
-    text = table(("case", "ROSS mesh", *NAMES, "ROSS", "here (80 x 6)", "ratio"), rows)
+    rows = [compared(case, asked) for case in CASES if asked.only in case.name]
+    text = table(("case", "ROSS mesh", *NAMES, "cross terms", "ROSS", "here (80 x 6)", "ratio"), rows)
     print(text)
     if asked.write:
         write_section("ross", "python -m tests.studies.peers --python INTERPRETER_WITH_ROSS --write", text)

@@ -13,7 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from rigdata.problem import Severity
 from tpjb_ident.check.findings import RUN_GAIN
-from tpjb_ident.check.point_readings import PointReadings
+from tpjb_ident.check.point_readings import MIN_RUNS, PointReadings, one_by_one
 from tpjb_ident.check.run_gain import dynamic_difference, gain_of_run, wrong_gains
 from tpjb_ident.check.wiring import repairs
 
@@ -23,13 +23,11 @@ _OUTLIER, _AGREE = 0.08, 0.03
 _LEAST = 0.03
 #: Probability at which chance is no explanation any more.
 _CHANCE = 1e-4
-#: Runs needed before one can be told apart from the others, and share of them that can be.
-_MIN_RUNS, _MOST = 4, 1 / 3
 
 
 def check_agreement(readings: PointReadings, stiffness: ComplexArray) -> set[int]:
     """Name runs that answer otherwise than the others at their operating point; their places."""
-    if len(readings) < _MIN_RUNS:
+    if len(readings) < MIN_RUNS:
         return set()
     misfits = readings.misfits(stiffness)
     outliers = set()
@@ -59,17 +57,13 @@ def check_gains(readings: PointReadings, known_outliers: Collection[int]) -> Non
 
 def _apart(readings: PointReadings, known: set[int]) -> set[int]:
     """Runs beyond chance of the others' matrix, the worst first, until none is left or too many are."""
-    outliers: set[int] = set(known)
-    while len(outliers) + 1 <= _MOST * len(readings):
-        remaining = [i for i in range(len(readings)) if i not in outliers]
-        if len(remaining) < _MIN_RUNS:
-            break
+
+    def farthest(remaining: list[int]) -> int | None:
         tried = [(*_distance(readings, i, [j for j in remaining if j != i]), i) for i in remaining]
         ratio, misfit, worst = max(tried)
-        if ratio < 1.0 or misfit < _LEAST:
-            break
-        outliers.add(worst)
-    return outliers
+        return None if ratio < 1.0 or misfit < _LEAST else worst
+
+    return one_by_one(len(readings), known, farthest)
 
 
 def _distance(readings: PointReadings, run: int, others: list[int]) -> tuple[float, float]:

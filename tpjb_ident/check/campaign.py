@@ -11,10 +11,10 @@ from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.arguments import as_campaign
-from tpjb_ident.check.consistency import check_load_ratios, check_positions
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.check.positions import check_positions
 from tpjb_ident.check.response import check_responses
 from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
@@ -77,8 +77,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     of_kind["dynamic"] = [s for s in dynamic if s.run.excitation_kind == "sine"]
     for observation in observations:
         check_speed(observation)
-    if check_static_loads(observations):
-        check_load_ratios(observations)
+    check_static_loads(observations)
     check_positions(observations)
     check_magnitudes(observations, campaign.housing_mass)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from rigdata.problem import Problem, Severity
@@ -49,14 +49,20 @@ def _is_shared(concerned: int, alike: int) -> bool:
     return concerned >= 3 and 3 * concerned >= alike
 
 
+def _alike(findings: Iterable[Finding]) -> Iterable[list[Finding]]:
+    """Findings by key and severity."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.key, finding.problem.severity), []).append(finding)
+    return groups.values()
+
+
 def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
     """Tell a finding once that a third (three at least) of the runs of its kinds share."""
-    groups: dict[tuple[str, str], list[Problem]] = {}
-    for finding in findings:
-        groups.setdefault((finding.key, finding.problem.severity), []).append(finding.problem)
     kind_of = {run.id: run.kind for run in runs}
     merged: list[Problem] = []
-    for group in groups.values():
+    for findings_alike in _alike(findings):
+        group = [finding.problem for finding in findings_alike]
         concerned = list(dict.fromkeys(p.run for p in group if p.run))
         kinds = {kind_of[r] for r in concerned}
         alike = sum(run.kind in kinds for run in runs)
@@ -90,19 +96,13 @@ def reach(reports: Sequence[Reporter]) -> None:
     for report in reports:
         kinds.setdefault(report.run.kind, []).append(report)
     for kind, alike in kinds.items():
-        groups: dict[tuple[str, Severity, tuple[str, ...]], list[Problem]] = {}
-        for report in alike if kind != "dynamic" else ():
-            for finding in report.found:
-                if finding.channels:
-                    groups.setdefault((finding.key, finding.problem.severity, finding.channels), []).append(
-                        finding.problem
-                    )
-        for (key, _, channels), problems in groups.items():
-            if len(problems) < len(alike) and not _is_shared(len(problems), len(alike)):
+        of_channels = [f for report in alike for f in report.found if f.channels and kind != "dynamic"]
+        for group in _alike(of_channels):
+            if len(group) < len(alike) and not _is_shared(len(group), len(alike)):
                 continue
             for report in kinds.get("dynamic", ()):
-                if set(channels) & set(report.run.channels):
-                    report.found.append(Finding(problems[0], key))
+                if set(group[0].channels) & set(report.run.channels):
+                    report.found.append(Finding(group[0].problem, group[0].key))
 
 
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:

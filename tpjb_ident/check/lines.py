@@ -56,23 +56,17 @@ def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) 
     return RecordLines(fit.mean[0], missing + 0j, missing, fit.scale[0])
 
 
-def strongest_line(time: FloatArray, values: FloatArray, apart_from: Sequence[float]) -> float:
-    """Frequency of the strongest line, leaving out some and the slowest [Hz]; NaN where there is none."""
-    if len(time) < 16:
-        return float("nan")
-    filled = np.where(np.isfinite(values), values, np.nanmedian(values)) if np.isfinite(values).any() else None
-    if filled is None:
-        return float("nan")
-    window = np.hanning(len(filled))
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    if step <= 0:
-        return float("nan")
-    power = np.abs(np.fft.rfft((filled - np.median(filled)) * window))
-    frequency = np.fft.rfftfreq(len(filled), step)
-    allowed = frequency > 4.0 / (step * len(filled))
-    for known in apart_from:
-        allowed &= np.abs(frequency - known) > 3.0 / (step * len(filled))
-    return float(frequency[np.argmax(np.where(allowed, power, 0.0))]) if allowed.any() else float("nan")
+def other_line(phasors: RunPhasors | None) -> float:
+    """Frequency of the line that nobody mentioned and that is strongest in the cells [Hz]; NaN where there is none."""
+    strongest, frequency = 0.0, float("nan")
+    known = phasors.lines.excitation + phasors.lines.nuisance if phasors is not None else ()
+    for k, line in enumerate(known):
+        if line.name == "found" and phasors is not None:
+            sizes = np.linalg.norm(phasors.cell_force.phasors[:, k], axis=1)
+            size = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
+            if size > strongest:
+                strongest, frequency = size, line.frequency
+    return frequency
 
 
 def band_lines(

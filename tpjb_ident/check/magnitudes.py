@@ -10,14 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import plane_vector
+from tpjb_ident.check.set_points import oil_force, plane_vector
 from tpjb_ident.check.signals import is_spare
+from tpjb_ident.phasors.run_data import QUANTITIES
 
 #: A running shaft's vibration, run-out and noise together, from low to high, that no probe shows [m]: error, warning.
 _STILL_PROBE = (2e-8, 1e-7)
@@ -70,30 +73,26 @@ class Sizes:
 def sizes(observation: Observation, mass: float) -> Sizes:
     """Sizes of a run from what one pass over it found."""
     lines = observation.lines
-    vectors: dict[str, float] = {}
-    film = math.nan
+    motion = cells = accelerated = static = math.nan
     if lines is not None:
         clear = np.abs(lines.phasor) > _CLEAR * lines.floor
-        for quantity in ("displacement", "force", "acceleration"):
-            phasors = plane_vector(observation, quantity, lines.phasor)
-            if phasors is not None and clear[observation.pick(quantity)].any():
-                vectors[quantity] = float(np.linalg.norm(phasors))
-        force = plane_vector(observation, "force", lines.phasor)
-        acceleration = plane_vector(observation, "acceleration", lines.phasor)
-        if force is not None:
-            inertia = 0.0 if acceleration is None or math.isnan(mass) else mass * acceleration
-            film = float(np.linalg.norm(force + inertia))
-        mean = plane_vector(observation, "force", lines.mean)
-    static = math.nan if lines is None or mean is None else float(np.linalg.norm(mean))
+        motion, cells, accelerated = (
+            _length(plane_vector(observation, q, lines.phasor)) if clear[observation.pick(q)].any() else math.nan
+            for q in QUANTITIES
+        )
+        static = _length(plane_vector(observation, "force", lines.mean))
+    film = _length(oil_force(observation, mass))
     travel = {}
     for place in observation.pick("displacement"):
         travel[observation.channels[place].name] = float(observation.spread[2, place] - observation.spread[0, place])
     alive = [c for c in observation.channels if travel.get(c.name, 0.0) >= _STILL_PROBE[1]]
     spare = tuple(c.name for c in observation.channels if c.name in travel and is_spare(c, alive))
     noise_free = any(finding.key == "no noise" for finding in observation.report.found)
-    measured = (vectors.get(name, math.nan) for name in ("displacement", "force", "acceleration"))
-    motion, cells, accelerated = measured
     return Sizes(observation.run, motion, cells, film, accelerated, static, travel, noise_free, spare)
+
+
+def _length(vector: NDArray[Any] | None) -> float:
+    return math.nan if vector is None else float(np.linalg.norm(vector))
 
 
 def check_magnitudes(observations: Sequence[Observation], mass: float) -> None:

@@ -16,10 +16,11 @@ from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, steady_level, strongest_line
+from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, other_line, steady_level
 from tpjb_ident.check.rotation import shaft_force
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import run_phasors
@@ -64,6 +65,10 @@ class Observation:
         """Places of the channels of `quantity` in `channels`."""
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
+    def of(self, quantity: str) -> list[Channel]:
+        """Channels of `quantity`."""
+        return [c for c in self.channels if c.quantity == quantity]
+
 
 def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Observation:
     """Read every channel of `run` once, block by block, and judge each by itself.
@@ -102,7 +107,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         channels=live,
         lines=lines,
         spread=_spread(used),
-        other_line=_other_line(run, live, time[:_FITTED], used[:_FITTED], phasors),
+        other_line=other_line(phasors),
         samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,
@@ -195,11 +200,9 @@ def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: R
         column = column[np.isfinite(column)]
         if len(column) < 10:
             return False
-        # Away from steady running nothing fits, but noise shows in the bends from sample to sample.
-        bends = np.diff(column, 2) / math.sqrt(6.0)
-        noise = 1.4826 * float(np.median(np.abs(bends)))
-        if lines is not None and run.kind in {"dynamic", "locus"}:
-            noise = float(lines.scatter[index])
+        # away from steady running nothing fits, but noise shows in the bends from sample to sample
+        fitted = lines is not None and run.kind in {"dynamic", "locus"}
+        noise = float(lines.scatter[index]) if fitted and lines is not None else white_noise(column)
         steps = np.diff(np.unique(column[:4000]))
         if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
             return False
@@ -243,24 +246,6 @@ def _spread(values: FloatArray) -> FloatArray:
         if len(finite_values):
             spread[:, index] = np.quantile(finite_values, [0.02, 0.5, 0.98])
     return spread
-
-
-def _other_line(
-    run: Run, channels: Sequence[Channel], time: FloatArray, values: FloatArray, phasors: RunPhasors | None
-) -> float:
-    cells = [i for i, c in enumerate(channels) if c.quantity == "force"]
-    if run.kind != "dynamic" or not cells:
-        return math.nan
-    column = values[:, max(cells, key=lambda i: _range(values[:, i]))]
-    speed = run.point.shaft_speed_hz
-    places = range(len(phasors.lines.excitation)) if phasors is not None else ()
-    driven = [phasors.lines.excitation[k].frequency for k in places if phasors and _near_set_point(run, phasors, k)]
-    return strongest_line(time, column, [speed, 2 * speed, 50.0, run.point.excitation_hz, *driven])
-
-
-def _range(values: FloatArray) -> float:
-    finite_values = values[np.isfinite(values)]
-    return float(np.std(finite_values)) if len(finite_values) else 0.0
 
 
 def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:

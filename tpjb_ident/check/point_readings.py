@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import oil_force, plane_of, to_plane
+from tpjb_ident.check.set_points import oil_force, plane_of
 
 #: Sectors into which the directions of a sweep's load are sorted, and share of them that must be met.
 _SECTORS, _MET = 36, 0.9
@@ -20,6 +20,8 @@ _SECTORS, _MET = 36, 0.9
 _ONE_LINE = 0.2
 #: Runs whose pairs are tried.
 _PAIRED = 24
+#: Runs needed before one can be told apart from the others, and share of them that can be.
+MIN_RUNS, _MOST = 4, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,18 @@ class PointReadings:
         return found[least] if refined is None else refined
 
 
+def one_by_one(count: int, known: Collection[int], worst: Callable[[list[int]], int | None]) -> set[int]:
+    """Runs that differ: `known` ones, and what `worst` finds among the others until it finds none or too many are."""
+    outliers = set(known)
+    while len(outliers) + 1 <= _MOST * count:
+        remaining = [i for i in range(count) if i not in outliers]
+        run = worst(remaining) if len(remaining) >= MIN_RUNS else None
+        if run is None:
+            break
+        outliers.add(run)
+    return outliers
+
+
 def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
     """Variance that a matrix fitted to displacements (n, 2) gives to its answer to one more (2,), over theirs."""
     return float(np.real(own.conj() @ np.linalg.solve(fitted.T @ fitted.conj(), own)))
@@ -90,24 +104,22 @@ def leverage(fitted: ComplexArray, own: ComplexArray) -> float:
 
 def point_readings(runs: Sequence[Observation], mass: float, centres: dict[str, float]) -> PointReadings:
     """Phasors and means of all runs of a point, by channel; `centres`: what probes read at the bearing's centre [m]."""
-    first = runs[0]
-    lines = [run.lines for run in runs if run.lines is not None]
-    probes, cells = ([run.pick(quantity) for run in runs] for quantity in ("displacement", "force"))
-    channels = tuple(first.channels[i] for i in probes[0])
+    lines = [(run, run.lines) for run in runs if run.lines is not None]
+    channels = tuple(runs[0].of("displacement"))
     plane = plane_of(channels)
     force = np.array([oil_force(run, mass) for run in runs], dtype=complex)
-    names = {tuple(run.channels[i].name for i in places) for run, places in zip(runs, cells)}
+    names = {tuple(cell.name for cell in run.of("force")) for run in runs}
     phasors, means, cell_plane = force, np.zeros((len(runs), 2)), np.eye(2)
-    if len(names) == 1 and len(cells[0]) == 2:
-        channels += tuple(first.channels[i] for i in cells[0])
-        phasors = np.stack([line.phasor[c] for line, c in zip(lines, cells)])
-        means = np.stack([line.mean[c] for line, c in zip(lines, cells)])
+    if len(names) == 1 and len(runs[0].pick("force")) == 2:
+        channels += tuple(runs[0].of("force"))
+        phasors = np.stack([line.phasor[run.pick("force")] for run, line in lines])
+        means = np.stack([line.mean[run.pick("force")] for run, line in lines])
         cell_plane = plane_of(channels[2:])
     return PointReadings(
-        probes=np.stack([line.phasor[p] for line, p in zip(lines, probes)]),
+        probes=np.stack([line.phasor[run.pick("displacement")] for run, line in lines]),
         cells=phasors,
         inertia=np.asarray(force - phasors @ cell_plane.T, dtype=complex),
-        probe_means=np.stack([line.mean[p] for line, p in zip(lines, probes)]),
+        probe_means=np.stack([line.mean[run.pick("displacement")] for run, line in lines]),
         cell_means=means,
         probe_plane=plane,
         cell_plane=cell_plane,
@@ -124,7 +136,7 @@ def probe_centres(sweeps: Sequence[Observation]) -> dict[str, float]:
         cells, probes = observation.pick("force"), observation.pick("displacement")
         if len(cells) != 2 or observation.report.doubts & {"force", "displacement"}:
             continue
-        load = to_plane([observation.channels[i] for i in cells], observation.samples[:, cells].T).T
+        load = observation.samples[:, cells] @ plane_of(observation.of("force")).T
         for index in probes:
             centre = _swept_centre(load, observation.samples[:, index])
             if centre is not None:

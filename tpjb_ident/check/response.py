@@ -36,8 +36,8 @@ def check_responses(runs: Sequence[Observation], mass: float, sweeps: Sequence[O
         if shaft_order(point.excitation_hz, point.shaft_speed_hz):  # runout answers there too, as no film does
             continue
         if _shows_response(observation, mass):
-            probes = [observation.channels[i] for i in observation.pick("displacement")]
-            groups.setdefault((point, *((c.name, c.axis) for c in probes)), []).append(observation)
+            probes = tuple((c.name, c.axis) for c in observation.of("displacement"))
+            groups.setdefault((point, *probes), []).append(observation)
     centres = probe_centres(sweeps)
     for group in groups.values():
         readings = point_readings(group, mass, centres)

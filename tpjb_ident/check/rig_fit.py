@@ -118,7 +118,7 @@ def check_accelerometers(fit: RigFit) -> None:
 
 
 def _tell(observation: Observation, shown: ComplexArray, foretold: ComplexArray) -> None:
-    channels = [observation.channels[i] for i in observation.pick("acceleration")]
+    channels = observation.of("acceleration")
     tried = sorted((_misfit(matrix @ shown, foretold), words) for words, matrix in repairs(channels, scales=True))
     misfit = _misfit(shown, foretold)
     hint = f"; as if {tried[0][1]}" if tried[0][0] < min(misfit / 3, tried[1][0] / 2) else ""

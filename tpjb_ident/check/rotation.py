@@ -30,11 +30,10 @@ def shaft_force(phasors: RunPhasors | None) -> float:
     """Logarithm of the 1X force's counter-clockwise part over its clockwise one; NaN where neither is clear."""
     if phasors is None:
         return math.nan
-    lines = phasors.lines.excitation + phasors.lines.nuisance
-    place = [k for k, line in enumerate(lines) if line.name == "1X"]
-    if not place:
+    place = phasors.lines.place("1X")
+    if place is None:
         return math.nan
-    force = phasors.cell_force.phasors[:, place[0]]
+    force = phasors.cell_force.phasors[:, place]
     force = force[np.isfinite(force).all(axis=1)]
     if len(force) < 2:
         return math.nan

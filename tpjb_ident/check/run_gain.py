@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.check.point_readings import PointReadings, leverage
+from tpjb_ident.check.point_readings import PointReadings, leverage, one_by_one
 
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand.
@@ -40,8 +40,6 @@ _LEAST, _MOST_PART = 0.01, 0.9
 _AS_WELL = 2 * math.log(1e3)
 #: An explanation that lets the mean move freely must leave this much less: ln of the equations, times one more unknown.
 _FREE = 2.0
-#: Runs needed, and the share of them that can be at fault.
-_MIN_RUNS, _MOST = 4, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -114,18 +112,18 @@ def evidence(differences: Sequence[Difference], patterns: Sequence[FloatArray]) 
 
 def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
     """Find runs with one wrong gain, the clearest first; `known` are runs that stand apart anyway."""
-    count, outliers, gains = len(readings.probes), set(known), list[WrongGain]()
-    while len(outliers) + 1 <= _MOST * count:
-        remaining = [i for i in range(count) if i not in outliers]
-        if len(remaining) < _MIN_RUNS:
-            break
+    gains: list[WrongGain] = []
+
+    def clearest(remaining: list[int]) -> int | None:
         tried = [gain_of_run(readings, i, [j for j in remaining if j != i]) for i in remaining]
-        clearest = min((t for t in tried if t is not None), key=lambda t: t.chance, default=None)
+        best = min((t for t in tried if t is not None), key=lambda t: t.chance, default=None)
         # each run is tried with two cells and two probes, a probe with two zeros
-        if clearest is None or clearest.chance > _CHANCE / (6 * len(remaining)):
-            break
-        gains.append(clearest)
-        outliers.add(clearest.run)
+        if best is None or best.chance > _CHANCE / (6 * len(remaining)):
+            return None
+        gains.append(best)
+        return best.run
+
+    one_by_one(len(readings), known, clearest)
     return gains
 
 

@@ -12,16 +12,21 @@ from numpy.typing import NDArray
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import Severity
-from rigdata.vector import inverse_directions
+from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.wiring import guess_wiring, repairs
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.run_data import oil_force as film_force
 
-_ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
+#: Angle [deg] between what is stated and what is shown: warning, error.
+ANGLE_WARNING, ANGLE_ERROR = 10.0, 30.0
 _SPEED_STILL = 2 * math.pi * 0.5
 _LINE_OVER_FLOOR = 8.0
 #: A mean force below this share of the set point is none, if it is not clearly there.
 _NO_STATIC = (0.002, 0.02)
+#: Runs needed before the load of one can be told apart; share (or angle, as a share of the load) that is no scatter,
+#: and robust standard deviations over the runs.
+_MIN_RUNS, _LOAD_OFF, _MANY = 4, 0.04, 6.0
 
 
 def plane_of(channels: Sequence[Channel]) -> FloatArray:
@@ -29,17 +34,12 @@ def plane_of(channels: Sequence[Channel]) -> FloatArray:
     return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
 
 
-def to_plane(channels: Sequence[Channel], readings: NDArray[Any]) -> NDArray[Any]:
-    """X, Y from one value per channel; complex stays complex; `readings` (m,) and (m, n)."""
-    return np.asarray(plane_of(channels) @ readings)
-
-
 def plane_vector(observation: Observation, quantity: str, values: NDArray[Any]) -> NDArray[Any] | None:
     """X, Y of one value per channel of `quantity`; None where its channels do not span the plane; `values` (m,)."""
     places = observation.pick(quantity)
     if len(places) < 2:
         return None
-    vector = to_plane([observation.channels[i] for i in places], values[places])
+    vector = plane_of(observation.of(quantity)) @ values[places]
     return vector if np.all(np.isfinite(vector)) else None
 
 
@@ -48,30 +48,46 @@ def angle_between(first: float, second: float, period: float = 360.0) -> float:
     return abs((first - second + period / 2) % period - period / 2)
 
 
-def check_static_loads(observations: Sequence[Observation]) -> bool:
-    """Mean force of dynamic and locus runs against the stated static load and its direction.
+def check_static_loads(observations: Sequence[Observation]) -> None:
+    """Mean force of dynamic and locus runs against the stated static load, its direction, and the other runs.
 
     Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
     against them.
     """
-    shown = []
+    shown: list[tuple[Observation, complex]] = []
     for observation in observations:
         nominal = observation.run.point.static_load
         if observation.run.kind in {"dynamic", "locus"} and observation.lines is not None and nominal > 0:
             mean = plane_vector(observation, "force", observation.lines.mean)
             if mean is not None:
                 turn = np.exp(-1j * observation.run.point.static_load_direction)
-                shown.append((observation, mean, complex(complex(mean[0], mean[1]) / nominal * turn)))
-    if without_static_part(np.array([ratio for _, _, ratio in shown], dtype=complex)):
-        for observation, _, _ in shown:
+                shown.append((observation, complex(complex(mean[0], mean[1]) / nominal * turn)))
+    ratios = np.array([ratio for _, ratio in shown], dtype=complex)
+    if without_static_part(ratios):
+        for observation, _ in shown:
             text = "is none, as of piezo-electric cells"
             observation.report.say(
                 "no static force", "note", "mean force", text, "Nothing; static loads are taken as set"
             )
-        return False
-    for observation, mean, ratio in shown:
-        _check_static_load(observation, mean, abs(ratio))
-    return True
+        return
+    for observation, ratio in shown:
+        _check_size(observation, abs(ratio))
+        if abs(ratio) >= 0.02:
+            _check_direction(observation, math.degrees(np.angle(ratio)))
+    if len(shown) < _MIN_RUNS:
+        return
+    middle = complex(np.median(ratios.real), np.median(ratios.imag))
+    off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
+    allowed = max(_LOAD_OFF, _MANY * robust_deviation(off))
+    for (observation, ratio), distance in zip(shown, off):
+        reported = any(f.key.startswith("load ") for f in observation.report.found)
+        if distance > allowed and not reported:
+            text = (
+                f"is {abs(ratio / middle) - 1:+.1%} in size and {math.degrees(np.angle(ratio / middle)):+.1f} deg in "
+                "direction off what the set point and the other runs of the campaign let one expect"
+            )
+            cure = "Check static_load and its direction in this run, and the gain of the cells"
+            observation.report.say("load ratio", "warning", "mean force", text, cure)
 
 
 def without_static_part(ratios: ComplexArray) -> bool:
@@ -83,24 +99,21 @@ def without_static_part(ratios: ComplexArray) -> bool:
     return bool(mean < _NO_STATIC[0] or (mean < _NO_STATIC[1] and mean < 4 * error))
 
 
-def _check_static_load(observation: Observation, mean: NDArray[Any], ratio: float) -> None:
-    run, place = observation.run, "mean force"
-    _check_size(observation, ratio)
-    if ratio < 0.02 or observation.lines is None:
+def _check_direction(observation: Observation, off: float) -> None:
+    """Mean force that points so far from the stated load [deg]."""
+    if abs(off) <= ANGLE_WARNING or observation.lines is None:
         return
-    points, nominal = math.degrees(math.atan2(mean[1], mean[0])), run.point.static_load_direction_deg
-    off = angle_between(points, nominal)
-    if off <= _ANGLE_WARNING:
-        return
-    cells = observation.pick("force")
-    wanted = np.array([math.cos(math.radians(nominal)), math.sin(math.radians(nominal))])
-    guess = guess_wiring([observation.channels[i] for i in cells], observation.lines.mean[cells], wanted)
-    severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
+    point = observation.run.point
+    readings = observation.lines.mean[observation.pick("force")]
+    guess = guess_wiring(observation.of("force"), readings, directions(point.static_load_direction))
+    severity: Severity = "error" if abs(off) > ANGLE_ERROR else "warning"
     if severity == "error":
         observation.report.doubts.add("force")
+    nominal = point.static_load_direction_deg
+    points = math.remainder(nominal + off, 360.0)
     text = f"points to {points:.0f} deg, static_load_direction is {nominal:g} deg{guess}"
     cure = "Check the cells' axis and polarity, their cables, and static_load_direction"
-    observation.report.say(f"load direction{guess}", severity, place, text, cure)
+    observation.report.say(f"load direction{guess}", severity, "mean force", text, cure)
 
 
 def _check_size(observation: Observation, ratio: float) -> None:
@@ -201,13 +214,13 @@ def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None
     directed = [
         (s, f, math.degrees(s.run.excitation_direction)) for s, f in shown if s.run.excitation_direction is not None
     ]
-    off = [(s, f, d) for s, f, d in directed if angle_between(_along(f), d, 180.0) > _ANGLE_WARNING]
+    off = [(s, f, d) for s, f, d in directed if angle_between(_along(f), d, 180.0) > ANGLE_WARNING]
     guess = _common_wiring([(s, d) for s, _, d in directed]) if len(off) > 2 else ""
     for observation, _, _ in directed if guess else ():
         observation.report.doubts.add("force")  # the cells are wired wrongly in the other runs too
     for observation, force, nominal in off:
         shows = _along(force)
-        severity: Severity = "error" if guess or angle_between(shows, nominal, 180.0) > _ANGLE_ERROR else "warning"
+        severity: Severity = "error" if guess or angle_between(shows, nominal, 180.0) > ANGLE_ERROR else "warning"
         if severity == "error":
             observation.report.doubts.add("force")
         near = round(nominal + (shows - nominal + 90.0) % 180.0 - 90.0)
@@ -218,18 +231,16 @@ def _check_directions(shown: Sequence[tuple[Observation, ComplexArray]]) -> None
 
 def _common_wiring(directed: Sequence[tuple[Observation, float]]) -> str:
     """One fault of the cells that brings nearly all excitations into their stated directions."""
-    first = directed[0][0]
-    channels = [first.channels[i] for i in first.pick("force")]
+    channels = directed[0][0].of("force")
     if len(channels) != 2:
         return ""
     for words, matrix in repairs(channels):
         correct = 0
         for observation, nominal in directed:
-            cells = observation.pick("force")
-            if observation.lines is None or [observation.channels[i].name for i in cells] != [c.name for c in channels]:
-                continue
-            mended = to_plane(channels, matrix @ observation.lines.phasor[cells])
-            correct += angle_between(_along(mended), nominal, 180.0) <= _ANGLE_WARNING
+            same = [c.name for c in observation.of("force")] == [c.name for c in channels]
+            if observation.lines is not None and same:
+                repaired = plane_of(channels) @ matrix @ observation.lines.phasor[observation.pick("force")]
+                correct += angle_between(_along(repaired), nominal, 180.0) <= ANGLE_WARNING
         if correct >= 0.8 * len(directed):
             return f"; as if {words}"
     return ""

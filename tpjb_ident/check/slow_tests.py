@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
+from rigdata.calibration import Channel
 from rigdata.problem import Severity
 from rigdata.vector import directions
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.response import definiteness, mirrored
-from tpjb_ident.check.set_points import angle_between, to_plane
+from tpjb_ident.check.set_points import ANGLE_ERROR, ANGLE_WARNING, angle_between, plane_of, plane_vector
 from tpjb_ident.check.wiring import guess_wiring, name_fault
 
-_ANGLE_WARNING, _ANGLE_ERROR = 10.0, 30.0
 #: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
 _FOLLOWS = math.cos(math.radians(40.0))
 #: Angle [deg] by which the shaft lies aside of the load, beyond what friction does: warning, error.
@@ -31,31 +32,33 @@ _SAME_PAD = 25.0
 #: A load goes toward a pad of the arrangement within this angle [deg].
 _AT_PAD = 12.0
 #: Numbers of pads that bearings have.
-_PADS = range(3, 13)
-_Shown = tuple[Observation, float]
+_LEAST_PADS, _MOST_PADS = 3, 12
+#: Smaller over larger extent of a load that goes around.
+_GOES_AROUND = 0.3
+_Planes = tuple[FloatArray, FloatArray, FloatArray]
 
 
-def _planes(observation: Observation) -> tuple[FloatArray, FloatArray] | None:
-    """Force and displacement (n, 2) of the thinned samples, rows without a value left out."""
-    force, shaft = observation.pick("force"), observation.pick("displacement")
-    if len(force) < 2 or len(shaft) < 2:
+def _planes(observation: Observation) -> _Planes | None:
+    """Force and displacement (n, 2), probes (n, m) of the thinned samples, rows without a value left out."""
+    probes, cells = observation.pick("displacement"), observation.pick("force")
+    if len(cells) < 2 or len(probes) < 2:
         return None
-    rows = np.isfinite(observation.samples[:, force + shaft]).all(axis=1)
+    force = observation.samples[:, cells] @ plane_of(observation.of("force")).T
+    shaft = observation.samples[:, probes] @ plane_of(observation.of("displacement")).T
+    rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
     if np.count_nonzero(rows) < 20:
         return None
-    samples = observation.samples[rows]
-    planes = (samples[:, columns] @ np.linalg.pinv(_directions(observation, columns)).T for columns in (force, shaft))
-    return next(planes), next(planes)
+    return force[rows], shaft[rows], observation.samples[rows][:, probes]
 
 
-def _directions(observation: Observation, where: Sequence[int]) -> FloatArray:
+def _along(channels: Sequence[Channel]) -> FloatArray:
     """Unit vectors (m, 2) of some channels."""
-    return directions(np.array([observation.channels[i].axis for i in where]))
+    return directions(np.array([c.axis for c in channels]))
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
     """Dry pivot runs: a load that rises, its direction, pads told apart."""
-    directions: list[tuple[Observation, float]] = []
+    pushed: list[tuple[Observation, float]] = []
     for observation in runs:
         planes = _planes(observation)
         if planes is None:
@@ -67,10 +70,10 @@ def check_dry(runs: Sequence[Observation]) -> None:
             )
             continue
         shows = math.degrees(math.atan2(push[1], push[0]))
-        directions.append((observation, shows))
+        pushed.append((observation, shows))
         if "static_load_direction" in observation.run.stated:
             _check_push(observation, shows, push)
-    _check_labels(directions)
+    _check_labels([observation for observation, _ in pushed], [shows for _, shows in pushed])
 
 
 def check_shaft_follows(runs: Sequence[Observation]) -> None:
@@ -106,24 +109,21 @@ def _main_move(force: FloatArray) -> FloatArray | None:
 
 
 def _check_push(observation: Observation, shows: float, push: FloatArray) -> None:
-    nominal = observation.run.point.static_load_direction_deg
-    off = angle_between(shows, nominal)
-    if off <= _ANGLE_WARNING:
+    point, channels = observation.run.point, observation.of("force")
+    off = angle_between(shows, point.static_load_direction_deg)
+    if off <= ANGLE_WARNING:
         return
-    cells = observation.pick("force")
-    channels = [observation.channels[i] for i in cells]
-    wanted = np.array([math.cos(math.radians(nominal)), math.sin(math.radians(nominal))])
-    guess = guess_wiring(channels, _directions(observation, cells) @ push, wanted)
-    severity: Severity = "error" if off > _ANGLE_ERROR else "warning"
+    guess = guess_wiring(channels, _along(channels) @ push, directions(point.static_load_direction))
+    severity: Severity = "error" if off > ANGLE_ERROR else "warning"
     if guess:
         observation.report.doubts.add("force")
-    stated = f"static_load_direction of pad {observation.run.pad} is {nominal:g} deg"
+    stated = f"static_load_direction of pad {observation.run.pad} is {point.static_load_direction_deg:g} deg"
     text = f"the load rises toward {shows:.0f} deg, {stated}{guess}"
     cure = "Check pad and static_load_direction of this run, and the cells' axes and cables"
     observation.report.say(f"push direction{guess}", severity, "force", text, cure)
 
 
-def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArray], push: FloatArray) -> float | None:
+def _check_follows(observation: Observation, planes: _Planes, push: FloatArray) -> float | None:
     """The shaft must go toward the pad, mainly along the load; by how much it goes aside [deg], None where untold."""
     unit = push / np.hypot(*push)
     load = planes[0] @ unit
@@ -134,21 +134,20 @@ def _check_follows(observation: Observation, planes: tuple[FloatArray, FloatArra
         return None
     if float(slope @ unit) > _FOLLOWS * size:
         return math.degrees(math.atan2(unit[0] * slope[1] - unit[1] * slope[0], float(slope @ unit)))
-    probes = observation.pick("displacement")
-    channels = [observation.channels[i] for i in probes]
-    guess = guess_wiring(channels, _directions(observation, probes) @ slope, unit, within=20.0)
+    channels = observation.of("displacement")
+    guess = guess_wiring(channels, _along(channels) @ slope, unit, within=20.0)
     goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
     text = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
     cure = "Check axis, polarity and cables of the probes"
-    names = " and ".join(c.name for c in channels)
-    _say_of_probes(observation, f"signs {names}{guess}", "error", text, cure)
+    _say_of_probes(observation, ("signs", guess), "error", text, cure)
     return None
 
 
-def _say_of_probes(observation: Observation, key: str, severity: Severity, text: str, cure: str) -> None:
-    """Say what is wrong with the probes, in whatever run they serve."""
-    names = [observation.channels[i].name for i in observation.pick("displacement")]
-    observation.report.say(key, severity, f"channels {' and '.join(names)}", text, cure, names)
+def _say_of_probes(observation: Observation, key: tuple[str, str], severity: Severity, text: str, cure: str) -> None:
+    """Say what is wrong with the probes, in whatever run they serve; `key` stands around their names."""
+    names = [channel.name for channel in observation.of("displacement")]
+    listed = " and ".join(names)
+    observation.report.say(f"{key[0]} {listed}{key[1]}", severity, f"channels {listed}", text, cure, names)
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
@@ -157,39 +156,42 @@ def check_sweeps(runs: Sequence[Observation]) -> None:
         planes = _planes(observation)
         if planes is None:
             continue
-        force, shaft = planes[0] - planes[0].mean(axis=0), planes[1] - planes[1].mean(axis=0)
-        sizes = np.linalg.svd(force, compute_uv=False)
-        if sizes[-1] < 0.3 * sizes[0]:
+        gain = _gain(planes[0], planes[1])
+        if gain is None:
             text = "the load does not sweep around all directions"
             observation.report.say("sweep", "warning", "force", text, "A clearance run needs a rotating load")
-            continue
-        gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
-        if _judge_gain(observation, gain):
-            _judge_turns(observation, _turns(observation))
+        elif _judge_gain(observation, gain):
+            _judge_turns(observation, _turns(observation.of("displacement"), planes))
 
 
-def _turns(observation: Observation) -> FloatArray:
+def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:
+    """Displacement by force (2, 2) [m/N] of some points (n, 2); None where the load does not go around."""
+    about = force - force.mean(axis=0)
+    sizes = np.linalg.svd(about, compute_uv=False)
+    if sizes[-1] < _GOES_AROUND * sizes[0]:
+        return None
+    return np.asarray(np.linalg.lstsq(about, shaft - shaft.mean(axis=0), rcond=None)[0].T)
+
+
+def _turns(probes: Sequence[Channel], planes: _Planes) -> FloatArray:
     """Angle of every probe's axis, as the load that goes around shows it, less the stated one (m,) [deg]."""
-    force, probes = observation.pick("force"), observation.pick("displacement")
-    samples = observation.samples[np.isfinite(observation.samples[:, force + probes]).all(axis=1)]
-    load = samples[:, force] @ np.linalg.pinv(_directions(observation, force)).T
-    load -= load.mean(axis=0)
+    load = planes[0] - planes[0].mean(axis=0)
     design = np.column_stack([load / np.linalg.norm(load, axis=1, keepdims=True), np.ones(len(load))])
-    answer = np.linalg.lstsq(design, samples[:, probes], rcond=None)[0]
-    along = _directions(observation, probes)
+    answer = np.linalg.lstsq(design, planes[2], rcond=None)[0]
+    along = _along(probes)
     turned = along[:, 0] * answer[1] - along[:, 1] * answer[0]
     return np.asarray(np.degrees(np.arctan2(turned, np.sum(along * answer[:2].T, axis=1))))
 
 
 def _judge_turns(observation: Observation, turns: FloatArray) -> None:
     """Axes of probes (m,) [deg] that lie elsewhere than stated, all alike or some."""
-    names = [observation.channels[i].name for i in observation.pick("displacement")]
+    names = [channel.name for channel in observation.of("displacement")]
     common = float(np.median(turns))
     cure = "Check the axes of the probes (and of the cells)"
     if abs(common) > _TURNED[0]:
         severity: Severity = "error" if abs(common) > _TURNED[1] else "warning"
         text = f"the shaft lies {common:+.0f} deg from where the load pushes it, as if all probes stood there"
-        _say_of_probes(observation, f"turned {' '.join(names)}", severity, text, cure)
+        _say_of_probes(observation, ("turned", ""), severity, text, cure)
         return
     for name, turn in zip(names, turns):
         if abs(turn - common) > _TURNED[0]:
@@ -200,35 +202,27 @@ def _judge_turns(observation: Observation, turns: FloatArray) -> None:
 
 def check_locus(runs: Sequence[Observation]) -> None:
     """Locus runs together: mean positions follow the directions of the loads."""
-    groups: dict[object, list[Observation]] = {}
+    groups: dict[object, list[tuple[Observation, FloatArray, FloatArray]]] = {}
     for observation in runs:
-        measured = len(observation.pick("displacement")) == 2 and len(observation.pick("force")) >= 2
-        if observation.lines is not None and measured and "force" not in observation.report.doubts:
-            point = observation.run.point
-            groups.setdefault((point.static_load, point.spin), []).append(observation)
-    for group in groups.values():
-        loads: list[FloatArray] = []
-        places: list[FloatArray] = []
-        for observation in group:
-            assert observation.lines is not None
-            for quantity, into in (("force", loads), ("displacement", places)):
-                columns = observation.pick(quantity)
-                into.append(to_plane([observation.channels[i] for i in columns], observation.lines.mean[columns]))
-        force, shaft = np.array(loads), np.array(places)
-        rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
-        if np.count_nonzero(rows) < 4:
+        if observation.lines is None or "force" in observation.report.doubts:
             continue
-        force, shaft = force[rows] - force[rows].mean(axis=0), shaft[rows] - shaft[rows].mean(axis=0)
-        sizes = np.linalg.svd(force, compute_uv=False)
-        if sizes[-1] > 0.3 * sizes[0]:
-            gain = np.linalg.lstsq(force, shaft, rcond=None)[0].T
-            for observation in group:
-                _judge_gain(observation, gain)
-            _judge_places([group[i] for i in np.flatnonzero(rows)], shaft, shaft - force @ gain.T)
+        force, shaft = (plane_vector(observation, q, observation.lines.mean) for q in ("force", "displacement"))
+        if force is not None and shaft is not None and len(observation.pick("displacement")) == 2:
+            point = observation.run.point
+            groups.setdefault((point.static_load, point.spin), []).append((observation, force, shaft))
+    for group in groups.values():
+        loads, places = (np.array([member[k] for member in group]) for k in (1, 2))
+        gain = _gain(loads, places) if len(group) >= 4 else None
+        if gain is None:
+            continue
+        for observation, _, _ in group:
+            _judge_gain(observation, gain)
+        _judge_places([member[0] for member in group], places, places - loads @ gain.T)
 
 
-def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArray) -> None:
+def _judge_places(group: Sequence[Observation], places: FloatArray, remainder: FloatArray) -> None:
     """A position that lies elsewhere than the others of its load and speed let one expect."""
+    shaft, off = places - places.mean(axis=0), remainder - remainder.mean(axis=0)
     size, misfit = float(np.median(np.hypot(*shaft.T))), np.hypot(*off.T)
     for observation, distance in zip(group, misfit):
         if len(group) >= 6 and distance > max(0.7 * size, 5 * float(np.median(misfit))):
@@ -239,83 +233,64 @@ def _judge_places(group: Sequence[Observation], shaft: FloatArray, off: FloatArr
 
 def _judge_gain(observation: Observation, gain: FloatArray) -> bool:
     """Whether `gain` (2, 2) [m/N] from force to displacement is positive definite, as it must be."""
-    if definiteness(gain) > _LEAST_DEFINITE or not np.any(gain) or "force" in observation.report.doubts:
-        return bool(np.any(gain)) and "force" not in observation.report.doubts
-    channels = [observation.channels[i] for i in observation.pick("displacement")]
+    judged = bool(np.any(gain)) and "force" not in observation.report.doubts
+    if not judged or definiteness(gain) > _LEAST_DEFINITE:
+        return judged
+    channels = observation.of("displacement")
     hint = name_fault(channels, lambda repair: definiteness(mirrored(channels, repair) @ gain))
-    names = " and ".join(c.name for c in channels)
     text = f"the shaft does not go to the side to which the load pushes it{hint}"
     cure = "Check axis, polarity and cables of the probes (and of the cells)"
-    _say_of_probes(observation, f"signs {names}{hint}", "error" if hint else "warning", text, cure)
+    _say_of_probes(observation, ("signs", hint), "error" if hint else "warning", text, cure)
     return False
 
 
-def _check_labels(directions: Sequence[_Shown]) -> None:
-    """Name runs whose pad number contradicts another run's.
+def _check_labels(runs: Sequence[Observation], shows: Sequence[float]) -> None:
+    """Name runs whose pad number contradicts another run's; `shows` [deg] is where each load goes.
 
     Two runs that contradict each other do not tell which of them is wrong. The others do: pads stand evenly around the
     shaft, so that the run is wrong which the arrangement that most runs agree on leaves over.
     """
-    pairs = [
-        (first, second) for i, second in enumerate(directions) for first in directions[:i] if _contradict(first, second)
-    ]
-    if not pairs:
-        return
-    odd = _odd_ones(directions)
-    for first, second in pairs:
-        struck = [suspect for suspect in (first, second) if id(suspect[0]) in odd]
-        suspect, partner = (
-            (struck[0], first if struck[0] is second else second) if len(struck) == 1 else (second, first)
-        )
-        _tell(suspect, partner, odd.get(id(suspect[0])) if len(struck) == 1 else None)
+    pads = [observation.run.pad or 0 for observation in runs]
+    belongs: dict[int, int] | None = None
+    for second, first in ((k, i) for k in range(len(runs)) for i in range(k)):
+        near = angle_between(shows[first], shows[second]) < _SAME_PAD
+        if near == (pads[first] == pads[second]):
+            continue
+        belongs = _misplaced(pads, shows) if belongs is None else belongs
+        wrong, other = (first, second) if first in belongs and second not in belongs else (second, first)
+        text = f"pad {pads[wrong]} is loaded toward {shows[wrong]:.0f} deg"
+        if pads[wrong] == pads[other]:
+            text += f" here, toward {shows[other]:.0f} deg in run {runs[other].run.id}"
+        else:
+            text += f", as is pad {pads[other]} in run {runs[other].run.id}"
+        cure = "One of the two runs names the wrong pad: correct it"
+        if wrong in belongs and other not in belongs:
+            text += f"; by the directions of the other runs it is pad {belongs[wrong]}"
+            cure = "Correct the pad number of this run"
+        if not any(f.key == "pad" for f in runs[wrong].report.found):
+            runs[wrong].report.say("pad", "error", "pad", text, cure)
 
 
-def _contradict(first: _Shown, second: _Shown) -> bool:
-    near = angle_between(first[1], second[1]) < _SAME_PAD
-    return near != (first[0].run.pad == second[0].run.pad)
-
-
-def _tell(suspect: _Shown, partner: _Shown, belongs: int | None) -> None:
-    """Name a contradiction, at the run that is wrong where that is known."""
-    observation, shows = suspect
-    text = f"pad {observation.run.pad} is loaded toward {shows:.0f} deg"
-    if observation.run.pad == partner[0].run.pad:
-        text += f" here, toward {partner[1]:.0f} deg in run {partner[0].run.id}"
-    else:
-        text += f", as is pad {partner[0].run.pad} in run {partner[0].run.id}"
-    cure = "One of the two runs names the wrong pad: correct it"
-    if belongs is not None:
-        text += f"; by the directions of the other runs it is pad {belongs}"
-        cure = "Correct the pad number of this run"
-    if not any(f.key == "pad" for f in observation.report.found):
-        observation.report.say("pad", "error", "pad", text, cure)
-
-
-def _odd_ones(directions: Sequence[_Shown]) -> dict[int, int]:
-    """Runs (by identity) that the evenly spaced arrangement of all others leaves over, with the pad that they load.
+def _misplaced(pads: Sequence[int], shows: Sequence[float]) -> dict[int, int]:
+    """Runs (by place) that the evenly spaced arrangement of all others leaves over, with the pad that they load.
 
     Empty where fewer than three runs agree on one arrangement, or where two arrangements serve as many.
     """
-    largest = max((observation.run.pad or 0) for observation, _ in directions)
     table: dict[frozenset[int], dict[int, int]] = {}
-    for count in _PADS:
-        for sense in (1, -1):
-            if count < largest:
-                continue
-            step = 360.0 * sense / count
-            for observation, shows in directions:
-                first = shows - step * ((observation.run.pad or 1) - 1)
-                places = {id(s): _pad_at(d, first, step, count) for s, d in directions}
-                fit = frozenset(id(s) for s, _ in directions if places[id(s)] == s.run.pad)
-                deviating = {id(s): places[id(s)] for s, _ in directions if id(s) not in fit}
-                if len(fit) >= 3 and None not in deviating.values():
-                    table.setdefault(fit, {k: v for k, v in deviating.items() if v is not None})
-    most = max((len(fit) for fit in table), default=0)
-    best = [deviating for fit, deviating in table.items() if len(fit) == most]
-    return best[0] if len(best) == 1 and 2 * most > len(directions) else {}
+    for count, sense in itertools.product(range(max(_LEAST_PADS, *pads), _MOST_PADS + 1), (1, -1)):
+        step = 360.0 * sense / count
+        for pad, direction in zip(pads, shows):
+            numbers = [_pad_at(angle - direction + step * (pad - 1), step, count) for angle in shows]
+            agree = frozenset(k for k, number in enumerate(numbers) if number == pads[k])
+            others = {k: number for k, number in enumerate(numbers) if k not in agree and number is not None}
+            if len(agree) >= 3 and len(agree) + len(others) == len(pads):
+                table.setdefault(agree, others)
+    most = max((len(agree) for agree in table), default=0)
+    best = [others for agree, others in table.items() if len(agree) == most]
+    return best[0] if len(best) == 1 and 2 * most > len(pads) else {}
 
 
-def _pad_at(direction: float, first: float, step: float, count: int) -> int | None:
-    """Number of the pad toward which a load goes; None between pads."""
-    number = round((direction - first) / step)
-    return number % count + 1 if angle_between(direction, first + number * step) < _AT_PAD else None
+def _pad_at(angle: float, step: float, count: int) -> int | None:
+    """Number of the pad toward which a load goes, so far from the first; None between pads."""
+    number = round(angle / step)
+    return number % count + 1 if angle_between(angle, number * step) < _AT_PAD else None

@@ -12,13 +12,14 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import refused_runs, slow_samples
+from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.presentation import Presented
-from tpjb_ident.slow_records.bad_samples import slow_samples
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,9 +151,7 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     """
     runs = campaign.of_kind("locus")
     if not runs:
-        raise RigDataError(
-            Problem("error", "campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
-        )
+        raise refuse("campaign.toml", "runs", "has no runs of kind locus", "Record the shaft locus")
     records, refused = _usable(runs)
     noise = _noise(list(records.values()))
     centre = np.zeros(2) if polygon is None else polygon.centre
@@ -184,9 +183,7 @@ def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Record], tuple[Condition, .
             problems += error.problems
     if 2 * len(records) <= len(runs):
         raise RigDataError(problems)
-    reasons = {str(p.run): p.what for p in reversed(problems)}
-    listed = "; ".join(f"{run} ({reasons[run]})" for run in reasons)
-    return records, (Condition("runs-refused", listed),) if reasons else ()
+    return records, refused_runs(problems)
 
 
 @dataclass(frozen=True)
@@ -211,35 +208,28 @@ def _read(run: Run) -> _Record:
     time, force, place, good, _ = slow_samples(run)
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
-        raise RigDataError(Problem("error", run.file, "record", what, "Repeat this direction", run=run.id))
+        raise refuse(run.file, "record", what, "Repeat this direction", run.id)
     time, place = time[good], place[good]
-    design = _turning(time, run.point.shaft_speed)
-    mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
     # what turns with the shaft (runout, unbalance) averages out only over whole turns: take it off
-    steady = place - design[:, 1:] @ mean[1:, :2]
+    speed = run.point.shaft_speed_hz
+    turning = [speed, 2 * speed] if speed * (time[-1] - time[0]) > 2.0 else []
+    design = line_design(time, np.array(turning), drift_order=0)
+    mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
+    steady = place - design[:, :-1] @ mean[:-1, :2]
     label = np.floor((time - time[0]) / _BLOCK).astype(int)
     count = np.bincount(label)
     usual = np.median(count[count > 0])
     parts = [label == k for k in np.flatnonzero(count > 0.5 * usual)]
-    load = mean[0, 2:]
+    load = mean[-1, 2:]
     return _Record(
         point=run.point,
-        position=np.asarray(mean[0, :2], dtype=float),
+        position=np.asarray(mean[-1, :2], dtype=float),
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
         span=float(time[-1] - time[0]),
         block_time=np.array([time[part].mean() for part in parts]),
         blocks=np.array([steady[part].mean(axis=0) for part in parts]),
     )
-
-
-def _turning(time: FloatArray, speed: float) -> FloatArray:
-    """Columns (n, p): one, and cosine and sine of once and twice per turn where the record holds two turns."""
-    columns = [np.ones_like(time)]
-    if speed > 0.0 and speed * (time[-1] - time[0]) > 4.0 * math.pi:
-        for order in (1.0, 2.0):
-            columns += [np.cos(order * speed * time), np.sin(order * speed * time)]
-    return np.column_stack(columns)
 
 
 def _noise(records: list[_Record]) -> NoiseModel:

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.vector import directions
 from tpjb_ident.clearance.polygon import Centre, CentreRule, SideFit, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
-from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,9 +172,7 @@ def measure_clearance(
     """
     runs = campaign.of_kind("clearance")
     if not runs:
-        raise RigDataError(
-            Problem("error", "campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
-        )
+        raise refuse("campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
     return measure_run(coldest_run(runs), pivot_angles, curves, rule)
 
 
@@ -190,7 +188,7 @@ def measure_run(
     reached = np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS
     if reached.sum() < 3:
         what = f"clearance run {run.id} reaches {int(reached.sum())} of {len(angles)} pads"
-        raise RigDataError(Problem("error", run.file, "record", what, "Check pad angles and channels", run=run.id))
+        raise refuse(run.file, "record", what, "Check pad angles and channels", run.id)
     fit = fit_sides(contact, angles, reached, curves)
     pads = np.flatnonzero(reached)
     centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)

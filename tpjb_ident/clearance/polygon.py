@@ -35,8 +35,9 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.sweep import ContactIntervals
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.curve import PivotCurve
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 
 CentreRule = Literal["least-absolute", "least-squares"]
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
@@ -187,21 +188,21 @@ def _place_along_side(contact: ContactIntervals, angles: FloatArray, reached: Bo
     far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
     design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
-    tangents = np.column_stack([-np.sin(angles), np.cos(angles)])
-    return np.asarray(contact.across - (tangents @ centre)[contact.pad])
+    return np.asarray(contact.across - (directions(angles + 0.5 * np.pi) @ centre)[contact.pad])
 
 
-def _smooth_side(load: FloatArray, place: FloatArray) -> FloatArray:
+def _smooth_side(contact: ContactIntervals, place: FloatArray) -> FloatArray:
     """Columns (m, 4) that span one side: its place, its turn, and any way in which its pivot deflects."""
+    load = np.maximum(contact.load, 0.0) / contact.push
     return np.column_stack([np.ones_like(load), np.cbrt(load) ** 2, load, place / 1e-4])
 
 
 def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
     """False for averages that do not lie on their side: the shaft was on its way, or a glitch was left."""
-    consistent = np.ones(len(contact.time), dtype=bool)
+    consistent, smooth = np.ones(len(contact.time), dtype=bool), _smooth_side(contact, place)
     for k in np.unique(contact.pad):
         members = np.flatnonzero(contact.pad == k)
-        design = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
+        design = smooth[members]
         good = np.ones(len(members), dtype=bool)
         for _ in range(8):
             if good.sum() < 8:
@@ -209,9 +210,9 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
             beta = np.linalg.lstsq(design[good], contact.along[members][good], rcond=None)[0]
             residual = contact.along[members] - design @ beta
             centre = np.median(residual[good])
-            spread = 1.4826 * np.median(np.abs(residual[good] - centre))
+            spread = robust_deviation(residual[good] - centre)
             # ten nanometres: what 16 bits resolve, so that a noise-free record keeps its averages
-            updated = np.abs(residual - centre) < _CLIP * max(float(spread), 1e-8)
+            updated = np.abs(residual - centre) < _CLIP * max(spread, 1e-8)
             if np.array_equal(updated, good):
                 break
             good = updated
@@ -221,11 +222,8 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
 
 def _noise(contact: ContactIntervals, place: FloatArray) -> NoiseModel:
     """Noise of the probes as the sweep itself shows it, about smooth sides."""
-    series = []
-    for k in np.unique(contact.pad):
-        members = contact.pad == k
-        mean = _smooth_side(np.maximum(contact.load[members], 0.0) / contact.push, place[members])
-        series.append(NoiseSeries(contact.time[members], contact.duration[members], contact.along[members], mean))
+    columns = contact.time, contact.duration, contact.along, _smooth_side(contact, place)
+    series = [NoiseSeries(*(c[contact.pad == k] for c in columns)) for k in np.unique(contact.pad)]
     return estimate_noise(series, _DRIFT_RATE)
 
 

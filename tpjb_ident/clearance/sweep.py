@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
-from tpjb_ident.slow_records.bad_samples import piece_means, slow_samples
+from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.slow_samples import piece_means, slow_samples
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -61,7 +62,7 @@ def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
 
 
 def _refused(run: Run, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", run.file, "record", f"clearance run {run.id} {what}", cure, run=run.id))
+    return refuse(run.file, "record", f"clearance run {run.id} {what}", cure, run.id)
 
 
 def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
@@ -124,7 +125,7 @@ def _average(
     lost = piece_means(np.isnan(carried).astype(float), starts, stops) > 0.0
     pads_touched = touched[starts]
     row, pad = np.nonzero(pads_touched & ~lost & _settled(moment, place, pads_touched)[:, None])
-    tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
+    tangent = directions(angles + 0.5 * np.pi)
     return ContactIntervals(
         time=moment[row],
         duration=count[row] * period,
@@ -149,7 +150,7 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     step = np.hypot(*np.diff(place, axis=0).T) / np.maximum(np.diff(time), 1e-9)
     speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
     ordinary = float(np.median(speed[corner]))
-    spread = 1.4826 * float(np.median(np.abs(speed[corner] - ordinary)))
+    spread = robust_deviation(speed[corner] - ordinary)
     moving = corner & (speed >= ordinary + _MOVING * spread)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]

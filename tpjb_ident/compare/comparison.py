@@ -14,14 +14,12 @@ from model.effects import Effect
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.coefficient_table import TableSource
+from tpjb_ident.compare.coefficient_table import TableRow, TableSource
 from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice, measured_laws
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     PointPrediction,
     Progress,
-    TablePoint,
-    coefficient_names,
     point_columns,
     predict_points,
 )
@@ -29,6 +27,7 @@ from tpjb_ident.dynamic.results.identification import Identification, coefficien
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +96,7 @@ class Variant:
     """Predictions with one pivot model, or another program's, under the name of its table."""
 
     name: str
-    points: tuple[PointPrediction | TablePoint, ...] = field(repr=False)
+    points: tuple[PointPrediction | TableRow, ...] = field(repr=False)
     locus: tuple[PointPrediction, ...] = field(repr=False, default=())
 
 
@@ -365,8 +364,7 @@ def locus_frame(comparison: Comparison) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-NAMES = (*coefficient_names("k"), *coefficient_names("c"))
-DIRECT = tuple(name for name in NAMES if name[1:3] in ("xx", "yy"))
+DIRECT = tuple(name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy"))
 
 
 def comparison_frame(comparison: Comparison) -> pd.DataFrame:
@@ -381,12 +379,12 @@ def comparison_frame(comparison: Comparison) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _row(variant: Variant, measured: PointResult, predicted: PointPrediction | TablePoint) -> dict[str, Any]:
+def _row(variant: Variant, measured: PointResult, predicted: PointPrediction | TableRow) -> dict[str, Any]:
     row: dict[str, Any] = {"pivots": variant.name, **point_columns(measured.point)}
     row["static_load_measured_N"] = measured.static_load_measured
     values = coefficient_columns(measured.stiffness)
-    model = dict(zip(NAMES, np.concatenate([predicted.k.ravel(), predicted.c.ravel()]), strict=True))
-    for name in NAMES:
+    model = dict(zip(COEFFICIENT_COLUMNS, np.concatenate([predicted.k.ravel(), predicted.c.ravel()]), strict=True))
+    for name in COEFFICIENT_COLUMNS:
         low, high = values[f"{name}_lo"], values[f"{name}_hi"]
         row[name], row[f"{name}_lo"], row[f"{name}_hi"] = values[name], low, high
         row[f"{name}_predicted"] = model[name]

@@ -16,6 +16,7 @@ from scipy.special import stdtrit
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
+from tpjb_ident.compare.coefficient_table import Tolerances, partners
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.dynamic.results.identification import Identification
 
-#: Set points of both are the same within this share, directions within this angle [deg].
-_SAME_POINT, _SAME_DIRECTION = 0.002, 0.5
+#: Set points of both that are the same.
+_SAME_POINT = Tolerances(load=0.002, direction=0.5, frequency=0.002)
 #: A difference within this share of the point's mean direct coefficient (a pad's stiffness, its clearance) is none:
 #: twice the tolerance that a model is granted.
 _NO_CHANGE = 0.03
@@ -92,6 +93,7 @@ class Difference:
 
     a: Side
     b: Side
+    pairs: IntArray  #: (n, 2) rows of the sides' tables that met
     points: pd.DataFrame  #: difference.csv
     pivots: pd.DataFrame  #: pivot_difference.csv
     clearance: pd.DataFrame  #: clearance_difference.csv
@@ -111,11 +113,13 @@ class Difference:
 
 def difference_of(a: Side, b: Side) -> Difference:
     """Hold two sides against each other, B less A."""
-    pairs = _matched(a.coefficients, b.coefficients)
+    partner = partners(a.coefficients, b.coefficients, _SAME_POINT)
+    pairs = np.column_stack([np.flatnonzero(partner >= 0), partner[partner >= 0]])
     shared = tuple(name for name in a.sensors if name in b.sensors and _same_instrument(name, a, b))
     return Difference(
         a,
         b,
+        pairs,
         _points(a, b, pairs, shared),
         _pivots(a, b),
         _clearance(a, b),
@@ -133,22 +137,6 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
     if channel in before:
         return before[channel] == after.get(channel)
     return before == after and a.campaign.housing_mass == b.campaign.housing_mass
-
-
-def _matched(a: pd.DataFrame, b: pd.DataFrame) -> IntArray:
-    """Rows of A and B that are of one operating point, (n, 2)."""
-    left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (a, b))
-    senses = [_rotation(frame) for frame in (a, b)]
-    pairs = []
-    for i, row in enumerate(left):
-        apart = np.abs(right - row)
-        turned = np.minimum(apart[:, 1] % 360.0, -apart[:, 1] % 360.0)
-        near = np.delete(apart, 1, axis=1) <= _SAME_POINT * np.abs(np.delete(row, 1))
-        same_sense = senses[1] == senses[0][i]
-        partners = np.flatnonzero(near.all(axis=1) & (turned <= _SAME_DIRECTION) & same_sense)
-        if len(partners):
-            pairs.append((i, partners[0]))
-    return np.array(pairs, dtype=int).reshape(-1, 2)
 
 
 def _rotation(frame: pd.DataFrame) -> np.ndarray:
@@ -322,7 +310,8 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
         return (f"{a} and {b} have no operating point in common.", *_sentences_beside(difference))
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
     largest = _largest_change(points)
-    rest = f"{no} are the same within {100 * _NO_CHANGE:g} %, of {number - yes - no} the records cannot tell."
+    rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
+    rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
     return (
         f"{head}, most of all {largest}." if yes else f"{head}.",
         f"At {counted(len(points), 'common operating point')}: {rest}",

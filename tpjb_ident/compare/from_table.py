@@ -11,10 +11,11 @@ from model.bearing import Bearing
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource, read_coefficients
 from tpjb_ident.compare.comparison import CompareSettings, Comparison, Variant, possible_variants
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
+from tpjb_ident.condition_kinds import KINDS
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.schema import ENTRIES
 
 _METHOD = "table"
 
@@ -49,27 +50,12 @@ def compare_table(
 
 def _point(row: TableRow) -> PointResult:
     """A row as if it had been identified; what it does not hold is NaN."""
-    value, error, omega = np.full(8, np.nan), np.full(8, np.nan), row.point.excitation
-    for j, entry in enumerate(ENTRIES):
-        value[j], error[j] = row.coefficients.get(f"k{entry}", (np.nan, np.nan))
-        value[4 + j], error[4 + j] = omega * np.array(row.coefficients.get(f"c{entry}", (np.nan, np.nan)))
-    h = (value[:4] + 1j * value[4:]).reshape(2, 2)
-    stiffness = DynamicStiffness(h, omega, np.diag(error**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
-    nothing = np.full(2, np.nan)
+    omega = row.point.excitation
+    h, errors = row.k + 1j * omega * row.c, row.errors * np.repeat([1.0, omega], 4)
+    stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
+    nowhere = np.full(2, np.nan)
+    quality = tuple(Condition(name) for name in row.status if name in KINDS)
     return PointResult(
-        row.point,
-        stiffness,
-        {_METHOD: stiffness},
-        row.point.static_load,
-        nothing,
-        nothing,
-        {},
-        0,
-        0,
-        0.0,
-        np.nan,
-        np.nan,
-        (),
-        (),
-        (),
-    )
+        row.point, stiffness, {_METHOD: stiffness}, row.point.static_load, nowhere, nowhere, {}, n_records=0,
+        n_windows=0, outlier_fraction=0.0, coherence=np.nan, amplitude=np.nan, quality=quality, rejected=(), runs=(),
+    )  # fmt: skip

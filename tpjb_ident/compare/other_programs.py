@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.coefficient_table import TableRow, read_rows
+from tpjb_ident.compare.coefficient_table import TableRow, Tolerances, partners, read_rows
 from tpjb_ident.compare.comparison import VARIANTS, Comparison, Variant
-from tpjb_ident.compare.predictions import TablePoint
+from tpjb_ident.compare.predictions import point_columns
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.schema import ENTRIES
 
-#: How far a row may be from an operating point that it predicts: what set points are rounded by in tables.
-_LOAD, _DIRECTION, _FREQUENCY = 0.01, math.radians(1.0), 0.005
+#: What set points are rounded by in tables.
+_ROUNDED = Tolerances(load=0.01, direction=1.0, frequency=0.005)
 _TOLERANCES = "its load within 1 %, direction within 1 deg, speed and excitation within 0.5 %, the same rotation"
 #: Points and lines that a remark lists.
 _MOST = 6
@@ -48,14 +47,16 @@ def with_predictions(comparison: Comparison, tables: Sequence[PredictionTable]) 
     points = [measured.point for measured in comparison.identification.points]
     variants, remarks = list(comparison.variants), list(comparison.remarks)
     for table in tables:
-        met = [_nearest(table.rows, point) for point in points]
-        unmet = [row for row in table.rows if row not in met]
+        theirs = pd.DataFrame([point_columns(row.point) for row in table.rows])
+        nearest = partners(pd.DataFrame(map(point_columns, points)), theirs, _ROUNDED)
+        met = [None if index < 0 else table.rows[index] for index in nearest]
+        unmet = [row for row in table.rows if not any(row is other for other in met)]
         if len(unmet) == len(table.rows):
             raise BadInputError(
                 f"--prediction {table.file}: no row meets an operating point ({_TOLERANCES}). Its first row is "
                 f"{table.rows[0].point}; the first measured point is {points[0]}. Check units and signs of its columns."
             )
-        variants.append(Variant(table.name, tuple(map(_table_point, points, met))))
+        variants.append(Variant(table.name, tuple(map(_at, points, met))))
         alone = [str(point) for point, row in zip(points, met, strict=True) if row is None]
         remarks.append(_remark(table, len(points), alone, unmet))
     if tables:
@@ -63,37 +64,10 @@ def with_predictions(comparison: Comparison, tables: Sequence[PredictionTable]) 
     return replace(comparison, variants=tuple(variants), remarks=tuple(remarks))
 
 
-def _nearest(rows: Sequence[TableRow], point: OperatingPoint) -> TableRow | None:
-    """The row of a point, the nearest where several are within the tolerances."""
-    distances = [(_distance(row, point), row.line, row) for row in rows]
-    distance, _, row = min(distances)
-    return row if distance <= 1.0 else None
-
-
-def _distance(row: TableRow, point: OperatingPoint) -> float:
-    """Largest deviation of a row from an operating point, over its tolerance."""
-    if row.point.rotation != point.rotation:
-        return math.inf
-    excitation = point.excitation or point.shaft_speed
-    turn = row.point.static_load_direction - point.static_load_direction
-    return max(
-        _share(row.point.static_load, point.static_load) / _LOAD,
-        abs(math.remainder(turn, 2.0 * math.pi)) / _DIRECTION,
-        _share(row.point.shaft_speed, point.shaft_speed) / _FREQUENCY,
-        _share(row.point.excitation, excitation) / _FREQUENCY,
-    )
-
-
-def _share(value: float, of: float) -> float:
-    return abs(value - of) / of if of > 0.0 else math.inf
-
-
-def _table_point(point: OperatingPoint, row: TableRow | None) -> TablePoint:
-    values = {} if row is None else row.coefficients
-    k, c = (np.array([values.get(kind + entry, (math.nan,))[0] for entry in ENTRIES]).reshape(2, 2) for kind in "kc")
-    if row is None:
-        return TablePoint(point, k, c, status=("no row of the table",))
-    return TablePoint(point, k, c, row.position, row.converged)
+def _at(point: OperatingPoint, row: TableRow | None) -> TableRow:
+    """A row at the point that it meets; without one, a row of nothing."""
+    nothing = np.full(8, np.nan)
+    return replace(row, point=point) if row else TableRow(0, point, nothing, nothing, status=("no row of the table",))
 
 
 def _remark(table: PredictionTable, total: int, alone: Sequence[str], unmet: Sequence[TableRow]) -> str:

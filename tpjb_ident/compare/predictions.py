@@ -17,7 +17,7 @@ from model.pivots import pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.schema import KINDS, POINT_KEY
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,19 +77,6 @@ class PointPrediction:
         return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
 
 
-@dataclass(frozen=True)
-class TablePoint:
-    """What a table gives for one operating point; NaN where it gives nothing. Stands where a `PointPrediction` does."""
-
-    point: OperatingPoint
-    k: np.ndarray = field(repr=False)  #: (2, 2) [N/m]
-    c: np.ndarray = field(repr=False)  #: (2, 2) [N s/m]
-    position: tuple[float, float] = (math.nan, math.nan)
-    converged: bool = True
-    status: tuple[str, ...] = ()
-    extrapolated: bool = False
-
-
 def predict_points(
     bearing: Bearing,
     points: Iterable[OperatingPoint],
@@ -142,11 +129,6 @@ def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     return dict(zip(POINT_KEY, excited.key, strict=True))
 
 
-def coefficient_names(kind: str) -> tuple[str, ...]:
-    """Column names of the four stiffnesses (``"k"``) or dampings (``"c"``), row by row."""
-    return KINDS[kind].columns
-
-
 def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> pd.DataFrame:
     """Build prediction.csv: one row per operating point."""
     import pandas as pd
@@ -162,8 +144,8 @@ def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = T
 def _row(point_prediction: PointPrediction, mesh_error: bool) -> dict[str, Any]:
     p = point_prediction.prediction
     row: dict[str, Any] = dict(point_columns(point_prediction.point))
-    row.update(zip(coefficient_names("k"), point_prediction.k.ravel(), strict=True))
-    row.update(zip(coefficient_names("c"), point_prediction.c.ravel(), strict=True))
+    coefficients = np.concatenate([point_prediction.k.ravel(), point_prediction.c.ravel()])
+    row.update(zip(COEFFICIENT_COLUMNS, coefficients, strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))

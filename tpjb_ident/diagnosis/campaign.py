@@ -20,9 +20,8 @@ from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
 from tpjb_ident.diagnosis.forward.forward import SENSOR
-from tpjb_ident.diagnosis.forward.tolerances import StatedTolerance, Tolerances
-from tpjb_ident.diagnosis.observations.from_table import observe_table
-from tpjb_ident.diagnosis.observations.observe import observe
+from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.observe import observe, observe_table
 from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
@@ -243,11 +242,8 @@ def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) 
     gains = [float(p.uncertainty) for p in probes if p.uncertainty]
     if gains and tolerances.stated["probe_gain"].source == "default":
         tolerances = tolerances.states({"probe_gain": max(gains)}, "manifest")
-    if len(probes) == 2 and abs(math.sin(float(probes[0].axis or 0.0) - float(probes[1].axis or 0.0))) > 0.05:
-        tolerances = replace(tolerances, probe_axes=(float(probes[0].axis or 0.0), float(probes[1].axis or 0.0)))
-    if cells:
-        gain = max(float(c.uncertainty or 0.0) for c in cells)
-        tolerances = replace(tolerances, cell_gain=StatedTolerance(gain, "manifest"))
+    if cells and tolerances.stated["cell_gain"].source == "default":
+        tolerances = tolerances.states({"cell_gain": max(float(c.uncertainty or 0.0) for c in cells)}, "manifest")
     return tolerances
 
 
@@ -267,6 +263,9 @@ _STIFF = 1e13
 def _with_housing(setup: Setup, campaign: Campaign) -> Setup:
     """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
     instruments = setup.instruments
+    axes = [float(c.axis) for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
+    if len(axes) == 2 and abs(math.sin(axes[0] - axes[1])) > 0.05:
+        instruments = replace(instruments, probe_axes=(axes[0], axes[1]))
     if math.isfinite(campaign.housing_mass):
         instruments = replace(instruments, housing_mass=campaign.housing_mass)
     stiffness = cell_stiffness(campaign)

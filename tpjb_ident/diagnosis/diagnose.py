@@ -10,24 +10,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from model.effects import Effect, apply_effects
+from model.mirror import rotation_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.comparison.fit import Fit
 from tpjb_ident.diagnosis.comparison.problem import Problem, loosened
 from tpjb_ident.diagnosis.comparison.search import Comparison, Progress, compare
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.unknowns import derivatives
 from tpjb_ident.diagnosis.forward.candidates import candidates
-from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance, column_of, nuisances
+from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.nuisance import nuisances
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.forward.workers import Map, workers
 from tpjb_ident.diagnosis.next_test import Separation, options_for, ranked, say, separated, suggested
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.verdict.decide import decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
-from tpjb_ident.dynamic.results.identification import coefficient_columns, point_columns
-from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, coefficient_column
+from tpjb_ident.dynamic.results.identification import coefficient_columns
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,13 +82,16 @@ def pose(observations: Observations, forward: Forward, settings: DiagnoseSetting
     base = forward()
     trusted = loosened(observations, forward.pad_shares(), settings.tolerance)
     listed = nuisances(trusted.elements, forward.setup, settings.tolerances)
-    with workers(forward, base, settings.workers) as run:
-        columns = np.column_stack([np.zeros((len(base), 0)), *run(_column, [(listed, i) for i in range(len(listed))])])
-    return Problem(trusted, base, listed, columns, candidates(forward.setup.bearing, settings.skip))
-
-
-def _column(forward: ForwardModel, base: FloatArray, unknowns: tuple[Nuisance, ...], index: int) -> FloatArray:
-    return column_of(forward, (), unknowns, np.zeros(len(unknowns)), base, index)
+    # without a cold polygon the clearance of the file and that of the running bearing are one
+    unseen = frozenset() if observations.layout.push_load is not None else frozenset({"clearance_error"})
+    pool = candidates(forward.setup.bearing, settings.skip | unseen)
+    problem = Problem(trusted, base, listed, np.zeros((len(base), len(listed))), pool)
+    with workers(forward, problem, settings.workers) as run:
+        jobs = [((), np.zeros(len(listed)), (i,)) for i in range(len(listed))]
+        for i, (column,) in enumerate(run(derivatives, jobs)):
+            if column is not None:
+                problem.columns[:, i] = column * problem.sigma
+    return problem
 
 
 def _next_test(
@@ -162,33 +168,54 @@ def _thinned(observations: Observations) -> Observations:
 
 
 def before_and_after(diagnosis: Diagnosis, identification: Identification | None) -> pd.DataFrame:
-    """Make a table as comparison.csv of a diagnosis."""
+    """Make a table as comparison.csv of a diagnosis; K and C of a table stand in it as the table has them."""
     import pandas as pd
 
+    observations = diagnosis.observations
     models = [(BEFORE, diagnosis.problem.base)]
     models += [(AFTER, diagnosis.after)] if diagnosis.verdict.effects else []
-    frames = []
+    measured = (
+        {_place(p.point): (p.point, coefficient_columns(p.stiffness)) for p in identification.points}
+        if identification is not None
+        else _coefficients(observations, observations.value, np.sqrt(np.diag(observations.covariance)))
+    )
+    rows = []
     for name, prediction in models:
-        predicted = _by_point(diagnosis, prediction)
-        for p in identification.points if identification is not None else ():
-            own = predicted.get((round(p.point.static_load, 6), round(p.point.excitation, 6)), {})
-            row: dict[str, Any] = {"pivots": name, **point_columns(p), **coefficient_columns(p.stiffness)}
-            for kind, omega in ((STIFFNESS, 1.0), (DAMPING, p.point.excitation)):
-                for entry in ENTRIES:
-                    column = kind.column(entry)
-                    row[f"{column}_predicted"] = own.get(f"{kind.symbol}{entry}", math.nan) / omega
-                    row[f"{column}_ratio"] = row[f"{column}_predicted"] / row[column]
-            frames.append(row)
-    return pd.DataFrame(frames)
+        predicted = _coefficients(observations, prediction)
+        for place, (point, columns) in measured.items():
+            empty = {f"{column}{end}": math.nan for column in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")}
+            row: dict[str, Any] = {"pivots": name, **dict(zip(POINT_KEY, point.key, strict=True)), **empty, **columns}
+            own = predicted[place][1] if place in predicted else {}
+            for column in COEFFICIENT_COLUMNS:
+                row[f"{column}_predicted"] = own.get(column, math.nan)
+                row[f"{column}_ratio"] = row[f"{column}_predicted"] / row[column]
+            rows.append(row)
+    return pd.DataFrame(rows)
 
 
-def _by_point(diagnosis: Diagnosis, prediction: FloatArray) -> dict[tuple[float, float], dict[str, float]]:
-    """Re h and Im h [N/m] by load [N] and excitation [rad/s]."""
-    out: dict[tuple[float, float], dict[str, float]] = {}
-    for element, value in zip(diagnosis.observations.elements, prediction, strict=True):
-        if element.family == "h":
-            key = (round(element.place("load"), 6), round(element.place("excitation"), 6))
-            out.setdefault(key, {})[element.observable] = float(value)
+Place = tuple[float, ...]
+
+
+def _place(point: OperatingPoint) -> Place:
+    return tuple(round(v, 6) for v in (point.static_load, point.static_load_direction, point.spin, point.excitation))
+
+
+def _coefficients(
+    observations: Observations, vector: FloatArray, errors: FloatArray | None = None
+) -> dict[Place, tuple[OperatingPoint, dict[str, float]]]:
+    """K and C of every operating point of a vector (n,), with intervals where there are errors (n,)."""
+    out: dict[Place, tuple[OperatingPoint, dict[str, float]]] = {}
+    for i, element in enumerate(observations.elements):
+        if element.family != "h":
+            continue
+        load, direction, speed, omega = (element.place(k) for k in ("load", "direction", "speed", "excitation"))
+        point = OperatingPoint(load, direction, abs(speed), omega, rotation_of(speed))
+        _, columns = out.setdefault(_place(point), (point, {}))
+        column, factor = coefficient_column(element.observable), omega if element.observable[0] == "c" else 1.0
+        columns[column] = float(vector[i]) / factor
+        if errors is not None:
+            half = 1.96 * float(errors[i]) / factor
+            columns |= {f"{column}_lo": columns[column] - half, f"{column}_hi": columns[column] + half}
     return out
 
 

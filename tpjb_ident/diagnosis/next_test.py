@@ -24,10 +24,10 @@ from scipy.special import ndtr
 from model.effects import Effect, kind_of
 from model.setup import Setup
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.forward import Change, Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.observations.observe import DynamicTest, Layout, Observations
 from tpjb_ident.diagnosis.planned import around, dry, dynamic, planned_observations

@@ -15,11 +15,11 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
 from tpjb_ident.diagnosis.planned import planned_observations

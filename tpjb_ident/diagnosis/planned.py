@@ -9,6 +9,7 @@ import numpy as np
 
 from model.setup import Setup
 from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.observations.constants import Tolerance
 from tpjb_ident.diagnosis.observations.gap import direct_scale
 from tpjb_ident.diagnosis.observations.observe import (
     ENTRY_NAMES,
@@ -18,7 +19,6 @@ from tpjb_ident.diagnosis.observations.observe import (
     Layout,
     LocusTest,
     Observations,
-    Tolerance,
 )
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,

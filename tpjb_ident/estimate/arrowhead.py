@@ -1,11 +1,15 @@
-"""Normal equations of an arrow: the eight numbers of every point, bordered by the parameters that all points share.
+"""Normal equations of an arrow: numbers of every point, bordered by the parameters that all points share.
 
-With A_p = J_h^T J_h, E_p = J_h^T J_t, g_p = J_h^T r summed over a point's blocks, G = J_t^T J_t + Lambda and
-g = J_t^T r + Lambda (theta_0 - theta) over all blocks::
+A point's numbers x_p are those of its H and the parameters of terms that are its own. With A_p = J_p^T J_p,
+E_p = J_p^T J_t, g_p = J_p^T r summed over a point's blocks (the prior of its own parameters added),
+G = J_t^T J_t + Lambda and g = J_t^T r + Lambda (theta_0 - theta) over all blocks::
 
     S = G - sum_p E_p^T A_p^-1 E_p          d_theta = S^-1 (g - sum_p E_p^T A_p^-1 g_p)
-    K_p = -A_p^-1 E_p                       d_h_p = A_p^-1 (g_p - E_p d_theta)
-    Cov(theta) = S^-1                       Cov(h_p) = A_p^-1 + K_p S^-1 K_p^T
+    K_p = -A_p^-1 E_p                       d_x_p = A_p^-1 (g_p - E_p d_theta)
+    Cov(theta) = S^-1                       Cov(x_p, x_q) = delta_pq A_p^-1 + K_p S^-1 K_q^T
+
+Time and memory are linear in the points: what one point's own parameter does to another goes through the border, and
+is kept as its two factors.
 
 A parameter of which the records tell little (posterior deviation above 0.8 of the prior's) is considered, not
 estimated: its value stays, its prior passes into the covariance. Estimated, it would be moved by what the model of the
@@ -28,14 +32,32 @@ _TOLD = 1e-13
 NUMBERS = 8
 
 
+@dataclass(frozen=True)
+class Prior:
+    """What is known of parameters beforehand: (q,) of those that all share, (P, L) of those of every point."""
+
+    distance: FloatArray  #: prior mean minus value
+    precision: FloatArray  #: Lambda
+    always: BoolArray  #: estimated however little the records tell
+
+    def estimated(self, posterior: FloatArray) -> BoolArray:
+        """Which are estimated, by their posterior variance if all were."""
+        return np.asarray((np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED) | self.always)
+
+    @staticmethod
+    def none(points: int) -> Prior:
+        """Points without parameters of their own."""
+        return Prior(np.zeros((points, 0)), np.zeros((points, 0)), np.zeros((points, 0), dtype=bool))
+
+
 @dataclass
 class Sums:
-    """Sums of the normal equations over blocks, P points and q parameters."""
+    """Sums of the normal equations over blocks, P points and q shared parameters, without the priors."""
 
-    A: FloatArray  #: (P, k, k), k numbers a point: eight, or those of a model over frequency
-    E: FloatArray  #: (P, k, q)
-    g_h: FloatArray  #: (P, k)
-    G: FloatArray  #: (q, q), without the priors
+    A: FloatArray  #: (P, n, n), n numbers a point: of H, eight or those of a model over frequency, then L of its own
+    E: FloatArray  #: (P, n, q)
+    g_h: FloatArray  #: (P, n)
+    G: FloatArray  #: (q, q)
     g_t: FloatArray  #: (q,)
 
     @staticmethod
@@ -59,9 +81,10 @@ class Sums:
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
 
-    def drop(self, points: BoolArray) -> None:
-        """Leave points (P,) out that have no answer."""
-        self.A[points], self.E[points], self.g_h[points] = np.eye(self.A.shape[1]), 0.0, 0.0
+    def drop(self, points: BoolArray, numbers: int) -> None:
+        """Leave points (P,) out that have no answer, `numbers` of H each."""
+        self.A[points], self.E[points], self.g_h[points] = 0.0, 0.0, 0.0
+        self.A[points, :numbers, :numbers] = np.eye(numbers)
 
 
 def are_told(A: FloatArray) -> BoolArray:
@@ -72,25 +95,33 @@ def are_told(A: FloatArray) -> BoolArray:
 
 
 @dataclass(frozen=True)
-class Step:
-    """One step of the solve, and the covariances that go with it."""
+class Own:
+    """Parameters of every point alone, and what one standard deviation of their priors does."""
 
-    h: FloatArray  #: (P, 8)
+    change: FloatArray  #: (P, L): of their values in the step
+    deviation: FloatArray  #: (P, L): posterior
+    estimated: BoolArray  #: (P, L)
+    here: FloatArray = field(repr=False)  #: (P, k, L): to the point's numbers of H
+    shared: FloatArray = field(repr=False)  #: (P, q, L): to the shared parameters, and through them to all points
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the solve, and the covariances that go with it; k numbers of H a point."""
+
+    h: FloatArray  #: (P, k)
     theta: FloatArray  #: (q,)
-    A_inverse: FloatArray = field(repr=False)  #: (P, 8, 8)
-    K: FloatArray = field(repr=False)  #: (P, 8, q)
+    own: Own
+    given: FloatArray = field(repr=False)  #: (P, k, k): covariance of H with all parameters given
+    records: FloatArray = field(repr=False)  #: (P, k, k): that the records leave, the learning of parameters included
+    K: FloatArray = field(repr=False)  #: (P, k, q)
     S: FloatArray = field(repr=False)  #: (q, q)
     S_inverse: FloatArray = field(repr=False)  #: (q, q): zero in rows and columns of considered parameters
     estimated: BoolArray = field(repr=False)  #: (q,)
     precision: FloatArray = field(repr=False)  #: (q,): Lambda
 
-    def records(self) -> FloatArray:
-        """Covariance (P, 8, 8) of the points' numbers that the records leave, the learning of parameters included."""
-        learnt = self.S_inverse @ (self.S - np.diag(self.precision)) @ self.S_inverse
-        return self.A_inverse + self.K @ learnt @ self.K.transpose(0, 2, 1)
-
     def factors(self) -> FloatArray:
-        """One standard deviation of every parameter's prior, as it moves all points together, (q, P, 8)."""
+        """One standard deviation of every shared parameter's prior, as it moves all points together, (q, P, k)."""
         moved = np.einsum("pak,kq->qpa", self.K, self.S_inverse) * np.sqrt(self.precision)[:, None, None]
         considered = np.flatnonzero(~self.estimated)
         if len(considered):
@@ -99,26 +130,107 @@ class Step:
             moved[considered] = passed.transpose(2, 0, 1) / np.sqrt(self.precision[considered])[:, None, None]
         return moved
 
+    def own_share(self, chosen: BoolArray) -> FloatArray:
+        """Covariance (P, k, k) by the priors of the points' own parameters `chosen` (P, L), of all points."""
+        here, shared = (part * chosen[:, None, :] for part in (self.own.here, self.own.shared))
+        across = here @ shared.transpose(0, 2, 1) @ self.K.transpose(0, 2, 1)
+        everywhere = np.einsum("pql,prl->qr", shared, shared)
+        through = self.K @ everywhere @ self.K.transpose(0, 2, 1)
+        return here @ here.transpose(0, 2, 1) + across + across.transpose(0, 2, 1) + through
+
     @property
     def deviation(self) -> FloatArray:
-        """Posterior standard deviation of every parameter, (q,)."""
+        """Posterior standard deviation of every shared parameter, (q,)."""
         posterior = np.sqrt(np.maximum(np.diag(self.S_inverse), 0.0))
         return np.where(self.estimated, posterior, 1 / np.sqrt(self.precision))
 
 
-def step(sums: Sums, to_prior: FloatArray, precision: FloatArray, always: BoolArray) -> Step:
-    """Solve the normal equations; `to_prior` (q,) prior mean minus value, `precision` (q,), `always` (q,) bool."""
-    A_inverse = np.linalg.inv(sums.A)
-    K = -A_inverse @ sums.E
-    S = sums.G + np.diag(precision) + np.einsum("pak,pal->kl", sums.E, K)
-    g = sums.g_t + precision * to_prior + np.einsum("pak,pa->k", K, sums.g_h)
-    posterior = np.sqrt(np.abs(np.diag(np.linalg.inv(S)))) if len(S) else np.zeros(0)
-    estimated = (posterior * np.sqrt(precision) < CONSIDERED) | always
+def step(sums: Sums, shared: Prior, own: Prior) -> Step:
+    """Solve the normal equations; the points' own parameters are the last of their numbers."""
+    k = sums.A.shape[1] - own.precision.shape[1]
+    given = np.asarray(np.linalg.inv(sums.A[:, :k, :k]), dtype=float)
+    A, g = sums.A.copy(), sums.g_h.copy()
+    last = np.arange(k, A.shape[1])
+    A[:, last, last] += own.precision
+    g[:, k:] += own.precision * own.distance
+    G = sums.G + np.diag(shared.precision)
+    A_inverse, K, S = _eliminated(A, sums.E, G)
+    inverse = np.asarray(np.linalg.inv(S), dtype=float)
+    estimated = shared.estimated(np.diag(inverse))
+    told = own.estimated(_variances(A_inverse, K, inverse)[:, k:])
+    # what is considered takes no part: its place holds a one, what it would move is kept apart
+    part = np.concatenate([np.ones((len(A), k), dtype=bool), told], axis=1)
+    moves = A[:, :, k:] * part[:, :, None] * ~told[:, None, :]
+    moves_shared = (sums.E[:, k:] * ~told[:, :, None]).transpose(0, 2, 1)
+    distance = np.where(told, 0.0, own.distance)
+    g = part * (g - np.einsum("pal,pl->pa", moves, distance))
+    g_t = sums.g_t + shared.precision * shared.distance - np.einsum("pql,pl->q", moves_shared, distance)
+    A = A * part[:, :, None] * part[:, None, :] + ~part[:, :, None] * np.eye(A.shape[1])
+    A_inverse, K, S = _eliminated(A, sums.E * part[:, :, None], G)
     S_inverse = np.zeros_like(S)
     chosen = np.ix_(estimated, estimated)
     S_inverse[chosen] = np.linalg.inv(S[chosen])
-    remaining = g - S[:, ~estimated] @ to_prior[~estimated]
-    theta = S_inverse @ (estimated * remaining) + np.where(estimated, 0.0, to_prior)
-    h = np.einsum("pab,pb->pa", A_inverse, sums.g_h) + K @ theta
-    inverse = np.asarray(A_inverse, dtype=float)
-    return Step(h, theta, inverse, K, S, S_inverse, np.asarray(estimated), precision)
+    remaining = g_t + np.einsum("pak,pa->k", K, g) - S[:, ~estimated] @ shared.distance[~estimated]
+    theta = S_inverse @ (estimated * remaining) + np.where(estimated, 0.0, shared.distance)
+    x = np.einsum("pab,pb->pa", A_inverse, g) + K @ theta
+    posterior = np.sqrt(np.maximum(_variances(A_inverse, K, S_inverse)[:, k:], 0.0))
+    root = np.sqrt(own.precision)
+    pushes = -(moves_shared + K.transpose(0, 2, 1) @ moves)
+    points = Own(
+        np.where(told, x[:, k:], own.distance),
+        np.where(told, posterior, 1 / root),
+        told,
+        _by_prior(told, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),
+        S_inverse @ _by_prior(told, K[:, k:].transpose(0, 2, 1), pushes, root),
+    )
+    weight = np.concatenate([np.zeros((len(A), k)), own.precision * told], axis=1)
+    records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
+    return Step(x[:, :k], theta, points, given, records, K[:, :k], S, S_inverse, estimated, shared.precision)
+
+
+def _by_prior(told: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
+    """Changes (P, .., L) by one standard deviation of estimated and considered priors; `root` (P, L) of precision."""
+    scale = root[:, None, :]
+    return np.asarray(np.where(told[:, None, :], learnt * scale, passed / scale))
+
+
+def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Inverse of A, K, and S: the border without the points.
+
+    By the points' Cholesky factors: an explicit inverse would lose what S keeps beside G where priors are wide.
+    """
+    n = A.shape[1]
+    white = np.linalg.solve(_root(A), np.concatenate([E, np.broadcast_to(np.eye(n), A.shape)], axis=2))
+    E_white, back = np.split(white, [E.shape[2]], axis=2)
+    A_inverse = np.asarray(back.transpose(0, 2, 1) @ back, dtype=float)
+    flat = E_white.reshape(len(A) * n, E.shape[2])
+    K = np.asarray(-back.transpose(0, 2, 1) @ E_white, dtype=float)
+    return A_inverse, K, np.asarray(G - flat.T @ flat, dtype=float)
+
+
+def _root(A: FloatArray) -> FloatArray:
+    """Cholesky factors; where one has none, a point whose weights left it at the edge of what is told, with a ridge."""
+    try:
+        return np.asarray(np.linalg.cholesky(A), dtype=float)
+    except np.linalg.LinAlgError:
+        ridge = _TOLD * np.einsum("paa->pa", A)[:, :, None] * np.eye(A.shape[1])
+        return np.asarray(np.linalg.cholesky(A + ridge), dtype=float)
+
+
+def _records(
+    A_inverse: FloatArray, K: FloatArray, S: FloatArray, S_inverse: FloatArray, own: FloatArray, shared: FloatArray
+) -> FloatArray:
+    """Covariance (P, n, n) that the records alone leave; `own` (P, n), `shared` (q,) precision of the priors.
+
+    As products throughout: differences of what wide priors leave would lose the records' share.
+    """
+    weighed = own[:, :, None] * K
+    learnt = S_inverse @ (S - np.diag(shared) - np.einsum("pak,pal->kl", K, weighed)) @ S_inverse
+    alone = A_inverse - A_inverse @ (own[:, :, None] * A_inverse)
+    across = A_inverse @ weighed @ S_inverse @ K.transpose(0, 2, 1)
+    return alone + K @ learnt @ K.transpose(0, 2, 1) - across - across.transpose(0, 2, 1)
+
+
+def _variances(A_inverse: FloatArray, K: FloatArray, S_inverse: FloatArray) -> FloatArray:
+    """Variances of the points' numbers, (P, n)."""
+    return np.einsum("paa->pa", A_inverse) + np.einsum("pak,kl,pal->pa", K, S_inverse, K, optimize=True)

@@ -105,10 +105,20 @@ def film_columns(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
     size = np.where(h.real == 0.0, 1.0, h.real)
     power = np.clip(state.slope[blocks.point].real / size, -2.0, 2.0)
     growth[known] += (blocks.miss.real[:, None, None] * power)[known]
-    force = np.zeros((n, 2, 4), complex)
-    for k in range(4):
-        force[:, k // 2, k] = growth[:, k // 2, k % 2] * d[:, k % 2]
-    return film_force_rows(rig, blocks, state, force)
+    return film_force_rows(rig, blocks, state, entry_forces(growth.reshape(n, 4), d))
+
+
+def entry_forces(size: ComplexArray | FloatArray, d: ComplexArray) -> ComplexArray:
+    """Forces (n, 2, k) of single entries xx, xy, yx, yy of H, over and over, `size` (n, k) each, at the motion d."""
+    force = np.zeros((len(d), 2, size.shape[1]), complex)
+    for k in range(size.shape[1]):
+        force[:, k % 4 // 2, k] = size[:, k] * d[:, k % 2]
+    return force
+
+
+def entry_sizes(h: ComplexArray) -> ComplexArray:
+    """Sizes of the eight numbers of H (n, 2, 2), those of Im h times i, (n, 8)."""
+    return np.concatenate([np.abs(h.real), 1j * np.abs(h.imag)], axis=1).reshape(len(h), 8)
 
 
 def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray) -> ComplexArray:

@@ -26,9 +26,10 @@ from tpjb_ident.estimate.equation import (
 )
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
+from tpjb_ident.estimate.parameters import Table
 from tpjb_ident.estimate.scatter import Residuals, Scatter
 from tpjb_ident.estimate.shape import Shape
-from tpjb_ident.estimate.term import Fitted, Term
+from tpjb_ident.estimate.term import Additive, Fitted, Term
 
 #: Steps of Gauss-Newton, at most, and the relative change of H at which it ends.
 _STEPS, _CONVERGED = 18, 1e-9
@@ -50,7 +51,7 @@ class Solution:
     records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
     given: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2: of `records`, with the terms' parameters given
     shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
-    factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every parameter
+    factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
     fitted: dict[str, Fitted] = field(repr=False)
     terms: tuple[Term, ...] = field(repr=False)
     scatter: Scatter = field(repr=False)
@@ -91,13 +92,8 @@ class Solver:
         self.group = self.shape.group[blocks.point]
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
-        self.parameters = [p for term in self.terms for p in term.parameters]
-        ends = np.cumsum([0] + [len(term.parameters) for term in self.terms])
-        self.part = {term.name: slice(int(a), int(b)) for term, a, b in zip(self.terms, ends, ends[1:])}
-        self.mean = np.array([p.mean for p in self.parameters])
-        self.precision = 1 / np.array([p.deviation for p in self.parameters]) ** 2
-        self.always = np.array([t.always_estimated for t in self.terms for _ in t.parameters], dtype=bool)
-        self.theta = self.mean.copy()
+        self.shared = Table([term for term in self.terms if not term.points], 1)
+        self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
         self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
@@ -117,7 +113,7 @@ class Solver:
         self.scatter = self._scatter(self._sums(None)[1], 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums(last)
-            last = step(sums, self.mean - self.theta, self.precision, self.always)
+            last = step(sums, self.shared.prior(), self.own.prior())
             change = self._move(last)
             if count == 3:
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
@@ -126,8 +122,13 @@ class Solver:
             elif count > 3 and change < _CONVERGED:
                 break
         sums, fit = self._sums(last)
-        last = step(sums, self.mean - self.theta, self.precision, self.always)
+        last = step(sums, self.shared.prior(), self.own.prior())
         return self._solution(last, fit, count)
+
+    def _value(self, term: Term) -> FloatArray:
+        """Values of a term's parameters."""
+        table = self.own if term.points else self.shared
+        return table.of(term, table.value)
 
     def _scatter(self, fit: Residuals, count: int) -> Scatter:
         return self.scatter.updated(self.group, fit, self.answered, count, self.shape.numbers)
@@ -152,7 +153,8 @@ class Solver:
             yield slice(first, first + _CHUNK)
 
     def _sums(self, last: Step | None) -> tuple[Sums, Residuals]:
-        sums = Sums.empty(self.shape.groups, len(self.parameters), self.shape.numbers)
+        numbers = self.shape.numbers + self.own.value.shape[1]
+        sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
         fits = []
         slope, known = self._load_slopes()
         for places in self._slices():
@@ -164,14 +166,14 @@ class Solver:
             sums.add(
                 group,
                 rows.r * weight[:, None],
-                rows.J_h * weight[:, None, None],
+                np.concatenate([rows.J_h, rows.J_own], axis=2) * weight[:, None, None],
                 rows.J_t * weight[:, None, None],
             )
             fits.append(self._fit(group, rows, weight**2, last))
         if last is None:  # a point whose readings leave a number untold has no answer
-            self.answered &= are_told(sums.A)
+            self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
-        sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)))  # none of its blocks counts
+        sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
         joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 
@@ -186,7 +188,7 @@ class Solver:
             np.ones((n, m), complex),
             np.zeros((n, m + HOUSING_ROWS), complex),
             self.u[places],
-            {name: self.theta[part] for name, part in self.part.items()},
+            {term.name: self._value(term) for term in self.terms},
         )
         self._apply(blocks, state, additive=False)
         if not self.moved:
@@ -197,7 +199,7 @@ class Solver:
     def _apply(self, blocks: Blocks, state: State, additive: bool) -> None:
         for term in self.terms:
             if term.additive == additive:
-                term.apply(blocks, state, self.theta[self.part[term.name]])
+                term.apply(blocks, state, state.parameters[term.name])
 
     def _rows(self, blocks: Blocks, state: State, scatter: FloatArray) -> _Rows:
         """Equations of blocks without their motion, real and of unit variance; the state's motion is renewed."""
@@ -217,44 +219,45 @@ class Solver:
         state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
         forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
-        others = [term.columns(blocks, state) for term in self.terms]
-        columns = np.concatenate([film, 1j * film, *others], axis=2)
+        own = [term.columns(blocks, state) for term in self.own.terms]
+        shared = [term.columns(blocks, state) for term in self.shared.terms]
+        columns = np.concatenate([film, 1j * film, *own, *shared], axis=2)
         projected = _real(Q2 @ np.linalg.solve(L, columns))
         remainder = Q2 @ white
         force = _along_force(Q2 @ np.linalg.solve(L, film_force_rows(rig, blocks, state, forces)), remainder)
         r = _real(remainder)[:, :, 0]
-        J_h, J_t = np.split(projected, [NUMBERS], axis=2)
+        J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
         slopes = self._slope_rows(blocks, state)
         if slopes is not None:
             r = np.concatenate([r, slopes[0]], axis=1)
             J_t = np.concatenate([J_t, slopes[1]], axis=1)
             more = slopes[0].shape[1]
-            J_h = np.concatenate([J_h, np.zeros((len(blocks), more, NUMBERS))], axis=1)
+            J_h, J_own = (np.pad(J, ((0, 0), (0, more), (0, 0))) for J in (J_h, J_own))
         counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
-        return _Rows(r, self.shape.mapped(J_h, blocks.point), J_t, force, counted, 2 * Q2.shape[1])
+        return _Rows(r, self.shape.mapped(J_h, blocks.point), J_own, J_t, force, counted, 2 * Q2.shape[1])
 
     def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
         """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
-        if all(type(term).slope_columns is Term.slope_columns for term in self.terms):
+        if all(type(term).slope_columns is Term.slope_columns for term in self.shared.terms):
             return None
         m = blocks.z.shape[1]
         told = (blocks.windows > 3) & blocks.present.all(axis=1)
         reading = state.reading(self.rig, blocks)[:, :m]
-        columns = np.concatenate([term.slope_columns(blocks, reading) for term in self.terms], axis=2)
+        columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.shared.terms], axis=2)
         safe = np.where(told[:, None, None], blocks.slope_noise, np.eye(m))
         L = np.linalg.cholesky(safe)
         Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
         Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
         J = _real(Q2 @ np.linalg.solve(L, columns)) * told[:, None, None]
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
-        return r - J @ self.theta, J
+        return r - J @ self.shared.value[0], J
 
     def _fit(self, group: IntArray, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
         r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
         if last is None:
             leverage = np.zeros(len(group))
         else:
-            taken = np.einsum("nka,nab,nkb->n", J_h, last.A_inverse[group], J_h)
+            taken = np.einsum("nka,nab,nkb->n", J_h, last.given[group], J_h)
             leverage = weight * taken / np.maximum(rows.counted, 1.0)
         return Residuals(np.einsum("nk,nk->n", r, r), rows.counted, leverage, rows.force[:, 0], rows.force[:, 1])
 
@@ -266,30 +269,36 @@ class Solver:
         damped = np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, _LARGEST_STEP))
         change = self.shape.change(x * damped[:, None]) * self.solvable[:, None, None]
         self.h = self.h + change
-        self.theta = self.theta + taken.theta
+        self.shared.value = self.shared.value + taken.theta
+        self.own.value = self.own.value + taken.own.change
         self.moved = True
         size = np.abs(self.h).max(axis=(1, 2))
         return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
 
     def _solution(self, last: Step, fit: Residuals, count: int) -> Solution:
         groups = self.shape.groups
-        factors = last.factors() * self.unit
-        shares, fitted = {}, {}
+        factors = last.factors()
+        fitted, shares = {}, {}
         for term in self.terms:
-            part = self.part[term.name]
-            own = factors[part]
-            shares[term.name] = np.einsum("qpa,qpb->pab", own, own)
-            fitted[term.name] = Fitted(self.theta[part], last.deviation[part], last.estimated[part], self.housing_noise)
+            if term.points:
+                told = (self.own.of(term, last.own.deviation), self.own.of(term, last.own.estimated))
+                share = last.own_share(self.own.chosen(term))
+            else:
+                told = (self.shared.of(term, last.deviation[None]), self.shared.of(term, last.estimated[None]))
+                part = factors[self.shared.chosen(term)[0]]
+                share = np.einsum("qpa,qpb->pab", part, part)
+            fitted[term.name] = Fitted(self._value(term), *told, self.housing_noise)
+            shares[term.name] = share * self.unit**2
         weight = self.scatter.weights
         chi_square = totals(self.group, weight * fit.chi_square, groups)
         counted = totals(self.group, fit.rows * (weight > 0.05), groups)
         spare = counted - self.shape.numbers
         return Solution(
             np.where(self.solvable[:, None, None], self.h, np.nan),
-            last.records() * self.unit**2,
-            last.A_inverse * self.unit**2,
+            last.records * self.unit**2,
+            last.given * self.unit**2,
             shares,
-            factors,
+            factors * self.unit,
             fitted,
             self.terms,
             self.scatter,
@@ -313,12 +322,12 @@ class Solver:
             change = state.at_run(blocks) - self.h[blocks.point]
             shift = np.zeros_like(blocks.z)
             for term in self.terms:
-                value = self.theta[self.part[term.name]]
+                value = state.parameters[term.name]
                 of_film = term.film_change(blocks, state, value)
                 if of_film is not None:
                     change = change + of_film
-                elif term.additive:
-                    shift = shift + (term.columns(blocks, state) @ value)[:, : shift.shape[1]]
+                elif isinstance(term, Additive):
+                    shift = shift + term.shift(blocks, state, value)[:, : shift.shape[1]]
             factors.append(state.factor)
             shifts.append(shift)
             changes.append(change)
@@ -329,6 +338,7 @@ class Solver:
 class _Rows:
     r: FloatArray  #: (n, k)
     J_h: FloatArray  #: (n, k, 8)
+    J_own: FloatArray  #: (n, k, L): of the points' own parameters
     J_t: FloatArray  #: (n, k, q)
     force: FloatArray  #: (n, 2): chi-square of the force equations, and what a scatter of variance one adds to it
     counted: FloatArray  #: (n,): equations that say something

@@ -48,6 +48,8 @@ class Term:
         As in the budget.
     parameters : tuple of Parameter
         None: the term does not apply to the campaign.
+    points : tuple of int
+        Points that each have as many of the parameters for their own, in this order; none where all points share them.
     always_estimated : bool
         Whether its parameters are estimated however little the records tell; else only where they tell clearly more
         than the prior.
@@ -68,9 +70,18 @@ class Term:
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
         self.parameters: tuple[Parameter, ...] = ()
+        self.points: tuple[int, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Number of columns: of the parameters, or of those of one point."""
+        return len(self.parameters) // max(len(self.points), 1)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """Change of the readings per unit of every parameter at the true motion, (n, m + 2, q)."""
+        """Change of the readings per unit of every parameter at the true motion, (n, m + 2, q).
+
+        Of a term whose parameters are the points' own: those of the block's point.
+        """
         raise NotImplementedError
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
@@ -104,7 +115,13 @@ class Term:
     def no_columns(self, blocks: Blocks) -> ComplexArray:
         """Zeros to be filled in, (n, m + 2, q)."""
         n, m = blocks.z.shape
-        return np.zeros((n, m + HOUSING_ROWS, len(self.parameters)), complex)
+        return np.zeros((n, m + HOUSING_ROWS, self.width), complex)
+
+    def of_blocks(self, blocks: Blocks, value: FloatArray) -> FloatArray:
+        """Values of the points' own parameters by block, (n, width); zero where the point has none."""
+        table = np.zeros((len(blocks.points), self.width))
+        table[list(self.points)] = value.reshape(len(self.points), -1)
+        return table[blocks.point]
 
 
 class Factor(Term):
@@ -135,7 +152,14 @@ class Additive(Term):
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Add to the state's shift."""
-        state.shift += self.columns(blocks, state) @ value
+        state.shift += self.shift(blocks, state, value)
+
+    def shift(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
+        """What the parameters' values (q,) add to the readings, (n, m + 2)."""
+        columns = self.columns(blocks, state)
+        if self.points:
+            return np.asarray(np.einsum("nrl,nl->nr", columns, self.of_blocks(blocks, value)))
+        return np.asarray(columns @ value)
 
 
 def beyond(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:

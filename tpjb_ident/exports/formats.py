@@ -1,27 +1,24 @@
-"""Coefficients sorted by static point, as every export wants them, and the forms in which they leave.
+"""Coefficients as every export takes them, one table of what may leave; and the forms in which they leave.
 
-A new form is a file with a writer and a line in `FORMATS`. Programs of rotors take a shaft that turns counter-clockwise
-for granted: what was measured on another one is mirrored for them.
+A new form is a writer ``write_NAME`` and a line in `FORMATS`. Programs of rotors take a shaft that turns
+counter-clockwise for granted: what was measured on another one is mirrored for them.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.columns import in_us_units, place_of
 from tpjb_ident.condition_kinds import ERRORS
 from tpjb_ident.errors import TpjbError
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_COLUMNS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_KEY
 
-if TYPE_CHECKING:  # numpy too is imported late: the command line asks for the names of the formats
+if TYPE_CHECKING:  # imported late: the command line asks for the names of the formats
     import pandas as pd
-
-    from rigdata.arrays import BoolArray, FloatArray
 
 
 class ExportError(TpjbError):
@@ -29,139 +26,94 @@ class ExportError(TpjbError):
 
 
 COLUMNS = {name[:3]: name for name in COEFFICIENT_COLUMNS}
-CROSS = ("kxy", "kyx", "cxy", "cyx")
-_ROTATION, _COUNTER_CLOCKWISE = "rotation", "counter-clockwise"
-
-
-@dataclass(frozen=True)
-class StaticPoint:
-    """Coefficients of one static load and speed over excitation frequency.
-
-    Attributes
-    ----------
-    load : float
-        [N]
-    direction : float
-        [deg]
-    speed : float
-        [Hz]
-    frequency : (n,) ndarray
-        Excitation [rad/s], rising.
-    coefficients : dict of str to (n,) ndarray
-        ``"kxx"`` .. ``"cyy"`` [N/m], [N s/m].
-    low, high : dict of str to (n,) ndarray
-        Ends of their 95 % intervals; NaN where the table has none, as of a prediction.
-    quality : tuple of str
-        Per frequency the named conditions, ``"ok"`` if there are none.
-    trusted : (n,) bool ndarray
-        False where the coefficients are exported against advice.
-    rotation : str
-        ``"counter-clockwise"`` or ``"clockwise"``, of the shaft in the frame of the coefficients.
-    mirrored : bool
-        Whether that frame is the mirror image of the rig's, x to -x.
-    """
-
-    load: float
-    direction: float
-    speed: float
-    frequency: FloatArray = field(repr=False)
-    coefficients: dict[str, FloatArray] = field(repr=False)
-    low: dict[str, FloatArray] = field(repr=False)
-    high: dict[str, FloatArray] = field(repr=False)
-    quality: tuple[str, ...]
-    trusted: BoolArray = field(repr=False)
-    rotation: str = _COUNTER_CLOCKWISE
-    mirrored: bool = False
-
-    @property
-    def flags(self) -> tuple[str, ...]:
-        """A sentence per frequency that has something against it."""
-        flags = []
-        for omega, text, trusted in zip(self.frequency, self.quality, self.trusted, strict=True):
-            if text != "ok":
-                warning = "" if trusted else "NOT TO BE TRUSTED, "
-                flags.append(f"{warning}at {omega / (2 * math.pi):g} Hz: {text}")
-        return tuple(flags)
+#: A coefficient and the ends of its interval.
+ENDS = ("", "_lo", "_hi")
+_CROSS = ("kxy", "kyx", "cxy", "cyx")
+_COUNTER_CLOCKWISE = "counter-clockwise"
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """What of a table can leave: the points, and where others stand, those that are doubtful with the reasons."""
+    """What of a table can leave, and where others stand, those that are doubtful with the reasons.
 
-    points: tuple[StaticPoint, ...]
+    Attributes
+    ----------
+    table : DataFrame
+        Sorted by static point and excitation; columns as in coefficients.csv: static point, ``excitation_Hz``,
+        ``rotation``, the coefficients with ``_lo`` and ``_hi`` (NaN where the source has none, as of a prediction),
+        ``quality`` (the named conditions, ``"ok"`` if there are none) and ``trusted`` (False where a point leaves
+        against advice).
+    left_out : tuple of str
+        Points without finite coefficients.
+    doubtful : tuple of str
+        Points that are not to be trusted, and why.
+    """
+
+    table: pd.DataFrame | None = field(repr=False, default=None)
     left_out: tuple[str, ...] = ()
     doubtful: tuple[str, ...] = ()
 
 
-def static_points(frame: pd.DataFrame, force: bool = False) -> Chosen:
-    """Sort a coefficient table by static point; what is not to be trusted stays behind."""
-    needed = [*POINT_COLUMNS, *COLUMNS.values()]
+def chosen_rows(frame: pd.DataFrame, force: bool = False) -> Chosen:
+    """Choose and sort rows of a table of coefficients; what is not to be trusted stays behind."""
+    needed = [*POINT_COLUMNS, *COEFFICIENT_COLUMNS]
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise ExportError(f"the table has no column {missing[0]}. Give a coefficients.csv or prediction.csv of tpjb.")
     import numpy as np
 
     finite = np.isfinite(frame[needed].to_numpy(dtype=float)).all(axis=1)
-    left_out = tuple(_place(row) for _, row in frame[~finite].iterrows())
+    left_out = tuple(_place(row) for row in frame[~finite].to_dict("records"))
     if not finite.any():
         raise ExportError("no point of the table has finite coefficients. Identify or predict again.")
-    usable = frame[finite].assign(_reasons=[_distrust(row) for _, row in frame[finite].iterrows()])
-    trusted = usable["_reasons"] == ""
-    doubtful = tuple(f"{_place(row)}: {row['_reasons']}" for _, row in usable[~trusted].iterrows())
-    exported = usable if force else usable[trusted]
-    if _ROTATION not in exported:
-        exported = exported.assign(**{_ROTATION: _COUNTER_CLOCKWISE})
-    points = [_point(keys, group) for keys, group in exported.groupby([*STATIC_COLUMNS, _ROTATION], sort=True)]
-    return Chosen(tuple(points), left_out, doubtful)
+    intervals = [name + end for name in COEFFICIENT_COLUMNS for end in ENDS]
+    records = frame[finite].to_dict("records")
+    reasons = [_distrust(row) for row in records]
+    table = frame[finite].reindex(columns=[*POINT_COLUMNS, *intervals]).astype(float)
+    table["rotation"] = [row.get("rotation") or _COUNTER_CLOCKWISE for row in records]
+    table["quality"] = [_flags(row, reason) for row, reason in zip(records, reasons, strict=True)]
+    table["trusted"] = [not reason for reason in reasons]
+    doubtful = tuple(f"{_place(row)}: {reason}" for row, reason in zip(records, reasons, strict=True) if reason)
+    exported = table if force else table[table["trusted"]]
+    keys = [*STATIC_KEY, "excitation_Hz"]
+    for load in exported.loc[exported.duplicated(keys), "static_load_N"]:
+        raise ExportError(f"the point {load:g} N stands twice at one frequency. Export one method at a time.")
+    return Chosen(exported.sort_values(keys, ignore_index=True), left_out, doubtful)
 
 
-def _place(row: pd.Series) -> str:
+def _place(row: Mapping[Any, Any]) -> str:
     return place_of(row["static_load_N"], row["excitation_Hz"])
 
 
-def _point(keys: tuple[Any, ...], group: pd.DataFrame) -> StaticPoint:
-    load, direction, speed = (float(key) for key in keys[:3])
-    ordered = group.sort_values("excitation_Hz")
-    if ordered["excitation_Hz"].duplicated().any():
-        raise ExportError(f"the point {load:g} N stands twice at one frequency. Export one method at a time.")
-    omega = 2 * math.pi * ordered["excitation_Hz"].to_numpy(dtype=float)
-    values, low, high = (_coefficients(ordered, end) for end in ("", "_lo", "_hi"))
-    column = "quality" if "quality" in ordered else "status"
-    texts = list(ordered[column]) if column in ordered else [""] * len(ordered)
-    flags = tuple(_with_reasons(text, reason) for text, reason in zip(texts, ordered["_reasons"], strict=True))
-    trusted = (ordered["_reasons"] == "").to_numpy(bool)
-    return StaticPoint(load, direction, speed, omega, values, low, high, flags, trusted, str(keys[3]))
+def turning_counter_clockwise(table: pd.DataFrame) -> pd.DataFrame:
+    """Give points in a frame in which the shaft turns counter-clockwise: x to -x where it does not (``mirrored``)."""
+    clockwise = table["rotation"] != _COUNTER_CLOCKWISE
+    turned = table.assign(rotation=_COUNTER_CLOCKWISE, mirrored=clockwise)
+    mirrored = (180.0 - table["static_load_direction_deg"] + 180.0) % 360.0 - 180.0
+    turned.loc[clockwise, "static_load_direction_deg"] = mirrored[clockwise]
+    for name in (COLUMNS[short] for short in _CROSS):
+        for end, opposite in zip(ENDS, ("", "_hi", "_lo"), strict=True):
+            turned.loc[clockwise, name + end] = -table.loc[clockwise, name + opposite]
+    return turned
 
 
-def turning_counter_clockwise(point: StaticPoint) -> StaticPoint:
-    """Give a point in a frame in which its shaft turns counter-clockwise: x to -x where it does not."""
-    if point.rotation == _COUNTER_CLOCKWISE:
-        return point
-    ends = ((point.coefficients, point.coefficients), (point.low, point.high), (point.high, point.low))
-    values, low, high = (end | {name: -opposite[name] for name in CROSS} for end, opposite in ends)
-    direction = (180.0 - point.direction + 180.0) % 360.0 - 180.0
-    return replace(
-        point, direction=direction, coefficients=values, low=low, high=high, rotation=_COUNTER_CLOCKWISE, mirrored=True
-    )
+def flags(table: pd.DataFrame) -> list[str]:
+    """A sentence for every row that has something against it."""
+    sentences = []
+    for row in table[table["quality"] != "ok"].to_dict("records"):
+        warning = "" if row["trusted"] else "NOT TO BE TRUSTED, "
+        sentences.append(f"{warning}at {row['excitation_Hz']:g} Hz: {row['quality']}")
+    return sentences
 
 
-def _coefficients(table: pd.DataFrame, end: str) -> dict[str, FloatArray]:
-    """Columns of K and C with an ending, NaN where the table has none."""
-    import numpy as np
-
-    empty = np.full(len(table), np.nan)
-    columns = {short: name + end for short, name in COLUMNS.items()}
-    return {s: table[name].to_numpy(dtype=float) if name in table else empty for s, name in columns.items()}
-
-
-def _with_reasons(quality: object, reasons: str) -> str:
+def _flags(row: Mapping[Any, Any], reasons: str) -> str:
     """Named conditions of a row with what forbids trust, each once; ``"ok"`` if there is nothing."""
-    names = quality.split("; ") if isinstance(quality, str) and quality not in ("", "ok") else []
-    names += [reason for reason in reasons.split("; ") if reason]
-    return "; ".join(dict.fromkeys(names)) or "ok"
+    names = [row.get("quality", row.get("status")), reasons]
+    texts = [text for name in names if isinstance(name, str) for text in name.split("; ")]
+    return "; ".join(dict.fromkeys(text for text in texts if text not in ("", "ok"))) or "ok"
 
 
-def _distrust(row: Mapping[str, Any]) -> str:
+def _distrust(row: Mapping[Any, Any]) -> str:
     """Say why a row of coefficients is not to be trusted.
 
     A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
@@ -183,64 +135,22 @@ def _distrust(row: Mapping[str, Any]) -> str:
 
 #: Versions of ROSS whose files are written.
 ROSS_VERSIONS = (2, 3)
-#: Writes points into an existing folder; the text says where they come from. ROSS's takes a version as well.
-Writer = Callable[..., None]
-
-
-@dataclass(frozen=True)
-class Format:
-    """One form of export; its writer puts files of some points into an existing folder.
-
-    A writer is called with the folder, the points (tuple of StaticPoint) and a text that says where they come from.
-
-    Attributes
-    ----------
-    module, function : str
-        Where its writer is; imported when it is used.
-    of_rotors : bool
-        Whether it is a rotor program's: its files hold no intervals and flags (a table beside them does), and its
-        shafts turn counter-clockwise.
-    note : str
-        What its user must know.
-    only_si : bool
-        Whether its program takes numbers in SI alone, so that US units are refused.
-    """
-
-    module: str
-    function: str
-    of_rotors: bool = False
-    note: str = ""
-    only_si: bool = False
-
-    @property
-    def writer(self) -> Writer:
-        """The function that writes it."""
-        writer: Writer = getattr(importlib.import_module(f"tpjb_ident.exports.{self.module}"), self.function)
-        return writer
-
-
+#: Programs whose files hold no intervals and flags (a table beside them does), and whose shafts turn counter-clockwise.
+ROTOR_PROGRAMS = ("ross", "xltrc", "dyrobes", "ansys")
 _BY_SPEED = "this program knows K and C over shaft speed only: one file per excitation frequency."
-_ROSS = "ROSS extrapolates outside the speeds and frequencies given; K holds Re h, there are no masses."
-
-
-FORMATS: dict[str, Format] = {
-    "ross": Format("rotor_programs", "write_ross", True, _ROSS, only_si=True),
-    "csv": Format("table", "write_csv"),
-    "parquet": Format("table", "write_parquet"),
-    "excel": Format("table", "write_excel"),
-    "mat": Format("table", "write_mat"),
-    "xltrc": Format("rotor_programs", "write_xltrc", True, _BY_SPEED),
-    "dyrobes": Format("rotor_programs", "write_dyrobes", True, _BY_SPEED),
-    "ansys": Format("rotor_programs", "write_ansys", True, _BY_SPEED),
+#: Every form of export, and what its user must know.
+FORMATS = {
+    "ross": "ROSS extrapolates outside the speeds and frequencies given; K holds Re h, there are no masses.",
+    **dict.fromkeys(("csv", "parquet", "excel", "mat"), ""),
+    **dict.fromkeys(("xltrc", "dyrobes", "ansys"), _BY_SPEED),
 }
 
 
-def export_format(name: str) -> Format:
-    """Format of a name, if it can be written in the units in use."""
+def check_format(name: str) -> None:
+    """Refuse a form that is not known, or that cannot be written in the units in use."""
     if name not in FORMATS:
         near = nearest_name(name, FORMATS)
         hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."
         raise ExportError(f"--to: {name!r} is not known. {hint}")
-    if FORMATS[name].only_si and in_us_units():
+    if name == "ross" and in_us_units():
         raise ExportError(f"--units us: --to {name} writes SI, all that its program reads. Leave --units us out.")
-    return FORMATS[name]

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
-from tpjb_ident.exports.formats import COLUMNS, ExportError, StaticPoint
+from tpjb_ident.exports.formats import COLUMNS, ENDS, ExportError, flags
 from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, write_atomic
-from tpjb_ident.schema import ENTRIES
+from tpjb_ident.schema import KINDS, STATIC_KEY
 from tpjb_ident.us_table import us_table
 
 if TYPE_CHECKING:
@@ -26,49 +25,38 @@ INTERVALS = f"{NAME}_intervals"
 _TIME, _NO_TIME = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9:.]+Z"), b"1980-01-01T00:00:00Z"
 #: Text at the start of a MATLAB file, in place of one with the time.
 _MAT_HEAD = b"MATLAB 5.0 MAT-file, written by tpjb-ident".ljust(116)
-_FIELDS = (
-    "load_N", "direction_deg", "speed_Hz", "frequency_rad_per_s", "K", "C", "K_lo", "K_hi", "C_lo", "C_hi",
-    "quality", "trusted", "rotation",
-)  # fmt: skip
+#: Matrices of a MATLAB file: K, C and the ends of their intervals.
+_MATRICES = ("K", "C", "K_lo", "K_hi", "C_lo", "C_hi")
 
 
-def _coefficient_table(points: tuple[StaticPoint, ...]) -> pd.DataFrame:
-    """One row per static point and frequency."""
-    import pandas as pd
-
-    parts = []
-    for point in points:
-        columns: dict[str, Any] = {
-            "static_load_N": point.load,
-            "static_load_direction_deg": point.direction,
-            "shaft_speed_rpm": 60 * point.speed,
-            "rotation": point.rotation,
-            "frequency_rad_per_s": point.frequency,
-        }
-        for short, name in COLUMNS.items():
-            for end, values in (("", point.coefficients), ("_lo", point.low), ("_hi", point.high)):
-                columns[name + end] = values[short]
-        parts.append(pd.DataFrame({**columns, "quality": list(point.quality), "trusted": point.trusted}))
-    return pd.concat(parts, ignore_index=True)
+def _coefficient_table(points: pd.DataFrame) -> pd.DataFrame:
+    """The table as it leaves: speed in rpm, frequency in rad/s."""
+    intervals = [name + end for name in COLUMNS.values() for end in ENDS]
+    rates = {
+        "shaft_speed_rpm": 60 * points["shaft_speed_Hz"],
+        "frequency_rad_per_s": 2 * np.pi * points["excitation_Hz"],
+    }
+    place = ["static_load_N", "static_load_direction_deg", "shaft_speed_rpm", "rotation", "frequency_rad_per_s"]
+    return points.assign(**rates)[[*place, *intervals, "quality", "trusted"]]
 
 
-def write_csv(folder: Path, points: tuple[StaticPoint, ...], source: str, name: str = NAME) -> None:
+def write_csv(folder: Path, points: pd.DataFrame, source: str, name: str = NAME) -> None:
     """Write bearing_coefficients.csv into an existing folder, or the same table under another name."""
     tables.write_csv(folder / f"{name}.csv", _coefficient_table(points))
 
 
-def write_us(folder: Path, points: tuple[StaticPoint, ...], name: str) -> None:
+def write_us(folder: Path, points: pd.DataFrame, name: str) -> None:
     """Write the same table in US units, beside what stays SI."""
     tables.write_csv(folder / f"{name}_us.csv", us_table(_coefficient_table(points)))
 
 
-def write_parquet(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+def write_parquet(folder: Path, points: pd.DataFrame, source: str) -> None:
     """Write bearing_coefficients.parquet; the source stands in the table's metadata."""
     frame = _coefficient_table(points)
     write_atomic(folder / f"{NAME}.parquet", lambda part: tables.write_parquet(part, frame, source=printable(source)))
 
 
-def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
     """Write bearing_coefficients.xlsx: all coefficients on one sheet, what they are on another.
 
     Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
@@ -99,8 +87,8 @@ def write_excel(folder: Path, points: tuple[StaticPoint, ...], source: str) -> N
         "_lo and _hi: 95 % interval, random and calibration errors together; empty for a prediction.",
         "quality: named conditions, explained in the report; trusted: FALSE was exported against advice.",
     ]
-    for point in points:
-        lines += [f"{point.load:g} N {flag}" for flag in point.flags]
+    for load, rows in points.groupby("static_load_N"):
+        lines += [f"{load:g} N {flag}" for flag in flags(rows)]
     for row, line in enumerate(lines, start=1):
         _text(about.cell(row, 1), line)
     content = io.BytesIO()
@@ -130,7 +118,7 @@ def _text(cell: Any, text: str) -> None:
     cell.data_type = "s"  # openpyxl would take a leading = for a formula
 
 
-def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> None:
+def write_mat(folder: Path, points: pd.DataFrame, source: str) -> None:
     """Write bearing_coefficients.mat (MATLAB 5): struct array ``bearing``.
 
     K and C are 2 x 2 x n, so are ``K_lo``, ``K_hi``, ``C_lo``, ``C_hi``, the ends of their 95 % intervals (NaN where
@@ -138,14 +126,8 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
     """
     from scipy.io import savemat
 
-    array = np.zeros(len(points), dtype=[(name, object) for name in _FIELDS])
-    for i, p in enumerate(points):
-        array[i] = (
-            p.load, p.direction, p.speed, p.frequency,
-            _matrices(p.coefficients, "k"), _matrices(p.coefficients, "c"),
-            _matrices(p.low, "k"), _matrices(p.high, "k"), _matrices(p.low, "c"), _matrices(p.high, "c"),
-            np.array([printable(text) for text in p.quality], dtype=object), p.trusted, p.rotation,
-        )  # fmt: skip
+    members = [_struct(rows) for _, rows in points.groupby(list(STATIC_KEY))]
+    array = np.array([tuple(member.values()) for member in members], dtype=[(name, object) for name in members[0]])
     content = {"bearing": array, "source": printable(source)}
     file = io.BytesIO()
     savemat(file, content, oned_as="column", appendmat=False)
@@ -153,5 +135,20 @@ def write_mat(folder: Path, points: tuple[StaticPoint, ...], source: str) -> Non
     write_atomic(folder / f"{NAME}.mat", lambda part: part.write_bytes(timeless))
 
 
-def _matrices(values: dict[str, FloatArray], kind: str) -> FloatArray:
-    return np.array([values[f"{kind}{entry}"] for entry in ENTRIES]).reshape(2, 2, -1)
+def _struct(rows: pd.DataFrame) -> dict[str, Any]:
+    """Fields of one static point, for MATLAB."""
+    load, direction, speed, rotation = rows[list(STATIC_KEY)].iloc[0]
+    matrices = {}
+    for name in _MATRICES:
+        columns = [column + name[1:] for column in KINDS[name[0].lower()].columns]
+        matrices[name] = rows[columns].to_numpy().T.reshape(2, 2, -1)
+    return {
+        "load_N": load,
+        "direction_deg": direction,
+        "speed_Hz": speed,
+        "frequency_rad_per_s": 2 * np.pi * rows["excitation_Hz"].to_numpy(),
+        **matrices,
+        "quality": np.array([printable(text) for text in rows["quality"]], dtype=object),
+        "trusted": rows["trusted"].to_numpy(),
+        "rotation": rotation,
+    }

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.columns import in_us_units
 from tpjb_ident.errors import NotTrustedError
+from tpjb_ident.exports import rotor_programs, table
 from tpjb_ident.exports.formats import (
     ROSS_VERSIONS,
+    ROTOR_PROGRAMS,
     Chosen,
     ExportError,
-    export_format,
-    static_points,
+    check_format,
+    chosen_rows,
     turning_counter_clockwise,
 )
 from tpjb_ident.exports.ross_bearing import write_ross_bearing
-from tpjb_ident.exports.table import INTERVALS, NAME, write_csv, write_us
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
+from tpjb_ident.schema import STATIC_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,10 +50,10 @@ class Export:
     chosen: Chosen
 
     def __str__(self) -> str:
-        if not self.chosen.points:
+        rows = self.chosen.table
+        if rows is None:
             return ", ".join(self.files)
-        sets = sum(len(p.frequency) for p in self.chosen.points)
-        return f"{len(self.chosen.points)} static points, {sets} coefficient sets"
+        return f"{rows.groupby(list(STATIC_KEY)).ngroups} static points, {len(rows)} coefficient sets"
 
 
 def export(
@@ -94,26 +96,34 @@ def export(
     NotTrustedError
         Nothing is left that can be trusted.
     """
-    form = export_format(to)
+    check_format(to)
     options = _ross_options(to, ross)
     target = Path(folder)
     if hasattr(source, "pads"):
         return _export_bearing(source, to, target, options)
     frame, origin = _table(source)
-    chosen = static_points(frame, force)
-    if not chosen.points:
+    chosen = chosen_rows(frame, force)
+    rows = chosen.table
+    if rows is None or rows.empty:
         reasons = "\n".join(chosen.doubtful[:5])
         raise NotTrustedError(f"no point can be trusted, nothing is exported:\n{reasons}\n--force writes them, marked.")
     target.mkdir(parents=True, exist_ok=True)
     before = {path.name for path in target.iterdir()}
-    points = tuple(turning_counter_clockwise(point) if form.of_rotors else point for point in chosen.points)
-    form.writer(target, points, f"tpjb-ident: coefficients of {name or origin}", **options)
-    if form.of_rotors:
-        write_csv(target, points, "", INTERVALS)
-    if in_us_units():
-        write_us(target, points, INTERVALS if form.of_rotors else NAME)
+    _write(target, rows, to, f"tpjb-ident: coefficients of {name or origin}", options)
     files = tuple(sorted(path.name for path in target.iterdir() if path.name not in before))
     return Export(target, files, chosen)
+
+
+def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict[str, int]) -> None:
+    """Write rows in one form; intervals, and a table in US units, beside it."""
+    rotor = to in ROTOR_PROGRAMS
+    beside = table.INTERVALS if rotor else table.NAME
+    if rotor:
+        rows = turning_counter_clockwise(rows)
+        table.write_csv(target, rows, "", beside)
+    getattr(rotor_programs if rotor else table, f"write_{to}")(target, rows, source, **options)
+    if in_us_units():
+        table.write_us(target, rows, beside)
 
 
 def _export_bearing(bearing: Any, to: str, target: Path, options: dict[str, int]) -> Export:
@@ -121,7 +131,7 @@ def _export_bearing(bearing: Any, to: str, target: Path, options: dict[str, int]
         raise ExportError(f"a bearing file leaves for ROSS alone, not for {to}. Export a prediction of it.")
     target.mkdir(parents=True, exist_ok=True)
     write_ross_bearing(target, bearing, **options)
-    return Export(target, ("ross_bearing.py",), Chosen(()))
+    return Export(target, ("ross_bearing.py",), Chosen())
 
 
 def _ross_options(to: str, version: int | None) -> dict[str, int]:

@@ -16,7 +16,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import calibration_numbers
+from tpjb_ident.identification.campaign_blocks import calibration_numbers, run_miss
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
@@ -24,8 +24,6 @@ from tpjb_ident.terms.distortion import band_change, line_scatter
 STRONG = 10.0
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
-#: Misses that no scatter of loads explains say nothing of how H changes with the load.
-_MAX_MISS = 0.05
 
 
 @dataclass(frozen=True)
@@ -40,8 +38,9 @@ class BandBlocks:
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
     strength: FloatArray  #: (L,): F ratio of the weaker direction of motion
     bent: FloatArray = field(default_factory=lambda: np.zeros(0))  #: (B,): share by which the motion may change H
+    uneven: FloatArray | None = None  #: (B,): relative scatter of the lines' film force, in one phase set
 
-    def with_film(self, sensors: Sequence[Sensor], points: Sequence[BandPoint], clearance: float) -> BandBlocks:
+    def with_film(self, points: Sequence[BandPoint], clearance: float) -> BandBlocks:
         """With what a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
         bent, scatter = np.zeros(len(points)), np.zeros(len(points))
         for b, point in enumerate(points):
@@ -51,11 +50,7 @@ class BandBlocks:
             if point.method == "periods" and one_phase_set(point.spectra):
                 # alike in all runs: more than the two that h needs do not average it away
                 scatter[b] = line_scatter(rms) * np.sqrt(max(len(point.spectra), 2) / 2)
-        cells = Rig(tuple(sensors), 1.0).of("force")
-        force = np.linalg.norm(self.blocks.z[:, cells], axis=1) / np.sqrt(2)
-        noise = self.blocks.noise.copy()
-        noise[:, cells, cells] += ((scatter[self.band[self.line[self.blocks.point]]] * force) ** 2)[:, None]
-        return replace(self, blocks=replace(self.blocks, noise=noise), bent=bent)
+        return replace(self, bent=bent, uneven=scatter)
 
 
 def band_blocks(
@@ -89,7 +84,7 @@ def band_blocks(
             warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth[0], "miss": _miss(miss, members)}
+            row |= {"run": len(runs), "temperature": warmth[0], "miss": run_miss(miss, members)}
             for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
                 rows.append(response | row | {"point": first + place, "omega": omega[first + place]})
             runs.append(", ".join(s.phasors.run for s in spectra))
@@ -112,12 +107,6 @@ def _members(point: BandPoint) -> list[list[int]]:
     """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
     runs = range(len(point.spectra))
     return [list(runs)] if point.method == "hv" else [[r] for r in runs]
-
-
-def _miss(miss: LoadMiss, members: Sequence[int]) -> complex:
-    """Missed load of some runs together, relative size + i turn [rad]."""
-    size, turn = float(np.mean(miss.size[members])), float(np.mean(miss.sideways[members]))
-    return complex(size, turn) if abs(size) < _MAX_MISS and abs(turn) < _MAX_MISS else 0j
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:

@@ -124,7 +124,8 @@ class _Task:
         rig, blocks = self.rig, self.data.blocks
         chosen = [t for t in TERMS if t is not Clock and (self.correct or t is not LoadTurn)]
         band = self.data.band[self.data.line]
-        given = {RunGain: RunGain(rig, blocks, deviation), Distortion: Distortion(rig, blocks, self.data.bent, band)}
+        film = Distortion(rig, blocks, self.data.bent, band, self.data.uneven)
+        given = {RunGain: RunGain(rig, blocks, deviation), Distortion: film}
         return replace(self, terms=tuple(given.get(term) or term(rig, blocks) for term in chosen))
 
 

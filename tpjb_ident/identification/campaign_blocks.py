@@ -57,19 +57,18 @@ def campaign_blocks(
     temperatures: Mapping[str, float],
 ) -> Blocks:
     """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
-    noises, freedoms = _pooled_noise(means, [source.digests[0].window for source in sources])
+    noises, freedoms = _pooled_noise(means, [source.data.runs[0].length for source in sources])
     names: list[str] = []
     known: list[list[Hashable]] = []
     rows: list[dict[str, object]] = []
     for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
         w = point.means
-        for g, (digest, (_, line)) in enumerate(zip(source.digests, source.members)):
+        for g, (digest, line) in enumerate(zip(source.digests, source.data.lines)):
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]
             known = known or [[] for _ in channels]
             load = max(source.point.static_load, 1e-9)
-            usable = abs(miss.size[g]) < _MAX_MISS and abs(miss.sideways[g]) < _MAX_MISS
             present = np.array([channel is not None for channel in channels])
             row: dict[str, object] = {
                 "point": p,
@@ -86,13 +85,19 @@ def campaign_blocks(
                 "windows": w.count[g],
                 "time": w.time[g],
                 "temperature": temperatures.get(digest.run, np.nan),
-                "miss": complex(miss.size[g], miss.sideways[g]) if usable else 0j,
+                "miss": run_miss(miss, [g]),
                 "miss_error": point.load_error[g] / load if source.point.static_load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }
             names.append(digest.run)
             rows.append(row)
     return stacked([source.point for source in sources], names, len(means[0].channels[0]), rows, bent)
+
+
+def run_miss(miss: LoadMiss, members: Sequence[int]) -> complex:
+    """Missed load of some runs together, relative size + i turn [rad]; none where no scatter of loads explains it."""
+    size, turn = float(np.mean(miss.size[members])), float(np.mean(miss.sideways[members]))
+    return complex(size, turn) if abs(size) < _MAX_MISS and abs(turn) < _MAX_MISS else 0j
 
 
 def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:

@@ -154,7 +154,7 @@ def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
 
 
 def _film(source: PointSource, point: PointMeans) -> FilmChange:
-    pairs = [digest.harmonics[line] for digest, (_, line) in zip(source.digests, source.members) if digest.harmonics]
+    pairs = [digest.harmonics[line] for digest, line in zip(source.digests, source.data.lines) if digest.harmonics]
     return film_change([pair for pair in pairs if pair is not None], point.start)
 
 

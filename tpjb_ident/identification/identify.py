@@ -88,8 +88,8 @@ def identify(
     if not sines.of_kind("dynamic"):
         identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
     else:
-        with all_runs(sines, settings.phasors, report, workers, store) as finished:
-            identification = assemble(sines, finished, settings, report, workers)
+        finished = all_runs(sines, settings.phasors, report, workers, store)
+        identification = assemble(sines, finished, settings, report, workers)
     identification = identification if bands is None else _with_bands(identification, bands)
     return _with_zero_uncertainty(identification, campaign)
 
@@ -140,12 +140,12 @@ def assemble(
     report: Progress,
     workers: Workers | None = None,
 ) -> Identification:
-    """Estimate all points from runs already turned to phasors, a few points' windows in memory at a time."""
+    """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
     baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
-    sources = [replace(source, baseline=baseline) for source in point_sources(finished)]
+    sources = point_sources(finished, baseline)
     report("estimating", 0, len(sources))
     solved = solve_campaign(campaign, sources, digests, workers, settings.correct)
     temperatures = {digest.run: digest.temperatures for digest in digests}

@@ -156,7 +156,7 @@ def _estimate(
 
 
 def _run_index(source: PointSource, window_weight: FloatArray) -> np.ndarray:
-    index = source.load().run_index
+    index = source.data.run_index
     return index if len(index) == len(window_weight) else np.zeros(len(window_weight), dtype=int)
 
 
@@ -180,7 +180,7 @@ def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans)
 def finished_point(task: PointTask, source: PointSource, share: PointShare) -> PointResult:
     """The point with every method, its uncertainties and what is to be said of it."""
     settings = task.settings
-    recorded = source.load()
+    recorded = source.data
     corrected = _corrected(recorded, task.means, share)
     table = phasor_table(corrected.D, corrected.F, corrected.run_index)
     solved = share.estimate or estimate_table(table, corrected.omega, SOLVED)

@@ -12,6 +12,7 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.errors_in_variables import attenuation
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.runs.point_data import PointData
@@ -62,7 +63,7 @@ class MeansTask:
 
 def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     """Robust start and means of one point."""
-    data = source.load()
+    data = source.data
     z, channels = channel_windows(data, task)
     time = window_times(data)
     z = _driven(z * clock_turns(data, task, time), data)
@@ -260,12 +261,8 @@ def _loads(data: PointData) -> tuple[FloatArray, FloatArray]:
 
 
 def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
-    """Noise over total power of the displacements along their principal directions, larger first, (2,)."""
+    """Noise over total power of the displacements, (2,)."""
     rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "displacement"]
     plane = np.linalg.pinv(task.along[rows])
-    d = means.mean[:, rows] @ plane.T
     noise = plane @ means.noise[np.ix_(rows, rows)] @ plane.T
-    total = max(float(means.count.sum()), 1e-12)
-    signal = (means.count[:, None] * d).T @ d.conj() / total
-    power = signal + noise * (1 - len(d) / total)
-    return np.sort(np.linalg.eigvals(np.linalg.solve(power, noise)).real)[::-1]
+    return attenuation(means.mean[:, rows] @ plane.T, means.count, noise)

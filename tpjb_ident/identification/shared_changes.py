@@ -33,16 +33,11 @@ class SharedChanges:
 
 
 def shared_changes(solution: Solution, points: Sequence[int], scattering: Sequence[str] = ()) -> SharedChanges:
-    """Changes of some points of a solve by all terms but those whose effect scatters from run to run."""
-    names: list[str] = []
-    rows: list[int] = []
-    first = 0
-    for term in solution.terms:
-        if term.name not in scattering:
-            rows += range(first, first + len(term.parameters))
-            names += [f"{term.name}: {parameter.name}" for parameter in term.parameters]
-        first += len(term.parameters)
+    """Changes of some points of a solve by all terms but points' own, and those that scatter from run to run."""
+    shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
+    rows = [k for k, (term, _) in enumerate(shared) if term.name not in scattering]
+    names = tuple(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows)
     if not rows:
         return SharedChanges(np.zeros((1, 8 * len(points))))
     factors = solution.factors[np.ix_(rows, points)].reshape(len(rows), -1)
-    return SharedChanges(np.asarray(factors * np.sqrt(len(rows))), tuple(names))
+    return SharedChanges(np.asarray(factors * np.sqrt(len(rows))), names)

@@ -45,6 +45,16 @@ class RobustFit:
         return float(1 - self.used.mean())
 
 
+def robust_deviation(residual: FloatArray) -> float:
+    """Standard deviation of a normal residual by its median size."""
+    return 1.4826 * float(np.median(np.abs(residual)))
+
+
+def white_noise(values: FloatArray) -> float:
+    """Standard deviation of the noise of single values (n,): steps, levels and ramps drop out of second differences."""
+    return robust_deviation(np.diff(values, 2)) / float(np.sqrt(6.0))
+
+
 def is_present(values: FloatArray) -> BoolArray:
     """Whether a reading is a value: finite, and no overflow mark; (n,)."""
     with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like
@@ -100,7 +110,7 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: float) -> tuple[FloatArray
     scale = 0.0
     for _ in range(_ROUNDS):
         size = np.abs(y - full @ _quick_solution(full, y, weights))
-        scale = min(1.4826 * float(np.median(size)), SCALE_LIMIT * usual)
+        scale = min(robust_deviation(size), SCALE_LIMIT * usual)
         excess = size / max(scale * BAD_LIMIT, _ROUNDING * float(size.max(initial=0.0)), np.finfo(float).tiny)
         previous, weights = weights, np.maximum(1 - excess**2, 0.0) ** 2
         if weights.mean() < 1 - _MAX_LOST or np.abs(weights - previous).max() < 1e-3:

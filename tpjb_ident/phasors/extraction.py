@@ -17,8 +17,7 @@ from tpjb_ident.phasors.line_fit import (
     LineFitter,
     WindowFit,
     fit_uneven,
-    joined_channels,
-    joined_windows,
+    joined,
     no_windows,
     usual_scale,
 )
@@ -64,7 +63,7 @@ def extract(
             start = times if not k else start
             tach = np.where(np.isfinite(tach), tach, turning)
             fits.append(fit)
-    fit = joined_channels(fits)
+    fit = joined(fits, channels=True)
     order = np.argsort([QUANTITIES.index(c.quantity) for reader in readers for c in reader.channels], kind="stable")
     described = [(c, reader.device.name) for reader in readers for c in reader.channels]
     recorded = RunPhasors(
@@ -112,7 +111,7 @@ class _DeviceFit:
             starts.append(start)
             speeds.append(window_speeds(speed, stop - first, nominal_speed))
         missing = len(self.firsts) - recorded  # windows after the end of this device's record
-        fit = joined_windows([*parts, no_windows(missing, int(self.shown.sum()), len(self.reader.channels))])
+        fit = joined([*parts, no_windows(missing, int(self.shown.sum()), len(self.reader.channels))])
         if len(parts) > 1:
             self._look_again(fit)
         none = np.full(missing, np.nan)
@@ -144,7 +143,7 @@ class _DeviceFit:
             if self.speeds is not None:
                 self._refit(fit, rows[group], times, self.speeds[first:stop])
             fits.append(fit)
-        return joined_channels(fits), times.start, speed
+        return joined(fits, channels=True), times.start, speed
 
     def _refit(self, fit: WindowFit, rows: FloatArray, times: _Times, speeds: FloatArray) -> None:
         """Fit every window once more with its own speed."""

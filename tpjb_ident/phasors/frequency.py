@@ -13,6 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.line_fit import usual_scale
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
@@ -64,11 +65,16 @@ def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> fl
     size = float(np.median(np.linalg.norm(z, axis=1)))
     if not size > 10 * noise:
         return 0.0
-    # Phase steps between neighbours, each weighted by what both show: robust through the median.
-    steps = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi * np.diff(t))
+    steps = _frequency_steps(z, t)
     slip = float(np.median(steps))
-    spread = 1.4826 * float(np.median(np.abs(steps - slip)))
+    spread = robust_deviation(steps - slip)
     return slip if abs(slip) > 4 * spread / np.sqrt(len(steps)) else 0.0
+
+
+def _frequency_steps(phasors: ComplexArray, start: FloatArray) -> FloatArray:
+    """Frequency error (n - 1,) [Hz] by the phase between neighbours (n, 2), each weighted by what both show."""
+    turns = np.angle(np.einsum("ni,ni->n", phasors[1:], phasors[:-1].conj()))
+    return np.asarray(turns / (2 * np.pi * np.diff(start)))
 
 
 def tuned(
@@ -81,8 +87,8 @@ def tuned(
     follow = _drifting(result, run.sample_rate)
     if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
         return None
-    extra = tuple(line.frequency for line in result.lines.nuisance if line.name == "found")
-    lines = known_lines(exact, speed + slip, run.sample_rate, settings.lines, extra, run.length / run.sample_rate)
+    rate = run.sample_rate
+    lines = known_lines(exact, speed + slip, rate, settings.lines, result.lines.found, run.length / rate)
     drift: tuple[Condition, ...] = ()
     if follow is not None:
         drift = (
@@ -113,14 +119,8 @@ def _excitations(
     )
 
 
-def _shaft_line(result: RunPhasors) -> int | None:
-    """Which line is 1X; None where it is not fitted apart."""
-    names = [line.name for line in result.lines.nuisance]
-    return len(result.lines.excitation) + names.index("1X") if "1X" in names else None
-
-
 def _shaft_slip(result: RunPhasors, rate: float, places: list[int] | None = None) -> float:
-    index = _shaft_line(result)
+    index = result.lines.place("1X")
     return 0.0 if index is None else _line_slip(result, index, rate, places)
 
 
@@ -160,11 +160,6 @@ def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> Flo
     return frequencies
 
 
-def _phasor_noise(result: RunPhasors, rate: float) -> float:
-    """Standard error of a component of a window's displacement phasor."""
-    return float(np.median(usual_scale(result.displacement.noise))) / np.sqrt(result.length * rate)
-
-
 def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
     """Course of the speed, where the shaft's phase runs away within a window.
 
@@ -185,17 +180,17 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
     advances by what the shaft is ahead of the frequency fitted.
     """
-    index = _shaft_line(result)
+    index = result.lines.place("1X")
     if index is None or len(result.start) < 3:
         return None
     z = result.displacement.phasors[:, index]
     good = np.flatnonzero(np.isfinite(z).all(axis=1))
-    noise = _phasor_noise(result, rate)
+    noise = float(np.median(usual_scale(result.displacement.noise))) / np.sqrt(result.length * rate)
     size = float(np.median(np.linalg.norm(z[good], axis=1))) if len(good) else 0.0
     if len(good) < 3 or not size > 10 * noise:
         return None
     t = result.start[good]
-    steps = np.angle(np.einsum("ni,ni->n", z[good][1:], z[good][:-1].conj())) / (2 * np.pi * np.diff(t))
+    steps = _frequency_steps(z[good], t)
     speeds = np.full(len(result.start), np.nan)
     speeds[good] = result.lines.frequencies[index] + np.concatenate(
         [steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]

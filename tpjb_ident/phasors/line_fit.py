@@ -11,7 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
-from tpjb_ident.phasors.bad_samples import BAD_LIMIT, SCALE_LIMIT, is_present, robust_fit, with_flanks
+from tpjb_ident.phasors.bad_samples import (
+    BAD_LIMIT,
+    SCALE_LIMIT,
+    is_present,
+    robust_deviation,
+    robust_fit,
+    with_flanks,
+)
 from tpjb_ident.phasors.windows import line_design
 
 #: Outlying samples up to this share are left out again and again until fit and verdict agree.
@@ -86,16 +93,11 @@ class WindowFit:
         self.scale[window, channels], self.lost[window, channels] = single.scale[0], single.lost[0]
 
 
-def joined_windows(parts: list[WindowFit]) -> WindowFit:
-    """Windows of one run one after the other."""
-    names = ("z", "mean", "scale", "lost")
-    return WindowFit(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def joined_channels(fits: list[WindowFit]) -> WindowFit:
-    """Channels of the same windows side by side."""
-    z = np.concatenate([fit.z for fit in fits], axis=2)
-    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=1) for n in ("mean", "scale", "lost")))
+def joined(fits: list[WindowFit], channels: bool = False) -> WindowFit:
+    """Windows of one run one after the other, or the channels of the same windows side by side."""
+    z = np.concatenate([fit.z for fit in fits], axis=2 if channels else 0)
+    others = ("mean", "scale", "lost")
+    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=int(channels)) for n in others))
 
 
 def no_windows(count: int, lines: int, channels: int) -> WindowFit:
@@ -203,7 +205,7 @@ class LineFitter:
                 return None
             solution = coefficients - change
             size = np.abs(residual + self.design @ change)
-            scale = 1.4826 * float(np.median(size))
+            scale = robust_deviation(size)
         return None
 
 

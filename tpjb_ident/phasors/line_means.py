@@ -99,21 +99,18 @@ def mains_force(run: RunPhasors) -> ComplexArray | None:
 
 
 def _place(run: RunPhasors) -> int | None:
-    names = [line.name for line in run.lines.nuisance]
-    if "mains" not in names or _shared(run, names.index("mains")):
+    """Place of the mains line; None where a drive harmonic was merged into it, or it is not fitted."""
+    place = run.lines.place("mains")
+    if place is None:
         return None
-    return len(run.lines.excitation) + names.index("mains")
+    mains = run.lines.whole[place]
+    harmonics = (n * e.frequency for e in run.lines.excitation for n in (2, 3))
+    return None if any(abs(f - mains.frequency) <= mains.wander for f in harmonics) else place
 
 
 def _typical_phasor(z: ComplexArray) -> ComplexArray | None:
     z = z[np.isfinite(z).all(axis=1)]
     return complex_median(z) if len(z) else None
-
-
-def _shared(run: RunPhasors, index: int) -> bool:
-    """Whether a drive harmonic was merged into the mains line of this run."""
-    mains = run.lines.nuisance[index]
-    return any(abs(n * e.frequency - mains.frequency) <= mains.wander for e in run.lines.excitation for n in (2, 3))
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:

@@ -17,7 +17,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 
 #: How far the mains and the shaft's speed may be from what is stated [Hz].
-_MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
+MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
 NAMED_HARMONICS = 3
 #: Lines closer than this are one [1 / record length].
@@ -50,6 +50,16 @@ class LineSet:
     def frequencies(self) -> FloatArray:
         """Frequencies of the windows' lines [Hz], excitation first, shape (n_lines,)."""
         return np.array([line.frequency for line in self.excitation + self.nuisance])
+
+    @property
+    def found(self) -> tuple[float, ...]:
+        """Frequencies of lines that nobody mentioned [Hz]."""
+        return tuple(line.frequency for line in self.nuisance if line.name == "found")
+
+    def place(self, name: str) -> int | None:
+        """Place of a disturbing line among those of the windows; None where it is not fitted apart."""
+        names = [line.name for line in self.nuisance]
+        return len(self.excitation) + names.index(name) if name in names else None
 
     @property
     def whole(self) -> tuple[Line, ...]:
@@ -107,7 +117,7 @@ def known_lines(
         coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * SPEED_DRIFT]
         conditions += [_on_excitation(line, e) for e in coincident[:1]]
     found = [next((line for line in faint if abs(line.frequency - f) < apart), Line("found", f, 1e-6)) for f in extra]
-    for line in _strong_lines(driven, speed, settings) + found:
+    for line in strong_lines(driven, speed, settings) + found:
         if not 0.0 < line.frequency < top:
             continue
         coincident = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
@@ -127,13 +137,14 @@ def _is_apart(line: Line, others: list[Line], least: float) -> bool:
     return all(abs(o.frequency - line.frequency) > max(o.wander, line.wander, least) for o in others)
 
 
-def _strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
+def strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
+    """What turns with the shaft, the mains, what the actuator makes of the drive."""
     shaft = [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in range(1, settings.shaft_harmonics + 1) if speed > 0]
     drive = [
         Line(f"harmonic {n}", n * e.frequency, 1e-6) for e in driven for n in range(2, settings.drive_harmonics + 1)
     ]
     mains = [
-        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, _MAINS_DRIFT)
+        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT)
         for n in range(1, settings.mains_harmonics + 1)
         if settings.mains > 0
     ]

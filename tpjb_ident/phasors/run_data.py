@@ -129,8 +129,8 @@ class RunPhasors:
         late = self._late(delays)
         return replace(self, record=record / late, residual=tuple(bins / gain for bins, gain in zip(residual, late)))
 
-    def oil_force(self, line: int = 0) -> ComplexArray:
-        """Oil-force phasors at one line, shape (n, 2) [N]."""
+    def oil_force(self, line: int | slice = 0) -> ComplexArray:
+        """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
         a = None if self.acceleration is None else self.acceleration.phasors[:, line]
         return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)
 
@@ -142,12 +142,6 @@ def _patterns(usable: BoolArray) -> list[tuple[BoolArray, list[int]]]:
     patterns, pattern_of = np.unique(usable, axis=0, return_inverse=True)
     table = [(pattern_of.ravel() == k, np.flatnonzero(pattern).tolist()) for k, pattern in enumerate(patterns)]
     return [(rows, members) for rows, members in table if len(members) > 1]
-
-
-def vector_channels(quantities: tuple[str, ...] = QUANTITIES) -> tuple[Channel, ...]:
-    """Channels along X and Y of some quantities: what stands for vectors that were never channels."""
-    names = [(quantity, axis) for quantity in quantities for axis in (0, 1)]
-    return tuple(Channel(f"{quantity} {'xy'[axis]}", quantity, axis=axis * np.pi / 2) for quantity, axis in names)
 
 
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:

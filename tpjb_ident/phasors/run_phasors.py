@@ -11,16 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, refuse_clipped
-from tpjb_ident.phasors.extra_lines import lines_beside, unexpected_lines
+from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition, unclipped_readings
 from tpjb_ident.phasors.extraction import extract
-from tpjb_ident.phasors.filled import filled_channels, slower_condition
+from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
 from tpjb_ident.phasors.lines import LineSet, known_lines
-from tpjb_ident.phasors.near_lines import near_line
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed
@@ -35,9 +33,9 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
     if run.excitation_kind != "sine":
         text = f"is excited by {run.excitation_kind}; coefficients come from sines, one frequency per run"
         cure = "Excite with sines, or leave the run out"
-        raise RigDataError(Problem("error", run.file, "excitation", text, cure, run.id))
+        raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    refuse_clipped(run)
+    unclipped_readings(run)
     inspection = _inspected(run, housing_mass, settings)
     result, slower = inspection.result, inspection.slower
     if inspection.run.length < run.length:
@@ -142,9 +140,8 @@ class _Inspection:
         near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
         beside = tuple(frequency for frequency in near if frequency is not None)
         if beside:
-            found = tuple(line.frequency for line in lines.nuisance if line.name == "found")
             exact = tuple(line.frequency for line in lines.excitation)
-            self._fit(self._lines(exact, lines.speed, (*found, *beside)), self.follow)
+            self._fit(self._lines(exact, lines.speed, (*lines.found, *beside)), self.follow)
             self.conditions += (lines_beside(beside),)
 
 

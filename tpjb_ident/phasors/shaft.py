@@ -104,13 +104,12 @@ def _by_keyphasor(run: Run, turning: float) -> ComplexArray | None:
 
 def _by_first_line(phasors: RunPhasors, turning: float) -> ComplexArray | None:
     """Unit phasors at the frequency `turning` [Hz] of the forward part of the 1X line in every window."""
-    lines = phasors.lines.excitation + phasors.lines.nuisance
-    place = [k for k, line in enumerate(lines) if line.name == "1X"]
-    if not place:
+    place = phasors.lines.place("1X")
+    if place is None:
         return None
-    d = phasors.displacement.phasors[:, place[0]]
+    d = phasors.displacement.phasors[:, place]
     middle = phasors.start + 0.5 * phasors.length
-    z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (lines[place[0]].frequency - turning) * middle)
+    z = (d[:, 0] + 1j * d[:, 1]) * np.exp(2j * np.pi * (phasors.lines.frequencies[place] - turning) * middle)
     good = z[np.isfinite(z)]
     if not len(good) or not abs(good.mean()) > _CLEAR * good.std() / np.sqrt(len(good)):
         return None

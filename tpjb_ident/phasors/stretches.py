@@ -13,6 +13,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.phasors.line_fit import usual_scale
+from tpjb_ident.phasors.line_means import complex_median
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Windows of a stretch, at least.
@@ -76,8 +77,7 @@ def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
 
 def _scatter(windows: ComplexArray) -> float:
     """Sum of squares about the median of some windows (n, m), one of them, the farthest, left out."""
-    middle = np.median(windows.real, axis=0) + 1j * np.median(windows.imag, axis=0)
-    squares = np.sum(np.abs(windows - middle) ** 2, axis=1)
+    squares = np.sum(np.abs(windows - complex_median(windows)) ** 2, axis=1)
     return float(squares.sum() - squares.max())
 
 
@@ -92,7 +92,7 @@ def _kept(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
     if not keep.any():
         return keep
     places = np.flatnonzero(keep)
-    middle = np.median(windows[places].real, axis=0) + 1j * np.median(windows[places].imag, axis=0)
+    middle = complex_median(windows[places])
     distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
     for end, inner in ((places[0], places[1:4]), (places[-1], places[-4:-1])):
         if distance[end] > max(_ACROSS * np.linalg.norm(middle), 3 * np.max(distance[inner], initial=0.0)):

@@ -42,12 +42,10 @@ class RecordTooShortError(TpjbError):
         return RecordTooShortError, (str(self), self.needed)
 
 
-def line_design(
-    time: FloatArray, frequencies: FloatArray, drift_order: int = 1, growing: FloatArray | None = None
-) -> FloatArray:
-    """Columns of the joint least-squares problem, (n, 2 n_lines + drift_order + 1 + 2 m).
+def line_design(time: FloatArray, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
+    """Columns of the joint least-squares problem, (n, 2 n_lines + drift_order + 1).
 
-    `time` (n,), `frequencies` (n_lines,) [Hz], `growing` (m,).
+    `time` (n,), `frequencies` (n_lines,) [Hz].
     """
     phase = 2 * np.pi * np.multiply.outer(time, frequencies)
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0]) or 1.0
@@ -55,11 +53,7 @@ def line_design(
     waves = np.empty((len(time), 2 * len(frequencies)))
     waves[:, 0::2] = np.cos(phase)
     waves[:, 1::2] = -np.sin(phase)
-    if growing is None or not len(growing):
-        return np.concatenate([waves, slow], axis=1)
-    turning = 2 * np.pi * np.multiply.outer(time, growing)
-    place = ((time - middle) / half)[:, None]
-    return np.concatenate([waves, slow, place * np.cos(turning), place * np.sin(turning)], axis=1)
+    return np.concatenate([waves, slow], axis=1)
 
 
 def variance_inflation(frequencies: FloatArray, n_driven: int, length: float, rate: float) -> float:

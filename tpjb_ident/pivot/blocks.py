@@ -16,9 +16,10 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.errors import ArgumentError
+from tpjb_ident.phasors.bad_samples import white_noise
+from tpjb_ident.phasors.slow_samples import piece_means
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.steps import Hold
-from tpjb_ident.slow_records.bad_samples import piece_means
 
 _TURN = 0.02  # of the load range: a smaller way back is noise
 MOST_BLOCKS = 220  # the covariance is a full matrix: keep it small
@@ -115,8 +116,6 @@ def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Bloc
     axes = pad_axes(samples.angle)
     load = piece_means(samples.load, first, last) @ axes.T
     displacement = piece_means(samples.displacement, first, last) @ axes.T
-    # white noise of single samples from differences: ramps and levels drop out
-    sample_noise = 1.4826 * float(np.median(np.abs(np.diff(load_along, 2)))) / np.sqrt(6.0)
     of_hold = np.array([hold.branch for hold in holds] + [0], dtype=int)
     return Blocks(
         time=time,
@@ -125,7 +124,7 @@ def cut_blocks(samples: Samples, holds: tuple[Hold, ...], length: float) -> Bloc
         across_load=load[:, 1],
         deflection=displacement[:, 0],
         across=displacement[:, 1],
-        load_spread=sample_noise / np.sqrt(count),
+        load_spread=white_noise(load_along) / np.sqrt(count),
         rate=np.asarray(rate),
         hold=number,
         branch=np.asarray(np.where(number >= 0, of_hold[number], _directions(along))),

@@ -15,6 +15,7 @@ from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.pivot.dry_record import PadDirection
 from tpjb_ident.pivot.law_fit import FRICTION, OFFSET, SCALE, LawFit
+from tpjb_ident.pivot.laws import interpolation
 from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
@@ -66,7 +67,9 @@ def measure_loop(
     gain = np.zeros((200, len(load)))
     for sign, members in ((1.0, down), (-1.0, up)):
         order = np.flatnonzero(members)[np.argsort(load[members], kind="stable")]
-        weights = _interpolation(grid, load[order])
+        # equal loads are set apart by a hair
+        knots = load[order] + 1e-9 * max(float(np.ptp(load[order])), 1.0) * np.arange(len(order))
+        weights = interpolation(grid, knots)
         gain[:, order] = sign * weights
         width += sign * (weights @ deflection[order])
     # trapezoid weights times interpolation weights: the area is linear in the points, so is its error
@@ -80,18 +83,6 @@ def measure_loop(
     if stored == 0.0:
         return None
     return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (low, high))
-
-
-def _interpolation(grid: FloatArray, knots: FloatArray) -> FloatArray:
-    """Weights (grid, knots) of linear interpolation at sorted knots; equal knots are set apart by a hair."""
-    x = knots + 1e-9 * max(float(np.ptp(knots)), 1.0) * np.arange(len(knots))
-    cell = np.clip(np.searchsorted(x, grid) - 1, 0, len(x) - 2)
-    share = np.clip((grid - x[cell]) / (x[cell + 1] - x[cell]), 0.0, 1.0)
-    weights = np.zeros((len(grid), len(x)))
-    rows = np.arange(len(grid))
-    weights[rows, cell] = 1.0 - share
-    weights[rows, cell + 1] += share
-    return weights
 
 
 EXTRAPOLATION_SPREAD = 0.04  # of ln(stiffness) per e-fold of load beyond the points: no law is quite the pivot's own
@@ -267,10 +258,7 @@ class PivotCurve(Presented):
             [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
             in `relative_calibration`.
         """
-        values = _loads(load)
-        half = self._quantile(level) * self.relative_stiffness_se(values)
-        centre = self.stiffness(values)
-        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
+        return self._band(_loads(load), level, secant=False)
 
     def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the secant stiffness [N/m]; as `stiffness_band`.
@@ -282,10 +270,7 @@ class PivotCurve(Presented):
         level : float, optional
             Of the interval, 0 to 1.
         """
-        values = _loads(load)
-        half = self._quantile(level) * self._spread(values, secant=True)
-        centre = self.secant(values)
-        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
+        return self._band(_loads(load), level, secant=True)
 
     def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
         """Standard error of ln(tangent stiffness) at pad loads [N].
@@ -308,9 +293,7 @@ class PivotCurve(Presented):
             [N]
         """
         values = np.maximum(_loads(load).ravel(), 1e-6 * self.valid_to)
-        logs = [np.log(fit.compliance(values)) for fit in self.fits]
-        gradients = [fit.log_compliance_gradient(values) for fit in self.fits]
-        return self._log_covariance(values, logs, gradients)
+        return self._log_covariance(values, secant=False)
 
     def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its interval.
@@ -358,23 +341,23 @@ class PivotCurve(Presented):
     def _spread(self, load: FloatArray, secant: bool) -> FloatArray:
         """Standard deviation of ln(stiffness): each law's own, and the laws' about the leading one."""
         flat = np.maximum(load.ravel(), 1e-6 * self.valid_to)
-        if secant:
-            logs = [np.log(fit.deflection(flat)) for fit in self.fits]
-            gradients = [fit.log_deflection_gradient(flat) for fit in self.fits]
-        else:
-            logs = [np.log(fit.compliance(flat)) for fit in self.fits]
-            gradients = [fit.log_compliance_gradient(flat) for fit in self.fits]
-        variance = np.diag(self._log_covariance(flat, logs, gradients))
-        return np.asarray(np.sqrt(variance)).reshape(load.shape)
+        return np.asarray(np.sqrt(np.diag(self._log_covariance(flat, secant)))).reshape(load.shape)
 
-    def _log_covariance(self, load: FloatArray, logs: list[FloatArray], gradients: list[FloatArray]) -> FloatArray:
-        """Covariance (n, n) of a logarithm (n,) of each law at loads (n,) [N], gradients (n, p).
+    def _band(self, load: FloatArray, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
+        half = self._quantile(level) * self._spread(load, secant)
+        centre = self.secant(load) if secant else self.stiffness(load)
+        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
+
+    def _log_covariance(self, load: FloatArray, secant: bool) -> FloatArray:
+        """Covariance (n, n) of ln(stiffness) at loads (n,) [N].
 
         Each law's own, the laws' about the leading one, and what extrapolation by so many e-folds adds.
         """
         total = np.zeros((len(load), len(load)))
-        for fit, weight, log, gradient in zip(self.fits, self.weights, logs, gradients, strict=True):
-            difference = log - logs[0]
+        leading, _ = self.law.log_softness(load, secant)
+        for fit, weight in zip(self.fits, self.weights, strict=True):
+            log, gradient = fit.log_softness(load, secant)
+            difference = log - leading
             total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
         outside = np.maximum(load / self.valid_to, float(np.min(self.steps.load)) / load)
         return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)

@@ -21,11 +21,11 @@ from scipy import fft, ndimage
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError, refuse
+from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
+from tpjb_ident.phasors.slow_samples import slow_samples
 from tpjb_ident.pivot.blocks import Blocks, PivotSettings, Samples, cut_blocks, pad_axes
 from tpjb_ident.pivot.steps import Hold, find_holds
-from tpjb_ident.slow_records.bad_samples import slow_samples
-from tpjb_ident.slow_records.noise import NoiseModel, NoiseSeries, estimate_noise
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
@@ -111,7 +111,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
 
 def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
     """Error that names the run, the place, the trouble and the cure."""
-    return RigDataError(Problem("error", run.file, place, f"run {run.id} {what}", cure, run=run.id))
+    return refuse(run.file, place, f"run {run.id} {what}", cure, run.id)
 
 
 def _quantisation(displacement: FloatArray) -> float:

@@ -12,8 +12,10 @@ import numpy as np
 from scipy import special
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import Problem, RigDataError, refuse
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
@@ -36,7 +38,6 @@ from tpjb_ident.pivot.law_fit import (
 )
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_of
-from tpjb_ident.slow_records.noise import NoiseModel
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
@@ -91,17 +92,13 @@ def fit_pivots(
     for record in records:
         if record.run.id not in refused:
             pads.setdefault(record.pad, []).append(record)
-    reasons = {str(problem.run): problem.what for problem in reversed(problems)}
-    many = 2 * len(reasons) >= len(campaign.of_kind("dry_pivot"))
+    many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (settings.on_refusal == "raise" or not pads or (settings.on_refusal == "few" and many)):
         raise RigDataError(problems)
     for number, pad_records in pads.items():
         pads[number] = [replace(record, good=~bad_blocks(record, noise, settings)) for record in pad_records]
     curves = _fit_pads([pads[number] for number in sorted(pads)], settings, str(structure_of(records, settings) or ""))
-    if not reasons:
-        return curves
-    listed = Condition("runs-refused", "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons)))
-    return tuple(replace(curve, status=(*curve.status, listed)) for curve in curves)
+    return tuple(replace(curve, status=(*curve.status, *refused_runs(problems))) for curve in curves)
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
@@ -109,7 +106,7 @@ def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tu
     runs = campaign.of_kind("dry_pivot")
     if not runs:
         cure = "Record dry pivot tests, one per pad"
-        raise RigDataError(Problem("error", "campaign.toml", "runs", "has no runs of kind dry_pivot", cure))
+        raise refuse("campaign.toml", "runs", "has no runs of kind dry_pivot", cure)
     records: list[DryRecord] = []
     problems: list[Problem] = []
     for run in runs:

@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.dry_record import DryRecord
 from tpjb_ident.pivot.law_fit import FitData, LawFit, fit_law
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.slow_records.noise import NoiseModel
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
 MODEL_ERROR = 3e-4  # of the deflection: what averaging over a curved law leaves; matters in computed records only

@@ -88,26 +88,14 @@ class LawFit:
         u = np.maximum(load, 0.0) / self.reference_load
         return np.asarray(np.exp(self.theta[SCALE]) * self.law.psi(u, self.shape)[0])
 
-    def log_compliance_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(compliance) with respect to `theta` at pad loads (n,) [N]."""
-        return self._log_gradient(*self.law.psi(np.maximum(load, 0.0) / self.reference_load, self.shape))
-
-    def log_deflection_gradient(self, load: FloatArray) -> FloatArray:
-        """Derivative (n, p) of ln(deflection) with respect to `theta` at pad loads (n,) [N]."""
-        return self._log_gradient(*self.law.phi(np.maximum(load, 0.0) / self.reference_load, self.shape))
-
-    def _log_gradient(self, value: FloatArray, derivative: FloatArray) -> FloatArray:
-        gradient = np.zeros((len(value), len(self.theta)))
+    def log_softness(self, load: FloatArray, secant: bool) -> tuple[FloatArray, FloatArray]:
+        """Logarithm (n,) of deflection (`secant`) or compliance at loads (n,) [N], its derivative (n, p) by `theta`."""
+        shape = self.law.phi if secant else self.law.psi
+        value, derivative = shape(np.maximum(load, 0.0) / self.reference_load, self.shape)
+        gradient = np.zeros((len(load), len(self.theta)))
         gradient[:, SCALE] = 1.0
         gradient[:, _shape(self.law)] = derivative / np.maximum(value, 1e-300)[:, None]
-        return gradient
-
-    def missing_compliance(self, load: FloatArray) -> FloatArray:
-        """What incomplete contact adds to the measured compliance (n,) [m/N] at loads (n,) [N]."""
-        if not self.contact:
-            return np.zeros_like(load)
-        gap, load_0 = self.theta[-2], np.exp(self.theta[-1])
-        return np.asarray(gap / load_0 * np.exp(-load / load_0))
+        return np.log(self.deflection(load) if secant else self.compliance(load)), gradient
 
     def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
         """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""

@@ -32,6 +32,7 @@ from rigdata.arrays import FloatArray
 
 #: Values (n,) and their derivative (n, k) with respect to the shape parameters.
 WithDerivative = tuple[FloatArray, FloatArray]
+_SPHERE = 2.0 / 3.0
 
 
 class Law(Protocol):
@@ -111,37 +112,32 @@ class _Shape:
         return np.array(self.low), np.array(self.high)
 
 
-def _no_parameters(u: FloatArray) -> FloatArray:
-    return np.zeros((len(u), 0))
-
-
 def _log(u: FloatArray) -> FloatArray:
     """Logarithm that stays finite at zero load, where every use multiplies it by zero or bounds it."""
     return np.log(np.maximum(u, 1e-9))
 
 
-class _Linear(_Shape):
-    """Constant compliance."""
+def _raised(u: FloatArray, p: float) -> FloatArray:
+    """Integral of the compliance u^(p - 1)."""
+    return np.asarray(np.maximum(u, 0.0) ** p / p)
 
-    name = "linear"
+
+def _compliance(u: FloatArray, p: float) -> FloatArray:
+    """Compliance u^(p - 1), finite at zero load."""
+    return np.asarray(np.maximum(u, 1e-9) ** (p - 1.0))
+
+
+class _FixedPower(_Shape):
+    """Deflection as W^p: p = 1 is a constant compliance, p = 2/3 a sphere on a flat (paper, Eq. 16)."""
+
+    def __init__(self, name: str, p: float) -> None:
+        self.name, self.p = name, p
 
     def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return u, _no_parameters(u)
+        return _raised(u, self.p), np.zeros((len(u), 0))
 
     def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return np.ones_like(u), _no_parameters(u)
-
-
-class _HertzPoint(_Shape):
-    """Sphere on flat: deflection as W^(2/3) (paper, Eq. 16)."""
-
-    name = "hertz-point"
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return 1.5 * np.cbrt(u) ** 2, _no_parameters(u)
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return 1.0 / np.cbrt(np.maximum(u, 1e-9)), _no_parameters(u)
+        return _compliance(u, self.p), np.zeros((len(u), 0))
 
 
 class _HertzLine(_Shape):
@@ -175,12 +171,11 @@ class _Power(_Shape):
     high = (1.3,)
 
     def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        p = q[0]
-        value = np.maximum(u, 0.0) ** p / p
-        return value, (value * (_log(u) - 1.0 / p))[:, None]
+        value = _raised(u, q[0])
+        return value, (value * (_log(u) - 1.0 / q[0]))[:, None]
 
     def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        value = np.maximum(u, 1e-9) ** (q[0] - 1.0)
+        value = _compliance(u, q[0])
         return value, (value * _log(u))[:, None]
 
 
@@ -195,11 +190,11 @@ class _PointInSeries(_Shape):
     high = (1.0,)
 
     def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        point = 1.5 * np.cbrt(u) ** 2
+        point = _raised(u, _SPHERE)
         return (1.0 - q[0]) * point + q[0] * u, (u - point)[:, None]
 
     def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        point = 1.0 / np.cbrt(np.maximum(u, 1e-9))
+        point = _compliance(u, _SPHERE)
         return (1.0 - q[0]) * point + q[0], (1.0 - point)[:, None]
 
 
@@ -274,7 +269,7 @@ class _Spline(_Shape):
         return self.precision
 
     def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        weights = _interpolation(np.log(np.maximum(u, 1e-9)))
+        weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)
         value = np.exp(weights @ np.insert(q, FIXED, 0.0))
         return value, np.delete(weights, FIXED, axis=1) * value[:, None]
 
@@ -304,11 +299,11 @@ class _Spline(_Shape):
         return phi, jacobian * phi[:, None]
 
 
-def _interpolation(x: FloatArray) -> FloatArray:
-    """Weights (n, nodes) of linear interpolation in ln u; linear extrapolation beyond the ends."""
-    cell = np.clip(np.searchsorted(NODES, x) - 1, 0, len(NODES) - 2)
-    share = (x - NODES[cell]) / (NODES[cell + 1] - NODES[cell])
-    weights = np.zeros((len(x), len(NODES)))
+def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
+    """Weights (n, k) of linear interpolation at rising knots (k,); linear extrapolation beyond the ends."""
+    cell = np.clip(np.searchsorted(knots, x) - 1, 0, len(knots) - 2)
+    share = (x - knots[cell]) / (knots[cell + 1] - knots[cell])
+    weights = np.zeros((len(x), len(knots)))
     rows = np.arange(len(x))
     weights[rows, cell] = 1.0 - share
     weights[rows, cell + 1] = share
@@ -318,12 +313,12 @@ def _interpolation(x: FloatArray) -> FloatArray:
 # ln u on which the compliance is integrated
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
 _GRID_LOAD = np.exp(_GRID)
-_GRID_WEIGHTS = _interpolation(_GRID)
+_GRID_WEIGHTS = interpolation(_GRID, NODES)
 _ALL: tuple[Law, ...] = (
     _HertzLine(),
-    _HertzPoint(),
+    _FixedPower("hertz-point", _SPHERE),
     _Power(),
-    _Linear(),
+    _FixedPower("linear", 1.0),
     _PointInSeries(),
     _Bilinear(),
     _Spline(),

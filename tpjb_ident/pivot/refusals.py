@@ -10,7 +10,8 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem
-from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.pivot.blocks import PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
 
 _ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
@@ -143,15 +144,14 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     """
     if len({record.pad for record in records}) < 3:
         return []
-    outward = np.array([[math.cos(record.angle), math.sin(record.angle)] for record in records])
-    tangent = np.column_stack([-outward[:, 1], outward[:, 0]])
+    axes = np.array([pad_axes(record.angle) for record in records])
+    outward, tangent = axes[:, 0], axes[:, 1]
     lowest = [int(np.argmin(record.blocks.load)) for record in records]
-    along_pad = np.array([record.blocks.deflection[k] for record, k in zip(records, lowest, strict=True)])
-    across_pad = np.array([record.blocks.across[k] for record, k in zip(records, lowest, strict=True)])
-    starts = along_pad[:, None] * outward + across_pad[:, None] * tangent
+    places = [(record.blocks.deflection[k], record.blocks.across[k]) for record, k in zip(records, lowest, strict=True)]
+    starts = np.einsum("ri,rij->rj", np.array(places), axes)
     centre, distance = _centre(starts, outward)
     asides = np.sum((starts - centre) * tangent, axis=1)
-    limit = max(_ASIDE * distance, _ASIDE_SPREAD * 1.4826 * float(np.median(np.abs(asides))))
+    limit = max(_ASIDE * distance, _ASIDE_SPREAD * robust_deviation(asides))
     problems = []
     for record, start, normal, aside in zip(records, starts, outward, asides, strict=True):
         along = float((start - centre) @ normal)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.phasors.bad_samples import robust_deviation, white_noise
 
 _STILL = 0.2  # share of the mean rate of change below which the load counts as held
 _SETTLED = 4.0  # noise standard deviations within which the load must lie of the hold's own level
@@ -72,10 +73,7 @@ def _bin(time: FloatArray, load: FloatArray) -> _Bins:
     bounds = list(zip(starts[whole], stops[whole], strict=True))
     medians = np.array([np.median(load[a:b]) for a, b in bounds])
     times = np.array([np.mean(time[a:b]) for a, b in bounds])
-    second = np.diff(medians, 2) if len(medians) > 2 else np.zeros(1)
-    # a second difference of white noise has variance 6; its median does not feel the ramps' corners
-    noise = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
-    return _Bins(times, medians, width, noise)
+    return _Bins(times, medians, width, white_noise(medians) if len(medians) > 2 else 0.0)
 
 
 def _runs(mask: BoolArray) -> list[tuple[int, int]]:
@@ -103,7 +101,7 @@ def _settle(run: tuple[int, int], bins: _Bins) -> Hold | None:
     a, b = run
     while b - a >= _FEWEST:
         level = float(np.median(bins.load[a:b]))
-        noise = max(bins.noise, 1.4826 * float(np.median(np.abs(bins.load[a:b] - level))), 1e-9 * abs(level))
+        noise = max(bins.noise, robust_deviation(bins.load[a:b] - level), 1e-9 * abs(level))
         if abs(bins.load[a] - level) > _SETTLED * noise:
             a += 1
         elif abs(bins.load[b - 1] - level) > _SETTLED * noise:

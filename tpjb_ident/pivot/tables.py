@@ -158,7 +158,7 @@ def pivots_text(curves: Sequence[PivotCurve], source: str) -> str:
     lines = [
         "# Measured pivot laws: pivot and housing together, as the probes on the housing see them.",
         f'schema = "{_SCHEMA}"',
-        f"source = {_quoted(source)}",
+        f"source = {_toml(source)}",
         "includes_housing = true",
     ]
     for curve in sorted(curves, key=lambda c: c.pad):
@@ -207,9 +207,9 @@ def pad_table(curve: PivotCurve) -> dict[str, Any]:
     return {
         "pad": curve.pad,
         "law": curve.law.name,
-        "valid_from_N": _Number(f"{curve.valid_from:.6g}"),
-        "valid_to_N": _Number(f"{curve.valid_to:.6g}"),
-        "relative_calibration": _Number(f"{curve.relative_calibration:.4g}"),
+        "valid_from_N": float(f"{curve.valid_from:.6g}"),
+        "valid_to_N": float(f"{curve.valid_to:.6g}"),
+        "relative_calibration": float(f"{curve.relative_calibration:.4g}"),
         "force_N": _rounded(loads, 9),
         "deflection_m": _rounded(np.r_[0.0, curve.deflection(positive)], 9),
         # at zero load Hertz's laws have no stiffness at all: the first value belongs to the first positive load
@@ -218,34 +218,10 @@ def pad_table(curve: PivotCurve) -> dict[str, Any]:
     }
 
 
-class _Number(float):
-    """A number that keeps the digits it was written with."""
-
-    def __new__(cls, text: str) -> _Number:
-        number = super().__new__(cls, text)
-        number.text = text
-        return number
-
-    text: str
-
-
-def _rounded(values: FloatArray, digits: int) -> list[_Number]:
-    numbers = []
-    for value in values:
-        text = f"{value:.{digits}g}"
-        # TOML tells integers from floats: a reader of floats should meet only floats
-        numbers.append(_Number(text if any(mark in text for mark in ".en") else f"{text}.0"))
-    return numbers
+def _rounded(values: FloatArray, digits: int) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in values]
 
 
 def _toml(value: Any) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(number.text for number in value) + "]"
-    if isinstance(value, _Number):
-        return value.text
-    return _quoted(value) if isinstance(value, str) else str(value)
-
-
-def _quoted(text: str) -> str:
-    escaped = json.dumps(text, ensure_ascii=False)  # a TOML string but for DEL, which TOML does not allow
+    escaped = json.dumps(value, ensure_ascii=False)  # a TOML value but for DEL, which TOML does not allow in a string
     return escaped.replace("\x7f", "\\u007f")

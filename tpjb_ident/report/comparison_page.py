@@ -10,17 +10,17 @@ import numpy as np
 import pandas as pd
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.columns import amount, place_of, size, symbol
+from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
 from tpjb_ident.report.drawing.colours import VARIANT_LABEL
-from tpjb_ident.report.drawing.series import DIRECT, point_label
+from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
-    evidence_section,
+    evidence_sections,
     flags_line,
     set_up_section,
     tested_facts,
@@ -81,9 +81,8 @@ def write_report(
     answer, *more = summary_sentences(comparison, frame)
     points = comparison.identification.points
     coefficients = coefficient_panels(frame)
-    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), coefficients[0] if coefficients else None)
+    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), next(iter(coefficients), None))
     campaign, bearing = comparison.campaign, comparison.bearing
-    hashes = {} if isinstance(campaign, TableSource) else campaign.fingerprint()
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
         subtitle=campaign.description,
@@ -96,21 +95,10 @@ def write_report(
         picture=lead,
         then=then,
         sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
-        settings=settings or _own_settings(comparison),
-        inputs=hashes if inputs is None else inputs,
+        settings=settings or {"campaign": campaign.id, **vars(comparison.settings)},
+        inputs=campaign.fingerprint() if inputs is None else inputs,
     )
     return write_page(folder, page)
-
-
-def _own_settings(comparison: Comparison) -> dict[str, Any]:
-    chosen = comparison.settings
-    return {
-        "campaign": comparison.campaign.id,
-        "pivot models": [v.name for v in comparison.variants],
-        "thermal": chosen.thermal,
-        "effects": chosen.effects,
-        "estimator": comparison.identification.method,
-    }
 
 
 def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
@@ -131,9 +119,10 @@ def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
 def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequence[Panel]) -> list[Section]:
     sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign = comparison.campaign
-    table = isinstance(campaign, TableSource)
-    evidence = None if isinstance(campaign, TableSource) else evidence_section(campaign, comparison.identification)
-    sections += [] if evidence is None else [evidence]
+    tables = [measured_table(comparison.identification)]
+    if not isinstance(campaign, TableSource):
+        sections += evidence_sections(campaign, comparison.identification)
+        tables.append(budget_table(comparison.identification))
     sections.append(
         Section(
             "Operating points",
@@ -141,18 +130,14 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequenc
                 "Intervals are 95 %, random and calibration errors together. Outliers is the share of record windows "
                 "that got no weight."
             ],
-            tables=[
-                measured_table(comparison.identification),
-                *([] if table else [budget_table(comparison.identification)]),
-                _predicted_table(frame),
-            ],
+            tables=[*tables, _predicted_table(frame)],
         )
     )
     flags = _flag_table(comparison)
-    text = [] if flags.rows else ["No flags: nothing about the records calls for caution."]
-    sections.append(Section("Quality flags", notes=text, tables=[flags] if flags.rows else []))
-    sections.append(set_up_section(comparison))
-    return sections
+    if flags.rows:
+        sections.append(Section("Quality flags", tables=[flags]))
+    set_up = set_up_section(comparison)
+    return [*sections, set_up] if set_up.tables else sections
 
 
 def _pivot_sections(comparison: Comparison) -> list[Section]:
@@ -194,61 +179,57 @@ _PIVOT_LOADS = (2000.0, 4000.0)
 def measured_table(result: Identification) -> Table:
     """K and C of every point with intervals."""
     rows = []
-    for p in result.points:
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         share = f"{100 * p.outlier_fraction:.0f} %"
         flags = ", ".join(str(c) for c in p.quality) or "ok"
-        rows.append([point_label(p), *p.stiffness.cells(), str(p.n_windows), share, flags])
+        rows.append([place, *p.stiffness.cells(), str(p.n_windows), share, flags])
     named = [f"{kind.symbol}{e}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING) for e in ENTRIES]
     columns = ["point", *named, "windows", "outliers", "flags"]
-    return Table(f"Measured ({result.method})", columns, rows, frozenset({0, len(columns) - 1}))
+    return Table(f"Measured ({result.method})", columns, rows)
 
 
 def _predicted_table(frame: pd.DataFrame) -> Table:
     """Direct coefficients predicted with every pivot model, and how far off each is."""
     rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
-    for _, row in ordered.iterrows():
+    for label, (_, row) in zip(point_labels(ordered), ordered.iterrows(), strict=True):
         cells = []
         for name in DIRECT:
             column = coefficient_column(name)
             cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
             cells.append(percent(row[f"{column}_ratio"] - 1.0))
         remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
-        label = place_of(row["static_load_N"], row["excitation_Hz"])
         rows.append([label, row["pivots"], *cells, remark or ""])
     columns = ["point", "pivots"]
     for name in DIRECT:
         columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]
     columns.append("remark")
-    return Table("Predicted", columns, rows, frozenset({0, 1, len(columns) - 1}))
+    return Table("Predicted", columns, rows)
 
 
 def _flag_table(comparison: Comparison) -> Table:
     """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
-    rows = [[place, str(c), c.detail, c.meaning] for place, status in _flagged(comparison) for c in status]
-    return Table("Flags", ["flag", "what it means", "where", "found"], _gathered(rows), frozenset(range(4)))
+    found: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
+    for place, conditions in _flagged(comparison):
+        for condition in conditions:
+            places, details = found.setdefault((str(condition), condition.meaning), ([], []))
+            places.append(place)
+            if condition.detail and condition.detail not in details:
+                details.append(condition.detail)
+    rows = [[*flag, "; ".join(places), "; ".join(details)] for flag, (places, details) in found.items()]
+    return Table("Flags", ["flag", "what it means", "where", "found"], rows)
 
 
 def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
     """What can have flags, and its flags."""
     identified = comparison.identification
-    parts: list[tuple[str, Sequence[Condition]]] = [(point_label(p), p.quality) for p in identified.points]
+    labels = point_labels(points_table(identified.points))
+    parts: list[tuple[str, Sequence[Condition]]] = []
+    parts += [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
     tests = (("clearance", comparison.clearance), ("locus", comparison.locus))
     return parts + [(name, test.status) for name, test in tests if test is not None]
-
-
-def _gathered(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    """One row per flag and meaning, with every place; what was found where it differs from place to place."""
-    places_of: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for place, name, detail, means in rows:
-        places_of.setdefault((name, means), []).append((place, detail))
-    out = []
-    for (name, means), places in places_of.items():
-        details = list(dict.fromkeys(detail for _, detail in places if detail))
-        out.append([name, means, "; ".join(place for place, _ in places), "; ".join(details)])
-    return out
 
 
 def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
@@ -266,7 +247,7 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
             cells.append(with_interval(value, low, high, size("stiffness")) + remark)
             cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
         rows.append([f"#{curve.pad}", curve.law.name, *cells])
-    return Table("Measured tangent stiffness, 95 %", columns, rows, frozenset({0, 1}))
+    return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
 def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.compare.effect_words import Estimate, finding, label_in_words, shown_unit, words_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -39,7 +39,7 @@ _GAPS = {
     "noise_floor": "what noise alone would leave",
 }
 _GROUP = "Where model and measurement part"
-OVER: tuple[tuple[Literal["load", "frequency"], str, str], ...] = (
+OVER = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
 )
@@ -81,8 +81,7 @@ def write_diagnosis_report(
 
 def _effects_table(verdict: Verdict) -> Table:
     return Table(
-        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict),
-        frozenset({0, 1}),
+        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict)
     )  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def _gap_table(verdict: Verdict) -> Table:
         for name, words in _GAPS.items()
         if verdict.effects or not name.endswith("after")  # where nothing was added, both are the same
     ]
-    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows, frozenset({0}))
+    return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 
 
 def _effect_sections(verdict: Verdict) -> list[Section]:
@@ -129,14 +128,13 @@ def _rivals(verdict: Verdict) -> list[str]:
     notes = []
     for rival in listed:
         if rival not in named and rival.probability * odds > own:
-            sizes = [_found(label, parameters) for label, parameters in rival.parameters.items()]
+            sizes = [
+                finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
+                for label, parameters in rival.parameters.items()
+            ]
             share = f"probability {rival.probability:.2f}, that of what is named {own:.2f}"
             notes.append(f"It may also be that {' and '.join(sizes)}: {share}.")
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
-
-
-def _found(label: str, parameters: Mapping[str, Any]) -> str:
-    return finding(label.split()[0], {key: Estimate(**value) for key, value in parameters.items()})
 
 
 def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
@@ -153,27 +151,21 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
     tried = [
         [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
     ]
+    columns = ["observable", "where", "size, sigma", "share"]
     sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
     sections.append(
         Section(
             _GROUP,
             notes=[note],
             panels=_diagnosis_panels(result.diagnosis),
-            tables=[
-                Table(
-                    "Largest shares of the squared gap",
-                    ["observable", "where", "size, sigma", "share"],
-                    places,
-                    frozenset({0, 1}),
-                )
-            ],
+            tables=[Table("Largest shares of the squared gap", columns, places)],
         )
     )
     sections += _evidence_sections(verdict)
     if tried:
-        text = "Log evidence above the baseline's, in nats, everything that may be off left free within its tolerance."
+        title = "Best first; log evidence in nats above the baseline's, everything free within its tolerance"
         columns = ["explanation", "log evidence", "held-out gap", "probability"]
-        sections.append(Section("Explanations that were fitted", [text], tables=[Table("Best first", columns, tried)]))
+        sections.append(Section("Explanations that were fitted", tables=[Table(title, columns, tried)]))
     if verdict.effects:
         sections.append(Section("The gap", tables=[_gap_table(verdict)]))
     return sections
@@ -191,27 +183,20 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     if len(frame):
         panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict, logarithmic=False), _GROUP)]
+    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP)]
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:
-    """Sections of the report; those for which a diagnosis holds nothing are left out."""
-    out = [Section("What is left", [_left_sentence(verdict.remainder)])]
-    if verdict.assumptions:
-        note = (
-            "One standard deviation each. They are free within these in every fit and part of every interval; the last "
-            "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
-            "model is what the campaign turned out to need."
-        )
-        far = [
-            f"The {label_in_words(a.name)} is {abs(a.deviation):.1f} standard deviations from what is stated: check it."
-            for a in verdict.assumptions if abs(a.deviation) > DiagnoseSettings.visible
-        ]  # fmt: skip
-        columns = ["tolerance", "stated", "source", "fitted", "deviations"]
-        rows = [_row(a) for a in verdict.assumptions]
-        table = Table("Stated tolerances", columns, rows, frozenset({0, 2, 3}))
-        out.append(Section("What may be off", [note, *far], tables=[table]))
-    return out
+    """What is left, and what was made of the tolerances."""
+    note = (
+        "One standard deviation each. They are free within these in every fit and part of every interval; the last "
+        "columns are what the fit made of them, and how many deviations the farthest number is out. That of the "
+        "model is what the campaign turned out to need."
+    )
+    columns = ["tolerance", "stated", "source", "fitted", "deviations"]
+    table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions])
+    left = Section("What is left", [_left_sentence(verdict.remainder)])
+    return [left, Section("What may be off", [note], tables=[table])]
 
 
 def _left_sentence(remainder: Remainder) -> str:
@@ -225,8 +210,7 @@ def _left_sentence(remainder: Remainder) -> str:
 
 def _row(one: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
-    values: Sequence[float] = one.fitted if isinstance(one.fitted, list) else [one.fitted]
     unit, scale = shown_unit(one.unit)
-    fitted = ", ".join(signed(v / scale) for v in values)
+    fitted = ", ".join(signed(v / scale) for v in one.values)
     far = signed(one.deviation) if one.deviation else ""
     return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}", far]

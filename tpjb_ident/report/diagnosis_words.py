@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import amount, finding, label_in_words, shown_unit, words_of
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.series import DIRECT
-from tpjb_ident.rounding import MINUS, percent, significant
+from tpjb_ident.rounding import MINUS, percent, signed, significant
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnosis.verdict.verdict import Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
 
+#: Parameters that number what there are several of.
+_PLACES = ("pad", "probe", "cell")
 #: Observables of a diagnosis in words.
 _OBSERVABLES = {
     "locus_x": "the shaft's horizontal position",
@@ -32,10 +35,11 @@ def verdict_sentences(
     name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None = None
 ) -> list[str]:
     """Say what came out, the answer first."""
-    sentences = [_answer(name, verdict, deviations)]
+    sentences = [_answer(name, verdict, deviations), *verdict.beforehand]
     if deviations and verdict.verdict != "consistent":
-        before = ", ".join(f"{c} {percent(deviations[c][0])}" for c in DIRECT if c in deviations)
-        after = ", ".join(f"{c} {percent(deviations[c][1])}" for c in DIRECT if c in deviations)
+        before, after = (
+            ", ".join(f"{c} {percent(deviations[c][end])}" for c in DIRECT if c in deviations) for end in (0, 1)
+        )
         with_effects = f"; with it {after}" if verdict.effects else ""
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
@@ -60,12 +64,23 @@ def verdict_sentences(
     worse = [observable(o) for o, g in verdict.gap_by_observable.items() if _worse(g)]
     if verdict.effects and worse:
         sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
+    sentences += [_beyond(one) for one in verdict.assumptions if abs(one.deviation) > Deciding.visible]
     if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
         sentences.append(f"Next test: {in_words(verdict.next_test)}.")
     if verdict.below_floor:
         hidden = ", ".join(label_in_words(n) for n in verdict.below_floor)
         sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
     return sentences
+
+
+def _beyond(one: Assumption) -> str:
+    """What is further out than its tolerance explains, with its size: no name, but to be looked at."""
+    unit, scale = shown_unit(one.unit)
+    sizes = ", ".join(signed(value / scale) for value in one.values)
+    return (
+        f"Beyond what is stated, without a name: {label_in_words(one.name)} {sizes} {unit}, "
+        f"{abs(one.deviation):.1f} standard deviations."
+    )
 
 
 def _tested(verdict: Verdict) -> bool:
@@ -167,7 +182,7 @@ def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> 
 def parameter_rows(verdict: Verdict) -> list[list[str]]:
     """One row per parameter of the effects, in the units that people read."""
     return [
-        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key == "pad" else amount(p)]
+        [label_in_words(e.name), label_in_words(key), f"#{p.value:.0f}" if key in _PLACES else amount(p)]
         for e in verdict.effects
         for key, p in e.parameters.items()
     ]

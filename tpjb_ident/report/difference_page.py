@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,19 +11,26 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, place_of, size, symbol
+from tpjb_ident.columns import per, place_of, size, spinning, symbol
 from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
+from tpjb_ident.condition_kinds import KINDS
+from tpjb_ident.conditions import Condition
 from tpjb_ident.report.drawing.colours import INK, LIGHT
-from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures, shrink
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with_errors
 from tpjb_ident.report.figure import panel
+from tpjb_ident.report.laboratory_sections import flags_line, set_points
 from tpjb_ident.report.page import Page, Section, Table, write_page
-from tpjb_ident.rounding import significant
-from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, TANGENT, Coefficient
+from tpjb_ident.rounding import significant, with_interval
+from tpjb_ident.schema import DAMPING, ENTRIES, POINT_KEY, STIFFNESS, TANGENT, Coefficient
 
-_TITLE = "Differences, 95 % intervals; full marks changed beyond what both intervals allow"
+_TITLE = (
+    "Differences, 95 % intervals; full marks changed beyond what both allow (logarithmic beyond the widest interval)"
+)
+_POINTS = "operating point: load in {}, excitation in Hz"
+#: How many times the widest interval a difference is at least where the scale is logarithmic outside.
+_BEYOND = 5.0
 _MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
-#: Height of the ticks' second line [inches].
-_SECOND_LINE = 0.16
 
 
 def write_difference_report(
@@ -35,8 +42,10 @@ def write_difference_report(
     page = Page(
         title=f"{a.name} and {b.name}: what changed",
         subtitle="Second less first, with 95 % intervals",
-        facts=_facts(difference),
-        picture=panel("difference", _TITLE, functools.partial(_drawn, points), "") if len(points) else None,
+        facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
+        values=_values_table(difference) if len(points) else None,
+        flags=flags_line([("", _flags(points))], len(points)),
+        picture=panel("difference", _TITLE, _drawn, "", points) if len(points) else None,
         answer=answer,
         more=more,
         then=then,
@@ -60,6 +69,30 @@ def _facts(difference: Difference) -> dict[str, str]:
     return facts
 
 
+def _values_table(difference: Difference) -> Table:
+    """K and C of both sides at the point in the middle, and what changed."""
+    number = len(difference.points) // 2
+    row = difference.points.iloc[number].to_dict()
+    sides = zip((difference.a, difference.b), difference.pairs[number], strict=True)
+    measured = [side.coefficients.iloc[index].to_dict() for side, index in sides]
+    rows = []
+    for kind, entry in itertools.product((STIFFNESS, DAMPING), ENTRIES):
+        name, scale = kind.column(entry), kind.display_scale
+        cells = [with_interval(side[name], side[f"{name}_lo"], side[f"{name}_hi"], scale) for side in measured]
+        changed = row[f"{kind.symbol}{entry}_changed"]
+        rows.append([f"{kind.symbol}{entry}, {kind.display_unit}", *cells, shown_difference(row, name, scale), changed])
+    place = f"{place_of(row['static_load_N'], row['excitation_Hz'])}, shaft at "
+    place += spinning(row["shaft_speed_Hz"], row["rotation"])
+    columns = ["", "first", "second", "difference", "changed"]
+    return Table(f"At {place}; 95 % intervals", columns, rows)
+
+
+def _flags(points: pd.DataFrame) -> list[Condition]:
+    """Flags of both sides at the common points."""
+    texts = points.reindex(columns=["quality_a", "quality_b"]).to_numpy(str).ravel()
+    return [Condition(name) for name in "; ".join(texts).split("; ") if name in KINDS]
+
+
 def _sections(difference: Difference) -> list[Section]:
     sections = []
     points = difference.points
@@ -72,12 +105,12 @@ def _sections(difference: Difference) -> list[Section]:
             for row in difference.pivots.to_dict("records")
         ]
         columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
-        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows, frozenset({0, 5}))
+        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows)
         sections.append(Section("Pivots", tables=[table]))
     if not difference.clearance.empty:
         rows = [_row(row, "clearance_m", "length") for row in difference.clearance.to_dict("records")]
         columns = ["pad", *_columns("length")]
-        table = Table("Assembled clearance at zero push load", columns, rows, frozenset({0, 4}))
+        table = Table("Assembled clearance at zero push load", columns, rows)
         sections.append(Section("Clearance", tables=[table]))
     return sections
 
@@ -95,51 +128,41 @@ def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[
 def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
     """Differences of K or of C at every point, and which of them changed."""
     rows = []
-    for row in points.to_dict("records"):
-        cells, changed = [], []
+    for place, row in zip(point_labels(points), points.to_dict("records"), strict=True):
+        cells = []
         for entry in ENTRIES:
             cells.append(shown_difference(row, kind.column(entry), kind.display_scale))
             if row[f"{kind.symbol}{entry}_changed"] == "yes":
                 cells[-1] += " *"
-                changed.append(f"{kind.symbol}{entry}")
         flags = dict.fromkeys(
             f for side in "ab" for f in str(row.get(f"quality_{side}", "ok")).split("; ") if f != "ok"
         )
-        rows.append([_place(row), *cells, ", ".join(flags) or "ok"])
+        rows.append([place, *cells, ", ".join(flags) or "ok"])
     named = [f"{kind.symbol}{entry}, {kind.display_unit}" for entry in ENTRIES]
     caption = f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow"
-    return Table(caption, ["point", *named, "flags of both"], rows, frozenset({0, 5}))
-
-
-def _place(row: Mapping[Any, Any]) -> str:
-    return place_of(row["static_load_N"], row["excitation_Hz"])
+    return Table(caption, ["point", *named, "flags of both"], rows)
 
 
 def _drawn(points: pd.DataFrame) -> Figure:
-    """Draw differences of K and C with their intervals, point by point."""
-    figure, ((left, right),) = new_pictures(1, 2, height=3.6)
+    """Draw differences of K and C with their intervals, point by point; logarithmic beyond the widest interval."""
+    figure, grid = new_pictures(2, 1, height=2.7)
     place = np.arange(len(points), dtype=float)
-    for axes, kind in ((left, STIFFNESS), (right, DAMPING)):
-        label(
-            axes,
-            f"operating point: load in {symbol('load')}, excitation in Hz",
-            f"difference of {kind.quantity}, {kind.display_unit}",
-        )
+    for (axes,), kind in zip(grid, (STIFFNESS, DAMPING), strict=True):
+        label(axes, _POINTS.format(symbol("load")), f"difference of {kind.symbol.upper()}, {kind.display_unit}")
         axes.axhline(0.0, color=INK, linewidth=1.0)
+        half = 0.0
         for k, (entry, colour, marker) in enumerate(_MARKS):
             name = f"{kind.column(entry)}_difference"
-            value, low, high = (points[name + end].to_numpy(float) / kind.display_scale for end in ("", "_lo", "_hi"))
+            value, errors = with_errors(points, name, kind.display_scale)
+            half = max(half, float(np.max(errors, where=np.isfinite(errors), initial=0.0)))
             x = place + 0.16 * (k - 1.5)
-            axes.errorbar(x, value, yerr=[value - low, high - value], fmt="none", ecolor=LIGHT[colour], capsize=2.5)
+            axes.errorbar(x, value, yerr=errors, fmt="none", ecolor=LIGHT[colour], capsize=2.5)
             axes.plot(x, value, marker, color=LIGHT[colour], markerfacecolor=LIGHT["paper"], markersize=5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
             axes.plot(x[changed], value[changed], marker, color=LIGHT[colour], markersize=5)
-        texts = [
-            f"{row['static_load_N'] * per('load'):.4g}\n{row['excitation_Hz']:g}" for row in points.to_dict("records")
-        ]
-        axes.set_xticks(place, texts)
-        shrink(axes, bottom=_SECOND_LINE)
-    add_legend(left, across=True)
-    box = right.get_position()
-    right.set_position((box.x0, box.y0, box.width, left.get_position().height))
+        if np.max(np.abs(axes.dataLim.intervaly)) > _BEYOND * half > 0.0:
+            axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(half)), linscale=0.7)
+            axes.yaxis.set_major_formatter("{x:g}")
+        set_point_ticks(axes, points)
+    add_legend(grid[0][0], across=True)
     return figure

@@ -15,13 +15,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from PIL import Image
 
 from tpjb_ident.report.drawing.colours import LIGHT
@@ -38,6 +38,8 @@ _POINTS_PER_INCH = 72.0
 _BELOW_LEGEND = 2.0
 #: Markers are found again by their place in the drawing [points].
 _NEAR = 0.05
+#: More markers on a line are a cloud.
+_MOST_POINTS = 400
 _ID = re.compile(r"(\bid=\"|href=\"#|url\(#)([^\")]+)")
 
 
@@ -78,9 +80,9 @@ _drawn: dict[int, tuple[Panel, ...]] = {}
 _numbers = itertools.count()
 
 
-def panel(name: str, title: str, figure: Figure | Callable[[], Figure], group: str) -> Panel:
-    """Make a panel of a picture."""
-    return Panel(name, title, figure if callable(figure) else lambda: figure, group)
+def panel(name: str, title: str, figure: Figure | Callable[..., Figure], group: str, *arguments: Any) -> Panel:
+    """Make a panel of a picture, or of a function that draws it and its arguments."""
+    return Panel(name, title, functools.partial(figure, *arguments) if callable(figure) else lambda: figure, group)
 
 
 def svg_text(figure: Figure, name: str) -> str:
@@ -89,7 +91,7 @@ def svg_text(figure: Figure, name: str) -> str:
     points = _hover_points(figure)
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return _with_titles(buffer.getvalue(), points)
+    return _USE.sub(functools.partial(_titled, points), buffer.getvalue())
 
 
 def inline_svg(text: str, name: str, title: str) -> str:
@@ -165,59 +167,37 @@ def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
     opaque.save(path, format="PNG", dpi=(_PNG_DPI, _PNG_DPI), compress_level=4)
 
 
-@dataclass(frozen=True)
-class _HoverPoints:
-    """Markers of one line: where they are drawn and what they say."""
-
-    gid: str
-    places: np.ndarray
-    texts: tuple[str, ...]
-
-
-def _hover_points(figure: Figure) -> tuple[_HoverPoints, ...]:
-    """Give every line with markers a name that the SVG keeps, and work out what its points say."""
-    lines = []
-    for i, axes in enumerate(figure.axes):
+def _hover_points(figure: Figure) -> tuple[np.ndarray, list[str]]:
+    """Where every marker is drawn, (n, 2) points of the SVG, and what it says."""
+    places, texts = [np.zeros((0, 2))], []
+    height = figure.get_size_inches()[1] * _POINTS_PER_INCH
+    for axes in figure.axes:
         axes.get_xlim(), axes.get_ylim()  # limits are set late: asking settles them
         axes.apply_aspect()
-        labels, halves = _errorbars(axes)
-        for j, line in enumerate(axes.lines):
-            if line.get_marker() in ("", "None", " ", None) or len(np.asarray(line.get_xdata())) > 400:
+        bars = {bar[0]: bar for bar in axes.containers if isinstance(bar, ErrorbarContainer)}
+        for line in axes.lines:
+            points = np.column_stack([np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)])
+            if line.get_marker() in ("", "None", " ", None) or len(points) > _MOST_POINTS:
                 continue
-            line.set_gid(f"spots-{i}-{j}")
-            label = labels.get(line, str(line.get_label()))
-            lines.append(_points_of_line(figure, axes, line, label, halves.get(line)))
-    return tuple(lines)
+            shown = axes.transData.transform(points) * _POINTS_PER_INCH / figure.dpi
+            places.append(np.column_stack([shown[:, 0], height - shown[:, 1]]))
+            texts += _texts_of_line(axes, points, str(bars.get(line, line).get_label()), bars.get(line))
+    return np.concatenate(places), texts
 
 
-def _errorbars(axes: Axes) -> tuple[dict[Line2D, str], dict[Line2D, np.ndarray]]:
-    """Label and half-widths of the intervals, of the lines that are drawn with error bars."""
-    labels, halves = {}, {}
-    for container in axes.containers:
-        if isinstance(container, ErrorbarContainer) and isinstance(container[0], Line2D):
-            labels[container[0]] = str(container.get_label())
-            bars = container[2]
-            if bars and container.has_yerr and not container.has_xerr:
-                segments = bars[0].get_segments()
-                halves[container[0]] = np.array([0.5 * abs(s[-1][1] - s[0][1]) if len(s) else np.nan for s in segments])
-    return labels, halves
-
-
-def _points_of_line(figure: Figure, axes: Axes, line: Line2D, label: str, half: np.ndarray | None) -> _HoverPoints:
-    x = np.asarray(line.get_xdata(), dtype=float)
-    y = np.asarray(line.get_ydata(), dtype=float)
-    shown = axes.transData.transform(np.column_stack([x, y])) * _POINTS_PER_INCH / figure.dpi
-    height = figure.get_size_inches()[1] * _POINTS_PER_INCH
-    places = np.column_stack([shown[:, 0], height - shown[:, 1]])
+def _texts_of_line(axes: Axes, points: np.ndarray, label: str, bars: ErrorbarContainer | None) -> list[str]:
+    """What the markers of a line say: its label, their values with their intervals, in the units of the axes."""
     name = "" if label.startswith("_") else f"{printable(label)}: "
     xl, yl = printable(axes.get_xlabel()), printable(axes.get_ylabel())
+    halves = np.full(len(points), np.nan)
+    if bars is not None and bars[2] and bars.has_yerr and not bars.has_xerr:
+        for k, ends in enumerate(bars[2][0].get_segments()):
+            halves[k] = 0.5 * abs(ends[-1][1] - ends[0][1]) if len(ends) else np.nan
     texts = []
-    for k in range(len(x)):
-        spread = (
-            f" ± {significant(half[k], '.2g')}" if half is not None and k < len(half) and np.isfinite(half[k]) else ""
-        )
-        texts.append(f"{name}{_with_unit(yl, y[k], spread)} at {_with_unit(xl, x[k])}")
-    return _HoverPoints(str(line.get_gid()), places, tuple(texts))
+    for (x, y), half in zip(points, halves, strict=True):
+        spread = f" ± {significant(half, '.2g')}" if np.isfinite(half) else ""
+        texts.append(f"{name}{_with_unit(yl, y, spread)} at {_with_unit(xl, x)}")
+    return texts
 
 
 def _with_unit(label: str, value: float, spread: str = "") -> str:
@@ -225,17 +205,6 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
     name, _, unit = label.rpartition(", ")
     name, unit = (name, unit) if name else (unit, "")
     return f"{name} {significant(value)}{spread} {unit}".strip()
-
-
-def _with_titles(svg: str, lines: tuple[_HoverPoints, ...]) -> str:
-    """Put a title into every marker of the drawing that `_hover_points` knows."""
-    for points in lines:
-        start = svg.find(f'<g id="{points.gid}"')
-        if start < 0:
-            continue
-        end = _end_of_group(svg, start)
-        svg = svg[:start] + _USE.sub(functools.partial(_titled, points), svg[start:end]) + svg[end:]
-    return svg
 
 
 def _end_of_group(svg: str, start: int) -> int:
@@ -247,13 +216,10 @@ def _end_of_group(svg: str, start: int) -> int:
     return len(svg)
 
 
-def _titled(points: _HoverPoints, match: re.Match[str]) -> str:
-    place = np.array([float(match[1]), float(match[2])])
-    with np.errstate(invalid="ignore"):  # a spot off the axes has no place, and NaN is never near
-        away = np.abs(points.places - place).max(axis=1)
-    if not np.isfinite(away).any():
-        return match[0]
-    best = int(np.nanargmin(away))
-    if away[best] > _NEAR:
-        return match[0]
-    return f"{match[0][:-2]}><title>{html.escape(points.texts[best])}</title></use>"
+def _titled(points: tuple[np.ndarray, list[str]], match: re.Match[str]) -> str:
+    """A mark of the drawing with a title, where it is a marker that says something."""
+    places, texts = points
+    with np.errstate(invalid="ignore"):  # a point off the axes has no place, and NaN is never near
+        near = np.flatnonzero(np.abs(places - [float(match[1]), float(match[2])]).max(axis=1) < _NEAR)
+    words = html.escape("; ".join(dict.fromkeys(texts[i] for i in near)))
+    return f"{match[0][:-2]}><title>{words}</title></use>" if words else match[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -14,7 +13,7 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
-from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label
+from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coherence import coherence
@@ -45,16 +44,10 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
     if bearing is not None:
         diameter, length = (amount(v, "size", ".4g") for v in (bearing.journal_diameter, bearing.length))
         facts["Bearing"] = f"{bearing.name}, {len(bearing.pads)} pads, Ø {diameter} × {length}"
-    if points:
-        loads = _span({p.point.static_load * per("load") for p in points}, symbol("load"))
-        directions = ", ".join(f"{a:g}°" for a in sorted({p.point.static_load_direction_deg for p in points}))
-        facts["Static load"] = f"{loads} at {directions}"
-        facts["Shaft"] = ", ".join(
-            spinning(*s) for s in sorted({(p.point.shaft_speed_hz, p.point.rotation) for p in points})
-        )
-        amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
-        moved = f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)" if amplitude else ""
-        facts["Excitation"] = _span({p.point.excitation_hz for p in points}, "Hz") + moved
+    facts |= set_points([p.point.key for p in points])
+    amplitude = max((p.amplitude for p in points if np.isfinite(p.amplitude)), default=0.0)
+    if amplitude:
+        facts["Excitation"] += f", vibration up to {amount(amplitude, 'length', '.2g')} (0-peak)"
     if isinstance(campaign, TableSource):
         return facts | {"Source": campaign.description}
     counts = Counter(_KINDS_IN_WORDS.get(run.kind, run.kind) for run in campaign.runs)
@@ -64,6 +57,17 @@ def tested_facts(campaign: Campaign | TableSource, bearing: Any, points: Sequenc
         "Runs": f"{len(campaign.runs)} ({kinds})",
         "Measured": measured or "date and by are not in campaign.toml",
     }
+
+
+def set_points(keys: Sequence[tuple[float, float, float, float, str]]) -> dict[str, str]:
+    """Loads, speeds and excitation of operating points, whose keys are given."""
+    if not keys:
+        return {}
+    loads, directions, speeds, excitations, senses = zip(*keys, strict=True)
+    shaft = ", ".join(spinning(*turning) for turning in sorted(set(zip(speeds, senses, strict=True))))
+    at = ", ".join(f"{angle:g}°" for angle in sorted(set(directions)))
+    load = _span({value * per("load") for value in loads}, symbol("load"))
+    return {"Static load": f"{load} at {at}", "Shaft": shaft, "Excitation": _span(set(excitations), "Hz")}
 
 
 def _span(values: set[float], unit: str) -> str:
@@ -90,29 +94,21 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
 def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first."""
     counts = Counter((str(c), c.severity) for _, conditions in named for c in conditions)
-    order = ("error", "warning", "note")
-    texts = [
-        f"{name} ({n})" if n > 1 else name
-        for (name, _), n in sorted(counts.items(), key=lambda c: order.index(c[0][1]))
-    ]
+    texts = []
+    for grave in ("error", "warning", "note"):
+        texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
-    return f"{head}: {', '.join(texts)}." if texts else "No flags: nothing about the records calls for caution."
+    return f"{head}: {', '.join(texts)}." if texts else f"No flags on {counted(points, 'point')}."
 
 
 def set_up_section(comparison: Comparison) -> Section:
     """Sensors with their calibration, bearing and oil, and what was run."""
     campaign = comparison.campaign
-    if isinstance(campaign, TableSource):
-        return Section("Set-up", tables=_bearing_tables(comparison.bearing))
-    return Section(
-        "Set-up",
-        tables=[
-            _sensor_table(tuple(campaign.channels.values())),
-            *_bearing_tables(comparison.bearing),
-            _run_matrix(campaign.runs),
-        ],
-    )
+    tables = _bearing_tables(comparison.bearing)
+    if not isinstance(campaign, TableSource):
+        tables = [_sensor_table(tuple(campaign.channels.values())), *tables, _run_matrix(campaign.runs)]
+    return Section("Set-up", tables=tables)
 
 
 def _sensor_table(channels: Sequence[Channel]) -> Table:
@@ -135,7 +131,7 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
             ]
         )
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
-    return Table("Sensors", columns, rows, frozenset({0, 1, 2, 3}))
+    return Table("Sensors", columns, rows)
 
 
 def _by_pad(values: Iterable[str]) -> str:
@@ -165,7 +161,7 @@ def _bearing_tables(bearing: Any) -> list[Table]:
         [f"oil, at {degrees(40.0)}",
          f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
     ]  # fmt: skip
-    return [Table("Bearing and oil", ["", "as stated"], rows, frozenset({0, 1}))]
+    return [Table("Bearing and oil", ["", "as stated"], rows)]
 
 
 def _run_matrix(runs: Sequence[Run]) -> Table:
@@ -190,10 +186,10 @@ def _run_matrix(runs: Sequence[Run]) -> Table:
         "rate, Hz",
         "runs",
     ]
-    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()], frozenset({0}))
+    return Table("Runs", columns, [[*key, str(n)] for key, n in counted.items()])
 
 
-def evidence_section(campaign: Campaign, result: Identification) -> Section | None:
+def evidence_sections(campaign: Campaign, result: Identification) -> list[Section]:
     """Orbit, spectra, coherence of one run in the middle of the campaign; h over frequency.
 
     Coherence of every point.
@@ -201,8 +197,8 @@ def evidence_section(campaign: Campaign, result: Identification) -> Section | No
     panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
     if result.points:
         title = "Force that the displacements do not explain"
-        panels.append(panel("coherence-points", title, functools.partial(coherence, result), _EVIDENCE))
-    return Section(_EVIDENCE, panels=panels) if panels else None
+        panels.append(panel("coherence-points", title, coherence, _EVIDENCE, result))
+    return [Section(_EVIDENCE, panels=panels)] if panels else []
 
 
 def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
@@ -216,9 +212,9 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
                       orbit(run), _EVIDENCE),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
                       coherence_spectrum(run), _EVIDENCE),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -233,12 +229,12 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         title = (
             f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
         )
-        panels.append(panel("h-over-frequency", title, functools.partial(frf, result), _EVIDENCE))
+        panels.append(panel("h-over-frequency", title, frf, _EVIDENCE, result))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
                  f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
-        panels.append(panel(f"h-over-band-{number}", title, functools.partial(frf, band), _EVIDENCE))
+        panels.append(panel(f"h-over-band-{number}", title, frf, _EVIDENCE, band))
     return panels
 
 
@@ -246,7 +242,7 @@ def budget_table(result: Identification) -> Table:
     """What the 95 % intervals of all coefficients are made of, source by source, as in ``budget.csv``."""
     sources = list(dict.fromkeys(name for p in result.points for name in p.budget))
     rows = []
-    for p in result.points:
+    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
         deviations = {name: np.sqrt(np.maximum(np.diag(part), 0.0)) for name, part in p.budget.items()}
         for i, (value, half) in enumerate(zip(p.stiffness.cells(), p.stiffness.half_width(), strict=True)):
             kind, factor = (STIFFNESS, 1.0) if i < 4 else (DAMPING, p.stiffness.omega)
@@ -254,6 +250,6 @@ def budget_table(result: Identification) -> Table:
             digits = 2 - math.floor(math.log10(half / scale)) if 0.0 < half < math.inf else 3
             parts = [fixed(float(deviations[n][i]) / scale, digits) if n in deviations else "–" for n in sources]
             name = f"{kind.symbol}{ENTRIES[i % 4]}, {kind.display_unit}"
-            rows.append([point_label(p), name, value, *parts])
+            rows.append([place, name, value, *parts])
     caption = "Uncertainty budget: value ± half of its 95 % interval, then the standard uncertainty by source"
-    return Table(caption, ["point", "", "value", *sources], rows, frozenset({0, 1}))
+    return Table(caption, ["point", "", "value", *sources], rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import datetime
 import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,9 @@ from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.tables import printable, readable, write_text
 
+#: A number with what may stand beside it, such as its interval or unit.
+_NUMBER = re.compile(r"–|[-−+#(]*\d(?!.*[A-Za-z]{3}).*")
+
 
 @dataclass(frozen=True)
 class Table:
@@ -25,7 +29,17 @@ class Table:
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
-    text_columns: frozenset[int] = frozenset({0})
+
+    @property
+    def text_columns(self) -> set[int]:
+        """Columns of words, which stand left: the first, and those of which most cells are no numbers."""
+        words = {0}
+        for index in range(len(self.columns)):
+            cells = [row[index] for row in self.rows if row[index]]
+            numbers = sum(bool(_NUMBER.fullmatch(cell)) for cell in cells)
+            if 2 * numbers < len(cells):
+                words.add(index)
+        return words
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,13 +36,10 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
-OVER: tuple[Literal["load", "frequency"], ...] = ("load", "frequency")
-
-
 def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
     """Draw every series of at least two points."""
     panels = []
-    for over in OVER:
+    for over in ("load", "frequency"):
         series = longest_series(table, over)
         if series is None:
             continue
@@ -63,9 +60,9 @@ def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -
     across = "Load and displacement vectors, and what of them lies on each pad's direction"
     group = "Pivots, from the dry tests"
     return [
-        panel("pivot-stiffness", bands, functools.partial(pivot_stiffness, curves, formula), group),
-        panel("pivot-steps", steps, functools.partial(load_deflection, curves), group),
-        panel("pivot-projection", across, functools.partial(pad_projection, curves), group),
+        panel("pivot-stiffness", bands, pivot_stiffness, group, curves, formula),
+        panel("pivot-steps", steps, load_deflection, group, curves),
+        panel("pivot-projection", across, pad_projection, group, curves),
     ]
 
 
@@ -128,7 +125,7 @@ def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look])
             spectrum_axes.semilogy(
                 look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7
             )
-        name = f"{channel.name}, {channel.unit}" if channel.unit else channel.name
+        name = ", ".join(filter(None, (channel.name, channel.unit)))
         time_axes.set_ylabel(printable(name), fontsize=FONT_SIZE - 1, color=INK)
         for axes, label in ((time_axes, "time, s"), (spectrum_axes, "frequency, Hz")):
             axes.tick_params(labelsize=FONT_SIZE - 2, colors=INK)

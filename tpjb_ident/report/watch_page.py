@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot
 
-#: Words of the page for the states of a run.
-_WORDS = {"to run": "to run", "being written": "being written", "good": "good", "look": "good, with a remark",
-         "repeat": "repeat", "replaced": "replaced by a repeat"}  # fmt: skip
+#: Words of the page for the states of a run, where they are not the state's name.
+_WORDS = {"look": "good, with a remark", "replaced": "replaced by a repeat"}
 _KINDS = {"dynamic": "dynamic runs", "locus": "locus runs", "clearance": "clearance sweeps", "dry_pivot": "dry tests",
          "baseline": "baseline runs"}  # fmt: skip
 
@@ -109,7 +108,7 @@ def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
     waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
     if waiting:
         rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
-        table = Table("Runs to come", ["run", "kind", "set points", "file"], rows, frozenset(range(4)))
+        table = Table("Runs to come", ["run", "kind", "set points", "file"], rows)
         sections.append(Section("Still to run", tables=[table]))
     return sections
 
@@ -125,13 +124,9 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     if identification is None:
         return []
     good = [p for p in identification.points if np.isfinite(p.stiffness.h).all() and not untrusted(p.quality)]
-    series: tuple[tuple[Literal["load", "frequency"], set[float]], ...] = (
-        ("load", {p.point.static_load for p in good}),
-        ("frequency", {p.point.excitation for p in good}),
-    )
     panels = []
-    for over, values in series:
-        if len(values) > 1:
+    for over, set_point in (("load", "static_load"), ("frequency", "excitation")):
+        if len({getattr(p.point, set_point) for p in good}) > 1:
             figure = direct_coefficients({identification.campaign: identification}, part="k", over=over)
             panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure, "K"))
     return panels
@@ -148,7 +143,7 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
         rows.append([*place, *cells, flags])
     direct = [f"{name}, {symbol('stiffness' if name[0] == 'k' else 'damping')}" for name in DIRECT]
     columns = [f"load, {symbol('load')}", "excitation, Hz", "records", *direct, "flags"]
-    return Table("Direct coefficients so far, 95 % intervals", columns, rows, frozenset({7}))
+    return Table("Direct coefficients so far, 95 % intervals", columns, rows)
 
 
 def _records_table(snapshot: Snapshot) -> Table:
@@ -159,5 +154,5 @@ def _records_table(snapshot: Snapshot) -> Table:
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]
         remarks += [f"not in the manifest; {why[s.run.id]}"] if s.run.id in why else []
-        rows.append([s.landed[11:19], s.run.id, described(s.run), _WORDS[s.state], "; ".join(remarks)])
-    return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows, frozenset(range(5)))
+        rows.append([s.landed[11:19], s.run.id, described(s.run), _WORDS.get(s.state, s.state), "; ".join(remarks)])
+    return Table("Newest first", ["time", "run", "set points", "verdict", "why"], rows)

@@ -39,6 +39,8 @@ _WORDS: dict[str, dict[str, object]] = {
 #: Ends of columns in US units, ours and as people write them: the same in SI, and the size of the unit in it.
 _US = {f"_{us}": (f"_{si}", size) for si, (us, size, zero) in UNITS.items() if not zero}
 _US |= {"_lbf_s_per_in": _US["_lbfs_per_in"], "_rpm": ("_Hz", 1.0 / 60.0)}
+#: Columns of our exported tables that have another name and unit in results.
+_EXPORTED = {"frequency_rad_per_s": ("excitation_Hz", 0.5 / math.pi)}
 _US_NAME = re.compile(rf"(\w+?)({'|'.join(_US)})(_lo|_hi|_se|)")
 #: Name, column of the schema, ending, and the size of its unit.
 _Header = list[tuple[str, Column | None, str, float]]
@@ -122,10 +124,10 @@ def _header(
 
 
 def _in_si(name: str) -> tuple[str, float]:
-    """Name of a column in SI, and the size of its unit there; US units are known by their ends."""
+    """Name of a column in results, and the size of its unit there; US units are known by their ends."""
     match = _US_NAME.fullmatch(name)
     if match is None:
-        return name, 1.0
+        return _EXPORTED.get(name, (name, 1.0))
     unit, size = _US[match[2]]
     return match[1] + unit + match[3], size
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.blocks import Blocks, Rig, totals
+from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
 from tpjb_ident.estimate.term import Additive, Fitted, Parameter
 
 #: Name of the condition where the runs tell G.
@@ -34,15 +34,15 @@ class Amplitude(Additive):
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
-        square = np.sum(np.abs(blocks.z[:, rig.of("displacement")]) ** 2, axis=1)
-        points = range(len(blocks.points))
-        self._mean = np.array(
-            [np.mean(square[blocks.point == p]) if np.any(blocks.point == p) else 1.0 for p in points]
-        )
-        self._several = np.array([_several(blocks.z[blocks.point == p][:, rig.of("displacement")]) for p in points])
-        self._points = [p for p in points if blocks.bent[p] > 0]
+        motion = blocks.z[:, rig.of("displacement")]
+        number = len(blocks.points)
+        runs = np.maximum(totals(blocks.point, np.ones(len(blocks)), number), 1.0)
+        self._mean = totals(blocks.point, np.sum(np.abs(motion) ** 2, axis=1), number) / runs
+        self.points = tuple(np.flatnonzero(blocks.bent > 0).tolist())
+        self._several = np.zeros(number, dtype=bool)
+        self._several[list(self.points)] = [_several(motion[blocks.point == p]) for p in self.points]
         parameters = []
-        for p in self._points:
+        for p in self.points:
             place = f"{blocks.points[p].static_load:g} N, {blocks.points[p].excitation_hz:g} Hz"
             deviation = _AS_DEVIATION * float(blocks.bent[p])
             parameters += [Parameter(f"{place}, {i}", "1", deviation) for i in range(_NUMBERS)]
@@ -50,9 +50,9 @@ class Amplitude(Additive):
 
     def point_conditions(self, point: int, fitted: Fitted, h: ComplexArray) -> tuple[Condition, ...]:
         """What to say where the runs of a point tell G; `h` (2, 2) [N/m]."""
-        if point not in self._points:
+        if point not in self.points:
             return ()
-        first = _NUMBERS * self._points.index(point)
+        first = _NUMBERS * self.points.index(point)
         part = slice(first, first + _NUMBERS)
         if not fitted.estimated[part].any():
             return ()
@@ -63,36 +63,20 @@ class Amplitude(Additive):
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """a^2 G d in the cells."""
-        columns = self.no_columns(blocks)
         d = state.u[:, :2]
-        square = self._square(blocks, d)
-        for i, p in enumerate(self._points):
-            mine = np.flatnonzero(blocks.point == p)
-            if not len(mine):
-                continue
-            entries = np.concatenate([np.abs(state.h[p].real).ravel(), 1j * np.abs(state.h[p].imag).ravel()])
-            force = np.zeros((len(blocks), 2, _NUMBERS), complex)
-            for k in range(_NUMBERS):
-                force[mine, k % 4 // 2, k] = entries[k] * square[mine] * d[mine, k % 2]
-            columns[:, :, _NUMBERS * i : _NUMBERS * (i + 1)] = film_force_rows(self.rig, blocks, state, force)
-        return columns
+        size = self._square(blocks, d)[:, None] * entry_sizes(state.h[blocks.point])
+        return film_force_rows(self.rig, blocks, state, entry_forces(size, d))
 
     def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
         """a^2 G of every run."""
-        change = np.zeros((len(blocks), 2, 2), complex)
-        square = self._square(blocks, state.u[:, :2])
-        for i, p in enumerate(self._points):
-            mine = blocks.point == p
-            numbers = value[_NUMBERS * i : _NUMBERS * (i + 1)]
-            stiffness = (numbers[:4] * np.abs(state.h[p].real).ravel()).reshape(2, 2)
-            damping = (numbers[4:] * np.abs(state.h[p].imag).ravel()).reshape(2, 2)
-            change[mine] = square[mine, None, None] * (stiffness + 1j * damping)
-        return change
+        size = self._square(blocks, state.u[:, :2])[:, None] * entry_sizes(state.h[blocks.point])
+        change = (self.of_blocks(blocks, value) * size).reshape(-1, 2, 2, 2)
+        return np.asarray(change.sum(axis=1))
 
     def _square(self, blocks: Blocks, d: ComplexArray) -> FloatArray:
-        """a^2 of every run (n,); one where a point has one amplitude."""
+        """a^2 of every run (n,); one where a point has one amplitude, nothing where its film shows no harmonics."""
         square = np.sum(np.abs(d) ** 2, axis=1) / self._mean[blocks.point]
-        return np.where(self._several[blocks.point], square, 1.0)
+        return np.where(blocks.bent[blocks.point] > 0, np.where(self._several[blocks.point], square, 1.0), 0.0)
 
 
 def _several(z: ComplexArray) -> bool:

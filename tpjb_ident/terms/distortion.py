@@ -15,7 +15,8 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
+from tpjb_ident.estimate.noise import scatter_patterns
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Change of H over the squared motion of a band, and over a blow's peak in one sense, and in both its square.
@@ -44,14 +45,23 @@ def line_scatter(rms: float) -> float:
 
 
 class Distortion(Additive):
-    """Real and imaginary parts of H of every band, each changed by its own share; no run tells them."""
+    """Real and imaginary parts of H of every band, each changed by its own share, which no run tells; lines scatter.
+
+    `share`, `scatter` by band, `band` (P,) of every point.
+    """
 
     name = "distortion"
 
     def __init__(
-        self, rig: Rig, blocks: Blocks, share: Sequence[float] | FloatArray = (), band: IntArray | None = None
+        self,
+        rig: Rig,
+        blocks: Blocks,
+        share: Sequence[float] | FloatArray = (),
+        band: IntArray | None = None,
+        scatter: FloatArray | None = None,
     ) -> None:
         super().__init__(rig, blocks)
+        self._scatter = scatter
         self._band = np.zeros(len(blocks.points), dtype=np.intp) if band is None else band
         self._bent = [b for b, size in enumerate(share) if size > 0]
         parameters = []
@@ -63,14 +73,16 @@ class Distortion(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """G d in the cells, G a share of every entry of H."""
         columns = self.no_columns(blocks)
-        h, d = state.h[blocks.point], state.u[:, :2]
-        force = np.zeros((len(blocks), 2, _NUMBERS), complex)
-        for k in range(_NUMBERS):
-            i, j = k % 4 // 2, k % 2
-            entry = np.abs(h.real[:, i, j]) if k < 4 else 1j * np.abs(h.imag[:, i, j])
-            force[:, i, k] = entry * d[:, j]
+        force = entry_forces(entry_sizes(state.h[blocks.point]), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
         for n, b in enumerate(self._bent):
             mine = self._band[blocks.point] == b
             columns[mine, :, _NUMBERS * n : _NUMBERS * (n + 1)] = rows[mine]
         return columns
+
+    def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
+        """The film's force at every line of one phase set, along X and Y: cells and housing answer to it alike."""
+        if self._scatter is None or not self._scatter.any():
+            return None
+        size = self._scatter[self._band[blocks.point]] / np.sqrt(2)
+        return film_force_rows(self.rig, blocks, state, np.stack(scatter_patterns(blocks, state, size), axis=2))

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_forces, film_force_rows
 from tpjb_ident.estimate.term import Additive, Parameter
 
 #: Plausible of a bearing: relative slope [1/rad], and its change per unit of ln W, one standard deviation.
@@ -48,14 +48,9 @@ class LoadTurn(Additive):
 
     def per_radian(self, blocks: Blocks, state: State) -> ComplexArray:
         """Readings of a load turned by one radian, (n, m + 2, q)."""
-        h, d = state.h[blocks.point], state.u[:, :2]
-        direct = np.stack([np.abs(h.real[:, [0, 1], [0, 1]]).mean(1), np.abs(h.imag[:, [0, 1], [0, 1]]).mean(1)])
-        force = np.zeros((len(blocks), 2, _NUMBERS), complex)
-        log_load = self._log_load[blocks.point] - self._middle[self._family[blocks.point]]
-        for i in range(_SLOPES):
-            size = direct[0] if i < 4 else 1j * direct[1]
-            force[:, i % 4 // 2, i] = size * d[:, i % 2]
-            force[:, i % 4 // 2, i + _SLOPES] = log_load * force[:, i % 4 // 2, i]
+        direct, log_load = self._direct(blocks, state), self._aside(blocks)[:, None]
+        size = np.repeat(direct * [1.0, 1j], 4, axis=1)
+        force = entry_forces(np.concatenate([size, log_load * size], axis=1), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
         columns = np.zeros((*rows.shape[:2], _NUMBERS * len(self.families)), complex)
         for k in range(len(self.families)):
@@ -69,15 +64,19 @@ class LoadTurn(Additive):
 
     def film_change(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
         """DH / d alpha times the run's own miss."""
-        h = state.h[blocks.point]
-        k = np.abs(h.real[:, [0, 1], [0, 1]]).mean(axis=1)
-        c = np.abs(h.imag[:, [0, 1], [0, 1]]).mean(axis=1)
         numbers = value.reshape(len(self.families), 4, 2, 2)[self._family[blocks.point]]
-        log_load = (self._log_load[blocks.point] - self._middle[self._family[blocks.point]])[:, None, None]
-        stiffness = numbers[:, 0] + log_load * numbers[:, 2]
-        damping = numbers[:, 1] + log_load * numbers[:, 3]
-        slope = k[:, None, None] * stiffness + 1j * c[:, None, None] * damping
-        return np.asarray(blocks.miss.imag[:, None, None] * slope)
+        change = numbers[:, :2] + self._aside(blocks)[:, None, None, None] * numbers[:, 2:]
+        stiffness, damping = np.moveaxis(self._direct(blocks, state)[:, :, None, None] * change, 1, 0)
+        return np.asarray(blocks.miss.imag[:, None, None] * (stiffness + 1j * damping))
+
+    def _direct(self, blocks: Blocks, state: State) -> FloatArray:
+        """Mean direct coefficients k and omega c of every block's point, (n, 2)."""
+        diagonal = state.h[blocks.point][:, [0, 1], [0, 1]]
+        return np.stack([np.abs(diagonal.real).mean(axis=1), np.abs(diagonal.imag).mean(axis=1)], axis=1)
+
+    def _aside(self, blocks: Blocks) -> FloatArray:
+        """Ln W of every block beside the middle of its family, (n,)."""
+        return (self._log_load - self._middle[self._family])[blocks.point]
 
     def turned(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
         """Readings of a load turned by one radian with the numbers (q,) found, (n, m + 2)."""

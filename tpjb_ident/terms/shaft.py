@@ -32,11 +32,11 @@ class Shaft(Additive):
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
         on_line = np.isfinite(blocks.shaft)
-        self._points = list(np.unique(blocks.point[on_line]))
-        self._size = np.ones((len(self._points), len(rig)))
+        self.points = tuple(np.unique(blocks.point[on_line]).tolist())
+        self._size = np.zeros((len(blocks.points), len(rig)))
         parameters = []
-        for i, point in enumerate(self._points):
-            self._size[i] = np.median(np.abs(blocks.z[blocks.point == point]), axis=0) + 1e-300
+        for point in self.points:
+            self._size[point] = np.median(np.abs(blocks.z[blocks.point == point]), axis=0) + 1e-300
             for sensor in rig.sensors:
                 names = f"{sensor.name} at {blocks.points[point].excitation_hz:g} Hz"
                 parameters += [Parameter(f"{names}, {part}", "1", _WIDE) for part in ("re", "im")]
@@ -45,14 +45,9 @@ class Shaft(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """The shaft's unit phasor, in the sensor's own row."""
         columns = self.no_columns(blocks)
-        m = len(self.rig)
-        phasor = np.nan_to_num(blocks.shaft)
-        for i, point in enumerate(self._points):
-            mine = blocks.point == point
-            for j in range(m):
-                k = 2 * (i * m + j)
-                columns[mine, j, k] = phasor[mine] * self._size[i, j] * blocks.present[mine, j]
-                columns[mine, j, k + 1] = 1j * columns[mine, j, k]
+        own = np.arange(len(self.rig))
+        vector = np.nan_to_num(blocks.shaft)[:, None] * self._size[blocks.point] * blocks.present
+        columns[:, own, 2 * own], columns[:, own, 2 * own + 1] = vector, 1j * vector
         return columns
 
 

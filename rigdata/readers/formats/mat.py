@@ -35,7 +35,7 @@ _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16,
 _DEEPEST_ELEMENT = 32
 
 
-def read_series(path: Path) -> list[Series]:
+def read_mat(path: Path) -> list[Series]:
     """Read every numeric vector.
 
     A variable or structure field with at least eight numbers is a channel. The columns of a matrix are channels,

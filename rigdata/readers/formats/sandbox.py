@@ -29,13 +29,13 @@ MEMORY, MULTIPLES = 2**30, 64
 _AGAIN = "Export or copy it again from the logger"
 
 
-def read_sandboxed(module: str, path: Path) -> list[Series]:
-    """Let ``rigdata.readers.formats.<module>.read_in_sandbox(path)`` read a file in a child process."""
+def read_sandboxed(function: str, path: Path) -> list[Series]:
+    """Let ``rigdata.readers.formats.loggers.<function>(path)`` read a file in a child process."""
     seconds = SECONDS + path.stat().st_size / BYTES_PER_SECOND
     # The child must find the same rigdata as this process, wherever that came from.
     home = str(Path(__file__).parents[3])
     search_path = os.pathsep.join([home, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
-    command = [sys.executable, "-m", "rigdata.readers.formats.sandbox", module, str(path), str(math.ceil(seconds))]
+    command = [sys.executable, "-m", "rigdata.readers.formats.sandbox", function, str(path), str(math.ceil(seconds))]
     too_long = refuse("", "", f"took longer than {seconds:.0f} s to read, far beyond its size", _AGAIN)
     try:
         # asammdf repairs a copy of a measurement that was cut short, and a child that dies cannot clear it away.
@@ -83,12 +83,12 @@ def _limit_memory(path: Path) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def main(module: str, path: Path, answer: Path) -> None:
+def main(function: str, path: Path, answer: Path) -> None:
     """Read a file and write its channels to `answer` (.npz): texts, and the numbers of each; or what is wrong."""
-    reader = importlib.import_module(f"rigdata.readers.formats.{module}")
+    read = getattr(importlib.import_module("rigdata.readers.formats.loggers"), function)
     _limit_memory(path)
     try:
-        series = reader.read_in_sandbox(path)
+        series = read(path)
     except MemoryError:
         np.savez(answer, error="claims more data than its size can hold")
     except Exception as problem:  # whatever another library raises on a broken file: it is the file's fault here

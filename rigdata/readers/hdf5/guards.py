@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from rigdata.problem import RigDataError, refuse
-from rigdata.readers.base import SAMPLE
+from rigdata.readers.base import SAMPLE, refuse_claim
 
 #: With the version; three reserved bytes follow, which the library does not look at.
 _SIGNATURE, _RESERVED = b"GCOL\x01", b"\0\0\0"
@@ -149,8 +149,8 @@ def _chunk_bytes(dataset: Any) -> int:
     return 0 if dataset.chunks is None else math.prod(dataset.chunks) * int(dataset.dtype.itemsize)
 
 
-def claimed_by_runs(handle: Any, runs: Sequence[str], names: Sequence[str]) -> int:
-    """Bytes that the described channels of all runs claim together; what cannot be opened is refused by its reader."""
+def refuse_claims(handle: Any, path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse a file whose runs claim more samples than it can hold; what cannot be opened is refused by its reader."""
     import h5py
 
     claimed = 0
@@ -160,14 +160,18 @@ def claimed_by_runs(handle: Any, runs: Sequence[str], names: Sequence[str]) -> i
             for name in names if isinstance(group, h5py.Group) else ():
                 with contextlib.suppress(*_BROKEN):
                     claimed += claimed_bytes(resolve(group, name, ""))
-    return claimed
+    refuse_claim(claimed, path.stat().st_size, path.name)
 
 
 def foreign_filters(dataset: Any) -> list[int]:
     """Filters of a dataset that the HDF5 library does not bring along: they would load foreign code."""
+    return [code for code, *_ in filters(dataset) if code not in _FILTERS]
+
+
+def filters(dataset: Any) -> list[Any]:
+    """Code, flags and values of every filter of a dataset."""
     creation = dataset.id.get_create_plist()
-    codes = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
-    return [code for code in codes if code not in _FILTERS]
+    return [creation.get_filter(i)[:3] for i in range(creation.get_nfilters())]
 
 
 def chunk_bytes(group: Any, name: str) -> int:

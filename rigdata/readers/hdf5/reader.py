@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.device import Grid, Timing, planned
+from rigdata.device import Grid, planned
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import (
     MAX_REQUEST,
@@ -21,14 +21,13 @@ from rigdata.readers.base import (
     MOST_RATE,
     RunReader,
     rate_of_time,
-    refuse_claim,
 )
 from rigdata.readers.hdf5.guards import (
     TEXT,
     UNIT,
     broken_heap,
     chunk_bytes,
-    claimed_by_runs,
+    filters,
     foreign_filters,
     is_plain,
     is_text,
@@ -45,8 +44,8 @@ _MOST_NUMBER = 64
 _MAX_MEMBERS, _LISTED = 4096, 20
 #: Attribute of a run's group.
 _RATE = "sample_rate_hz"
-#: Keys of an open group and of its facts among the opened members; no dataset can have these names.
-_GROUP, _FACTS = "/", ""
+#: Key of an open group among the opened members; no dataset can have this name.
+_GROUP = "/"
 #: Samples of a time dataset that tell its rate.
 _LOOK = 100_000
 #: Bytes of unpacked chunks that the library keeps per dataset.
@@ -191,9 +190,6 @@ class Hdf5Reader(RunReader):
 
     def _facts(self) -> _Facts:
         """The facts; they are looked for once where the file is kept open."""
-        if _FACTS in self.opened_members:
-            facts: _Facts = self.opened_members[_FACTS]
-            return facts
         try:
             state = self.path.stat()
         except OSError as error:
@@ -206,10 +202,7 @@ class Hdf5Reader(RunReader):
                 facts = _Facts(members, *self._planned(group, rate))
             self.cached_facts.clear()
             self.cached_facts[signature] = facts
-        facts = self.cached_facts[signature]
-        if _GROUP in self.opened_members:
-            self.opened_members[_FACTS] = facts
-        return facts
+        return self.cached_facts[signature]
 
     def _lengths(self, group: Any) -> dict[str, int]:
         """Samples of every dataset that can be used."""
@@ -239,16 +232,16 @@ class Hdf5Reader(RunReader):
             rates[clock] = rate if rate > 0 else run_rate or rate
             if attribute is not None and not self.channels[clock].clock:
                 rates[clock] = attribute
-        timings = {name: Timing(length) for name, length in lengths.items() if name not in rates}
+        timings = {name: Grid(length) for name, length in lengths.items() if name not in rates}
         for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
             same = [names[c] for c in clocks if lengths[names[c]] == lengths[name]]
             if i is None or name in rates:
                 continue
             if same:
                 clock = names[i] if names[i] in same else same[0]
-                timings[name] = Timing(lengths[name], clock, rates[clock], clock)
+                timings[name] = Grid(lengths[name], clock, rates[clock], clock)
             else:
-                timings[name] = Timing(lengths[name], times=lengths[names[i]])
+                timings[name] = Grid(lengths[name], times=lengths[names[i]])
         grids, texts = planned(
             timings, self.channels, run_rate, lambda clock: float(self._seconds(group, clock, 0, 1)[0])
         )
@@ -337,14 +330,9 @@ def _text(value: Any) -> str:
     return plain if isinstance(plain, str) else ""
 
 
-def _filters(dataset: Any) -> list[Any]:
-    creation = dataset.id.get_create_plist()
-    return [creation.get_filter(i)[:3] for i in range(creation.get_nfilters())]
-
-
 def _hash_dataset(digest: Any, file: BinaryIO, name: str, dataset: Any) -> None:
     """Feed how a dataset is stored, and every stored byte, in the order of the file's own index."""
-    layout = (name, dataset.dtype.str, dataset.shape, dataset.chunks, _filters(dataset))
+    layout = (name, dataset.dtype.str, dataset.shape, dataset.chunks, filters(dataset))
     digest.update(repr(layout).encode())
     pieces: list[tuple[int, int]] = []
     if dataset.chunks is not None:
@@ -378,12 +366,6 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
         manifest = _text_attribute(handle, "manifest", file)
         bearing = _text_attribute(handle, "bearing", file) if "bearing" in handle.attrs else ""
     return manifest, bearing
-
-
-def refuse_claims(path: Path, runs: Sequence[str], names: Sequence[str]) -> None:
-    """Refuse a file whose runs claim more samples than it can hold."""
-    with open_readonly(path, path.name) as handle:
-        refuse_claim(claimed_by_runs(handle, runs, names), path.stat().st_size, path.name)
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:

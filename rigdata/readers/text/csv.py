@@ -55,14 +55,15 @@ def read_text(record: RecordFile) -> Contents:
     length = _length_without_empty_tail(columns, clocks)
     if len(clocks) == 1:
         _check_times(source, clocks[0], columns[clocks[0]][:length])
-    series = [Series(names[i], head.units[i], columns[i][:length], None, f"column {i + 1}") for i in places]
+    units = ["s" if i in head.stamps else unit for i, unit in enumerate(head.units)]
+    series = [Series(names[i], units[i], columns[i][:length], None, f"column {i + 1}") for i in places]
     if not record.channels:
         series = [column for column in series if column.name and np.isfinite(column.values).any()]
         if all(is_time(column.name) for column in series):
             raise record.refuse("", "holds no column of numbers", "Export the run again")
     described = {*record.channels, *(names[i] for i in clocks)}
     unread = tuple(name for name in names if name and name not in described) if record.channels else ()
-    return Contents(series, names[clocks[0]] if clocks else "", unread, problems)
+    return Contents(series, unread=unread, problems=problems)
 
 
 def _clocks(source: Source) -> list[int]:

@@ -64,7 +64,7 @@ class _Segment:
         return Series(name, self.entry("Y_Unit_Label", number), values[:length], time, began)
 
 
-def read_series(path: Path) -> list[Series]:
+def read_lvm(path: Path) -> list[Series]:
     """Read every channel over time; segments of the same channels follow each other."""
     parts: dict[str, list[Series]] = {}
     for segment in _LvmFile(path).segments():

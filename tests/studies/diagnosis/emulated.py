@@ -15,7 +15,7 @@ import functools
 import itertools
 import math
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -42,12 +42,12 @@ from tpjb_ident.diagnosis.observations.observe import Layout
 #: Coordinates: name, where its spline is solved, and the step of its bilinear terms.
 _BOTH = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
 _UP = (0.1, 0.25, 0.5, 0.75, 1.0)
-AXES: dict[str, tuple[tuple[float, ...], float, float]] = {
+_WHOLE: dict[str, tuple[tuple[float, ...], float, float]] = {
     "viscosity": (_BOTH, 0.5, 0.15),
     "exponent": (_BOTH, 0.4, 0.1),
     "heat": (_BOTH, 0.7, 0.15),
     "supply": (_BOTH, 12.0, 3.0),
-    "bore": (_BOTH, 40e-6, 10e-6),
+    "arc": (_BOTH, 0.12, 0.03),
     "damping": (_UP, 2e6, 4e5),
     "rotation": (_UP, 5e4, 5e3),
     "rolling": (_UP, 5.0, 1.0),
@@ -55,18 +55,30 @@ AXES: dict[str, tuple[tuple[float, ...], float, float]] = {
     "lean y": (_BOTH, 1.1e-3, 4e-4),
     "starvation": (_UP, 0.5, 0.15),
     "carryover": (_UP, 0.98, 0.4),
-    **{f"offset {k}": (_BOTH, 30e-6, 6e-6) for k in range(5)},
-    **{f"pivot {k}": (_BOTH, 1.6, 0.4) for k in range(5)},
 }
-NAMES = tuple(AXES)
-#: What all pads do together: which coordinates, and where it is solved.
-TOGETHER = {"offset": (_BOTH, 30e-6), "pivot": (_BOTH, 1.6)}
+#: The same, of every pad; and what all pads do together, beyond that.
+_OF_A_PAD: dict[str, tuple[tuple[float, ...], float, float]] = {
+    "offset": (_BOTH, 30e-6, 6e-6),
+    "pivot": (_BOTH, 1.6, 0.4),
+    "bore": (_BOTH, 40e-6, 10e-6),
+}
 #: Beyond this multiple of its range a number has no equilibrium, as in the model something would give out.
 REACH = 1.5
 
 
+def axes(setup: Setup) -> dict[str, tuple[tuple[float, ...], float, float]]:
+    """Coordinates of a bearing with as many pads as it has; lengths are of a journal of 100 mm."""
+    size = setup.bearing.journal_diameter / 0.1
+    pads = {f"{name} {k}": row for name, row in _OF_A_PAD.items() for k in range(len(setup.bearing.pads))}
+    scale = {"offset": size, "bore": size}
+    return {
+        name: (shares, reach * scale.get(name.split()[0], 1.0), step * scale.get(name.split()[0], 1.0))
+        for name, (shares, reach, step) in {**_WHOLE, **pads}.items()
+    }
+
+
 def coordinates(setup: Setup, base: Setup) -> FloatArray:
-    """The numbers of a `Setup`, counted from its baseline, in the order of `NAMES`."""
+    """The numbers of a `Setup`, counted from its baseline, in the order of `axes`."""
     oil, first = setup.bearing.oil, base.bearing.oil
     pads = list(zip(setup.bearing.pads, base.bearing.pads, strict=True))
     offsets = np.array([a.assembled_clearance - b.assembled_clearance for a, b in pads])
@@ -76,11 +88,12 @@ def coordinates(setup: Setup, base: Setup) -> FloatArray:
     heat = -math.log(oil.specific_heat / first.specific_heat) + math.log(1.0 - setup.heat_loss)
     whole = [
         math.log(oil.viscosity_40 / first.viscosity_40), math.log(oil.viscosity_exponent / first.viscosity_exponent),
-        heat, setup.supply_change, float(np.mean([a.pad_clearance - b.pad_clearance for a, b in pads])),
+        heat, setup.supply_change, float(np.mean([a.pivot_offset - b.pivot_offset for a, b in pads])),
         setup.pivot_damping, setup.rotational_stiffness, setup.rolling, angle * math.cos(direction),
         angle * math.sin(direction), setup.starvation, setup.carryover,
     ]  # fmt: skip
-    return np.array([*whole, *(offsets + setup.clearance_change), *softer])
+    bores = [a.pad_clearance - b.pad_clearance for a, b in pads]
+    return np.array([*whole, *(offsets + setup.clearance_change), *softer, *bores])
 
 
 def _factor(law: PivotLaw) -> float:
@@ -104,7 +117,9 @@ def at(base: Setup, name: str, value: float) -> Setup:
         return base.change(misalignment=(float(np.hypot(*lean)), math.atan2(lean[1], lean[0])))
     simple = {"supply": "supply_change", "damping": "pivot_damping", "rotation": "rotational_stiffness"}
     if kind == "bore":
-        return apply_effects(base, [Effect("preload_error", pad_clearance_change=value)])
+        return apply_effects(base, [Effect("pad_bore", pad=int(number) + 1, pad_clearance_change=value)])
+    if kind == "arc":
+        return apply_effects(base, [Effect("pivot_offset_error", offset_change=value)])
     if kind == "offset":
         return apply_effects(base, [Effect("pad_offset", pad=int(number) + 1, radial_offset=value)])
     if kind == "pivot":
@@ -116,6 +131,7 @@ def at(base: Setup, name: str, value: float) -> Setup:
 class Table:
     """Answers of the model as numbers that are nearly linear in the coordinates."""
 
+    names: tuple[str, ...]
     base: FloatArray
     splines: list[CubicSpline] = field(repr=False)
     pairs: FloatArray = field(repr=False)
@@ -128,13 +144,15 @@ class Table:
         for i in moved:
             out += _follow(self.splines[i], place[i])
         for kind, spline in self.together.items():
-            out += _follow(spline, float(np.mean(place[_members(kind)])))
+            out += _follow(spline, float(np.mean(place[_members(self.names, kind)])))
+        if not len(self.pairs):
+            return out
         u = place[moved]
         return np.asarray(out + np.tensordot(np.outer(u, u), self.pairs[np.ix_(moved, moved)], 2))
 
 
-def _members(kind: str) -> list[int]:
-    return [i for i, name in enumerate(NAMES) if name.startswith(kind + " ")]
+def _members(names: Sequence[str], kind: str) -> list[int]:
+    return [i for i, name in enumerate(names) if name.startswith(kind + " ")]
 
 
 def _follow(spline: CubicSpline, value: float) -> FloatArray:
@@ -151,6 +169,7 @@ class Emulated(ModelCache):
     base: Setup | None = None
     points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = field(default_factory=dict)
     table: Table | None = None
+    axes: dict[str, tuple[tuple[float, ...], float, float]] = field(default_factory=dict)
     _last: tuple[bytes, FloatArray] | None = None
     _setup: tuple[Setup, FloatArray] | None = None
 
@@ -170,8 +189,8 @@ class Emulated(ModelCache):
         assert self.table is not None
         place = coordinates(setup, self.base)
         place[np.abs(place) < 1e-13] = 0.0
-        for name, value in zip(NAMES, place, strict=True):
-            if abs(value) > REACH * AXES[name][1]:
+        for name, value in zip(self.table.names, place, strict=True):
+            if abs(value) > REACH * self.axes[name][1]:
                 raise NoEquilibriumError(f"{name} beyond what was solved")
         key = place.tobytes()
         if self._last is None or self._last[0] != key:
@@ -200,24 +219,25 @@ def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> SolvedPoint:
     h[:, 0, 1], h[:, 1, 0] = cross[0] + 1j * cross[2], cross[1] + 1j * cross[3]
     rest = latent[8 * lines :]
     force = point[0] * np.array([math.cos(point[1]), math.sin(point[1])])
-    return SolvedPoint(h, rest[:2] / 1e5, force, rest[2:7], rest[7:12] * 1e3)
+    pads = (len(rest) - 2) // 2
+    return SolvedPoint(h, rest[:2] / 1e5, force, rest[2 : 2 + pads], rest[2 + pads :] * 1e3)
 
 
-def emulate(forward: Forward, more: Layout, kept: Path | None = None) -> Emulated:
-    """Solve what an emulator needs (some minutes), or read it."""
+def emulate(forward: Forward, more: Layout, kept: Path | None = None, pairs: bool = True) -> Emulated:
+    """Solve what an emulator needs (some minutes; seconds without the terms of pairs), or read it."""
     points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = {}
     count = 0
     for point, lines in _asked(forward.layout, more):
-        size = 8 * len(lines) + 12
+        size = 8 * len(lines) + 2 + 2 * len(forward.setup.bearing.pads)
         points[(point, lines)] = slice(count, count + size)
         count += size
     if kept is not None and kept.exists():
         table = pickle.loads(kept.read_bytes())
     else:
-        table = _tabulate(forward, points)
+        table = _tabulate(forward, points, pairs)
         if kept is not None:
             kept.write_bytes(pickle.dumps(table))
-    return Emulated(base=forward.setup, points=points, table=table)
+    return Emulated(base=forward.setup, points=points, table=table, axes=axes(forward.setup))
 
 
 def _asked(*layouts: Layout) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
@@ -240,37 +260,38 @@ def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
     return np.concatenate(out)
 
 
-def _tabulate(forward: Forward, points: Any) -> Table:
+def _tabulate(forward: Forward, points: Any, pairs: bool) -> Table:
     start = forward.setup
-    base = solve(forward, start, points)
-    splines = [_spline(forward, points, base, lambda v, n=name: at(start, n, v), *AXES[name][:2]) for name in NAMES]
-    table = Table(base, splines, np.zeros((len(NAMES), len(NAMES), len(base))), {})
-    for i, j in itertools.combinations(range(len(NAMES)), 2):
-        steps = [AXES[NAMES[k]][2] for k in (i, j)]
+    base, along = solve(forward, start, points), axes(start)
+    names = tuple(along)
+    splines = [_spline(forward, points, base, lambda v, n=name: at(start, n, v), *along[name][:2]) for name in names]
+    table = Table(names, base, splines, np.zeros((len(names), len(names), len(base)) if pairs else (0, 0, 0)), {})
+    for i, j in itertools.combinations(range(len(names)), 2) if pairs else ():
+        steps = [along[names[k]][2] for k in (i, j)]
         corners = []
         for sign in (1.0, -1.0):
-            a, b = (sign * step if AXES[NAMES[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True))
-            place = np.zeros(len(NAMES))
+            a, b = (sign * step if along[names[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True))
+            place = np.zeros(len(names))
             place[[i, j]] = a, b
             try:
-                missing = solve(forward, at(at(start, NAMES[i], a), NAMES[j], b), points) - table(place)
+                missing = solve(forward, at(at(start, names[i], a), names[j], b), points) - table(place)
             except NoEquilibriumError:
                 continue
             corners.append(missing / (a * b))
         if corners:
             table.pairs[i, j] = table.pairs[j, i] = 0.5 * np.mean(corners, axis=0)
-    for kind, (shares, reach) in TOGETHER.items():
-        names = [NAMES[i] for i in _members(kind)]
+    for kind in _OF_A_PAD:
+        members = _members(names, kind)
 
-        def moved(value: float, names: list[str] = names) -> Setup:
-            return functools.reduce(lambda setup, name: at(setup, name, value), names, start)
+        def moved(value: float, members: list[int] = members) -> Setup:
+            return functools.reduce(lambda setup, i: at(setup, names[i], value), members, start)
 
-        def known(value: float, kind: str = kind) -> FloatArray:
-            place = np.zeros(len(NAMES))
-            place[_members(kind)] = value
+        def known(value: float, members: list[int] = members) -> FloatArray:
+            place = np.zeros(len(names))
+            place[members] = value
             return table(place)
 
-        table.together[kind] = _spline(forward, points, known, moved, shares, reach)
+        table.together[kind] = _spline(forward, points, known, moved, *along[f"{kind} 0"][:2])
     return table
 
 

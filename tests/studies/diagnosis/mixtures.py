@@ -114,12 +114,17 @@ def bench(name: str, folder: Path | None, skip: frozenset[str] = SKIPPED) -> Ben
     forward = Forward(setup, layout, observations.elements, cache)
     elsewhere = Forward(setup, new, planned_observations(setup, new).elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=skip))
+    return Bench(problem, forward, elsewhere, seen_sizes(problem, forward))
+
+
+def seen_sizes(problem: Problem, forward: Forward) -> dict[str, float]:
+    """A typical step of each candidate, in standard deviations of everything else."""
     factor = usual_factor(problem.observations, problem.columns)
     seen = {}
     for c in problem.pool:
         columns = [_slope(forward.fresh(), problem.base, c, i) for i in range(len(c.steps))]
         seen[c.label] = float(np.linalg.norm(np.linalg.solve(factor, np.column_stack(columns) @ c.steps)))
-    return Bench(problem, forward, elsewhere, seen)
+    return seen
 
 
 def _slope(forward: Forward, base: FloatArray, c: Candidate, i: int) -> FloatArray:
@@ -171,14 +176,14 @@ def draw(one: Bench, kind: str, rng: np.random.Generator, beyond: Sequence[str] 
             growth = float(rng.uniform(6e-6, 1.4e-5))
     size = np.clip(rng.standard_normal(len(one.problem.nuisances)), -2.0, 2.0) * (kind != "clean")
     try:
-        value = _measured(one, hidden, size, growth)
+        value = measured(one, hidden, size, growth)
         shares = []
         for e in truth:
-            without = _measured(one, [h for h in hidden if h is not e], size, growth)
+            without = measured(one, [h for h in hidden if h is not e], size, growth)
             shares.append(float(np.sum(((value - without) / one.problem.sigma) ** 2)))
     except NoEquilibriumError:
         return None
-    noisy = value + _noise(one.problem.observations, value, rng)
+    noisy = value + noise(one.problem.observations, value, rng)
     observations = replace(one.problem.observations, value=noisy)
     return Drawn(truth, outside, replace(one.problem, observations=observations, pool=pool), tuple(shares), size,
                  tuple(hidden), growth)  # fmt: skip
@@ -206,7 +211,7 @@ def _sized(one: Bench, c: Candidate, rng: np.random.Generator, clean: bool) -> E
     return Effect(c.name, **parameters)
 
 
-def _measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: float) -> FloatArray:
+def measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: float) -> FloatArray:
     """What a bearing that is off its drawing shows, with hidden effects."""
     known = one.problem.nuisances
     value = predict(one.forward, hidden, known, size)
@@ -218,15 +223,13 @@ def _measured(one: Bench, hidden: Sequence[Effect], size: FloatArray, growth: fl
             more = (*hidden, Effect("thermal_growth", clearance_change=growth * load / top))
             value = np.where(mine, predict(one.forward, more, known, size), value)
         mine = np.array([e.family in {"locus", "load"} for e in elements])
-        more = (
-            *hidden,
-            Effect("thermal_growth", clearance_change=growth * layout.locus[0].load / top),
-        )
-        value = np.where(mine, predict(one.forward, more, known, size), value)
+        if layout.locus:
+            more = (*hidden, Effect("thermal_growth", clearance_change=growth * layout.locus[0].load / top))
+            value = np.where(mine, predict(one.forward, more, known, size), value)
     return value
 
 
-def _noise(observations: Observations, value: FloatArray, rng: np.random.Generator) -> FloatArray:
+def noise(observations: Observations, value: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Noise of identification, and a smooth difference of the models."""
     scale = direct_scale(observations.elements, value)
     smooth = np.zeros(len(value))

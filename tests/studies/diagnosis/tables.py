@@ -2,7 +2,7 @@
 
     python -m tests.studies.diagnosis.tables [--write SECTION] ROWS.jsonl [MORE.jsonl ..]
 
-`SECTION` of RESULTS.md: mixtures, mixtures-between, mixtures-one, volts.
+`SECTION` of RESULTS.md: mixtures, mixtures-between, mixtures-one, volts, strangers.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def standing(rows: Sequence[Row]) -> list[list[bool]]:
     return [
         [not r["named"] for r in rows if r["kind"] == "scatter"],
         [_dominant(r, True) for r in mixed],
-        [_all_there(r) for r in mixed],
-        [_no_false(r) for r in mixed],
+        [all_there(r) for r in mixed],
+        [no_false(r) for r in mixed],
         [ok for r in inside for ok in _intervals(r)],
         [_described(r) for r in rows if r["kind"] == "outside"],
         [_dominant(r, False) for r in rows if r["kind"] == "clean"],
@@ -113,7 +113,8 @@ def _found(row: Row, name: str) -> bool:
     return name in said or any(name in g and g & said for g in _groups(row))
 
 
-def _all_there(row: Row) -> bool:
+def all_there(row: Row) -> bool:
+    """Whether every hidden effect of the library is listed, or in a group of three at most."""
     return all(_found(row, e["name"]) for e in row["truth"])
 
 
@@ -127,7 +128,8 @@ def _dominant(row: Row, sized: bool) -> bool:
     return all(held) if sized and held else True
 
 
-def _no_false(row: Row) -> bool:
+def no_false(row: Row) -> bool:
+    """Whether every name is that of a hidden effect, or in a group with one."""
     truth = {e["name"] for e in row["truth"]}
     return all(e["name"] in truth or any(e["name"] in g and g & truth for g in _groups(row)) for e in row["named"])
 

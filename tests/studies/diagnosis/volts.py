@@ -46,7 +46,7 @@ from tpjb_ident.diagnosis.forward.nuisance import Nuisance, Shift
 
 #: Slow to simulate.
 SKIPPED = frozenset({"pad_conduction", "pivot_friction"})
-PROBES, CELLS = ("X1A", "X1B"), {"cell x": "L1H", "cell y": "L1V"}
+PROBES, CELLS = ("X1A", "X1B"), {"cell 1": "L1H", "cell 2": "L1V"}
 
 
 def rig_of(name: str, drawn: Drawn, seed: int) -> VirtualRig:

@@ -28,7 +28,8 @@ from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
-    from tpjb_ident.compare.comparison import Comparison
+    from model.bearing import Bearing
+    from tpjb_ident.compare.comparison import CompareSettings, Comparison
     from tpjb_ident.compare.difference import Difference, Side
 
 Other = Annotated[
@@ -90,13 +91,9 @@ def compare(
     typed = str(campaign or f"--coefficients {coefficients}")
     with c.results() as folder:
         if coefficients is not None:
-            from tpjb_ident.compare.from_table import compare_table
             from tpjb_ident.report.comparison_page import write_report
 
-            share = parse_share(reading_error, "--reading-error")
-            with c.progress("comparing") as show:
-                compared = compare_table(coefficients, drawing, settings, share, show)
-            result = with_predictions(compared, tables)
+            result = with_predictions(_compared_table(c, coefficients, drawing, settings, reading_error), tables)
             c.table("comparison", comparison_frame(result))
             following = next_command(result, typed, bearing)
             write_report(folder, result, named(c.options), c.inputs, following)
@@ -114,6 +111,17 @@ def compare(
     show_comparison(c, result, following)
     c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
+
+
+def _compared_table(
+    c: Command, path: Path, drawing: Bearing, settings: CompareSettings, reading_error: str | None
+) -> Comparison:
+    """Predictions held against a table of coefficients."""
+    from tpjb_ident.compare.from_table import compare_table
+
+    share = parse_share(reading_error, "--reading-error")
+    with c.progress("comparing") as show:
+        return compare_table(path, drawing, settings, share, show)
 
 
 def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:

@@ -11,7 +11,7 @@ from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import identify_settings
 from tpjb_ident.cli.common.options import DEMO, Method, Norm, one_of
 from tpjb_ident.errors import NotTrustedError
-from tpjb_ident.exports.formats import FORMATS, export_format
+from tpjb_ident.exports.formats import FORMATS, check_format
 from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def export(
     """
     from tpjb_ident.exports.write import export as write_export
 
-    form = export_format(to)
+    check_format(to)
     frame, name = _coefficients(c, source, method, norm)
     with c.results(f"export {to}") as folder:
         written = write_export(frame, to, folder, force=force, name=name, ross=ross)
@@ -62,8 +62,8 @@ def export(
     c.print(str(written))
     c.print(f"Results: {c.target}: {', '.join(written.files[:4])}{' ..' * (len(written.files) > 4)}")
     c.next("verify", c.target)
-    if form.note:
-        c.note(form.note)
+    if FORMATS[to]:
+        c.note(FORMATS[to])
     _refuse_doubtful(written.chosen, force)
 
 

@@ -90,7 +90,7 @@ def _draft(c: Command, folder: Path, bearing: str | None) -> str:
 
 
 def _update(c: Command, folder: Path, bearing: str | None) -> str:
-    from rigdata.survey.update import column_names, updated_manifest
+    from rigdata.survey.draft import column_names, updated_manifest
 
     manifest = c.target / MANIFEST
     if not manifest.is_file():

@@ -50,10 +50,8 @@ def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
     for name, entry in repeated.items():
         for known in files_of(folder, name, entry, ()):
             if known["role"] == "input" and known["state"] != "same":
-                raise BadInputError(
-                    f"{folder}: input {known['file']} of {name} {STATES[known['state']]}. "
-                    "Bring it back to where it was."
-                )
+                place = f"{folder}: input {known['file']} of {name}"
+                raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
     from tpjb_ident.runtime.differences import compared
 
     found = []

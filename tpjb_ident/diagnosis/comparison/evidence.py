@@ -16,7 +16,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 
 class ErrorModel:

@@ -11,12 +11,11 @@ import numpy as np
 from model.effects import Effect
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, Posterior, posterior
-from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Strain
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, derivatives, prediction
-from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 #: Steps on one set of derivatives, which every step corrects.
 _STEPS = 4
@@ -98,26 +97,25 @@ class Fit:
     @property
     def sizes(self) -> FloatArray:
         """Posterior means of all tolerances in stated deviations, zero for one that a fault has taken over, (m,)."""
-        out = np.zeros(len(self.problem.nuisances))
-        out[self.unknowns.tolerances] = self.posterior.mean[self.unknowns.amplitudes :]
-        return out
+        out = np.zeros(len(self.posterior.mean))
+        out[self.unknowns.tolerances] = self.posterior.mean[self.unknowns.tolerances]
+        return out[self.unknowns.amplitudes :]
 
     @property
     def on_bound(self) -> bool:
         """Whether an amplitude is on its bound: the linear form counts the forbidden side too."""
-        own = slice(0, self.unknowns.amplitudes)
-        near, theta = 1e-6 * self.unknowns.width[own], self.point.theta[own]
-        low, high = self.unknowns.low[own], self.unknowns.high[own]
-        return bool(np.any((theta <= low + near) | (theta >= high - near)))
+        unknowns, theta = self.unknowns, self.point.theta
+        near = 1e-6 * unknowns.width
+        out = (theta <= unknowns.low + near) | (theta >= unknowns.high - near)
+        return any(out[at].any() for at in unknowns.slices)
 
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
         names, rows = _combinations(self.problem, self.unknowns)
-        count = self.unknowns.amplitudes
         stated = np.sqrt(np.sum(rows**2, axis=1))
-        sizes = rows @ self.posterior.mean[count:] / stated
-        heard = 1.0 - np.sum((rows @ self.posterior.covariance[count:, count:]) * rows, axis=1) / stated**2
+        sizes = rows @ self.posterior.mean / stated
+        heard = self._heard(rows) / stated**2
         listed = [Deviation(*row) for row in zip(names, map(float, sizes), map(float, heard), strict=True)]
         return tuple(sorted(listed, key=lambda d: -abs(d.significance)))
 
@@ -125,12 +123,13 @@ class Fit:
     def strain(self) -> Strain:
         """The tolerances of which the data say something."""
         _, rows = _combinations(self.problem, self.unknowns)
-        count = self.unknowns.amplitudes
-        stated = np.sum(rows**2, axis=1)
-        heard = stated - np.sum((rows @ self.posterior.covariance[count:, count:]) * rows, axis=1)
-        asked = heard > Deciding.silent * stated
-        whole = np.column_stack([np.zeros((len(rows), count)), rows])
-        return Strain(whole[asked], np.sqrt(heard[asked]))
+        heard = self._heard(rows)
+        asked = heard > Deciding.silent * np.sum(rows**2, axis=1)
+        return Strain(rows[asked], np.sqrt(heard[asked]))
+
+    def _heard(self, rows: FloatArray) -> FloatArray:
+        """Variance of some combinations (c, k) of tolerances that the data take away."""
+        return np.asarray(np.sum(rows**2 - (rows @ self.posterior.covariance) * rows, axis=1))
 
     @property
     def p(self) -> float:
@@ -153,14 +152,15 @@ class Deviation:
 
 
 def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], FloatArray]:
-    """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, m)."""
-    listed = [problem.nuisances[i] for i in unknowns.tolerances]
-    names, rows = [f"{n.name} {n.place}".strip() for n in listed], list(np.eye(len(listed)))
-    sigma = {n.name: n.sigma for n in listed}
+    """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, k)."""
+    listed = {int(i): problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
+    each = np.eye(len(unknowns.width))
+    names, rows = [f"{n.name} {n.place}".strip() for n in listed.values()], list(each[unknowns.tolerances])
+    sigma = {n.name: n.sigma for n in listed.values()}
     for scatter, common in _MEANS.items():
-        members = np.array([n.name == scatter for n in listed], dtype=float)
+        members = each[[i for i, n in listed.items() if n.name == scatter]].sum(axis=0)
         if members.sum() > 1:
-            whole = np.array([n.name == common for n in listed], dtype=float)
+            whole = each[[i for i, n in listed.items() if n.name == common]].sum(axis=0)
             names.append(f"{scatter}, mean of all pads")
             rows.append(sigma[scatter] * members / members.sum() + sigma.get(common, 0.0) * whole)
     return names, np.array(rows)
@@ -193,7 +193,7 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     point = Point(theta, predicted, start.jacobian)
     if start.coarse:
         held = unknowns.width.copy()
-        held[unknowns.amplitudes :] = Deciding.held
+        held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
         point = _renewed(run, problem, unknowns, point)  # those from before the jump say nothing behind it
         point = _stepped(run, problem, unknowns, point, coarse, held)

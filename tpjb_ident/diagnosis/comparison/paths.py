@@ -2,23 +2,79 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.comparison.amplitude_path import AmplitudePath, path_through
-from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.unknowns import derivatives, path_changes
 from tpjb_ident.diagnosis.forward.workers import Map
 
-#: Nodes of a path in widths of the prior: typical sizes first, the ends only on the side that the data ask for.
-_NEAR, _FAR = (1.0 / 3.0, -1.0 / 3.0), 1.0
-#: Parts of the way from one direction of the grid to the next.
-_BETWEEN = 3
+
+@dataclass(frozen=True)
+class AmplitudePath:
+    """Change of a prediction along one amplitude: cubic pieces between amplitudes at which the model was asked.
+
+    Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
+    of contact lets K and C jump, at another amplitude for every load, and one polynomial through all of it is wrong
+    everywhere.
+    """
+
+    at: FloatArray  #: (m,): amplitudes, counted from the neutral one, which is among them; rising
+    columns: FloatArray  #: (n, 2 m): changes of the prediction there, then its derivatives
+
+    def weights(self, amplitudes: FloatArray) -> FloatArray:
+        """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends."""
+        inside = self._inside(amplitudes)
+        return self._pieces(inside, _VALUE) + (amplitudes - inside)[:, None] * self.slope_weights(inside)
+
+    def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
+        """Weights of the columns in the derivative at some amplitudes, (k, 2 m); `amplitudes` (k,)."""
+        return self._pieces(self._inside(amplitudes), _SLOPE)
+
+    def slope(self, amplitude: float) -> FloatArray:
+        """Derivative at an amplitude, (n,)."""
+        return np.asarray(self.columns @ self.slope_weights(np.array([amplitude]))[0])
+
+    def _inside(self, amplitudes: FloatArray) -> FloatArray:
+        return np.clip(amplitudes, self.at[0], self.at[-1])
+
+    def _pieces(self, inside: FloatArray, basis: FloatArray) -> FloatArray:
+        count = len(self.at)
+        lower = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
+        length = self.at[lower + 1] - self.at[lower]
+        u = (inside - self.at[lower]) / length
+        # of value at left, value at right, derivative at left, derivative at right
+        parts = (u[:, None] ** np.arange(4)) @ basis
+        if basis is _VALUE:
+            parts[:, 2:] *= length[:, None]
+        else:
+            parts[:, :2] /= length[:, None]
+        out = np.zeros((len(inside), 2 * count))
+        rows = np.arange(len(inside))
+        for column, at in enumerate((lower, lower + 1, count + lower, count + lower + 1)):
+            out[rows, at] = parts[:, column]
+        return out
+
+
+#: Cubic Hermite pieces by powers of the place within the piece, rows 1, u, u^2, u^3.
+_VALUE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
+_SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]])
+
+
+def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> AmplitudePath:
+    """Lay a path through what the model said; `changes` (n,) each."""
+    order = np.argsort([0.0, *amplitudes])
+    at = np.array([0.0, *amplitudes])[order]
+    values = np.array([np.zeros_like(changes[0]), *changes])[order]
+    return AmplitudePath(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))
+
+
+#: A typical size in widths of the prior.
+_NEAR = 1.0 / 3.0
 #: Amplitudes of a path at which a score is asked for.
 _POINTS = 41
 #: Effects of which one prediction takes seconds: a derivative has to do in place of a path.
@@ -65,65 +121,42 @@ class Path:
 
 
 def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
-    """Lay the path of every fault about its typical sizes; those without an equilibrium anywhere are left out."""
+    """Lay the path of every fault to a typical size on one side; a tolerance's own number is known from its column.
+
+    Those without an equilibrium anywhere are left out.
+    """
     curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in _SLOW]
     straight = [f for f in problem.faults if f not in curved]
-    nodes = [[share * float(f.width[0]) for share in _NEAR] for f in curved]
-    changes = run(path_changes, list(zip(curved, nodes, strict=True)))
-    paths = [_curved(fault, row) for fault, row in zip(curved, changes, strict=True) if row]
-    jobs = [((fault,), _start(problem, fault), tuple(range(len(fault.width)))) for fault in straight]
-    for fault, columns in zip(straight, run(derivatives, jobs), strict=True):
-        whole = [column for column in columns if column is not None]
+    columns = problem.scaled(problem.columns)
+    paths = [_curved(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
+    asked = [f for f in curved if f.own < 0]
+    changes = run(path_changes, [(f, [sign * _NEAR * float(f.width[0]) for sign in (1.0, -1.0)], 1) for f in asked])
+    paths += [_curved(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
+    count = len(problem.nuisances)
+    jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
+    for fault, found in zip(straight, run(derivatives, jobs), strict=True):
+        whole = [column for column in found if column is not None]
         if len(whole) == len(fault.width):
             paths.append(Path(fault, np.column_stack(whole)))
-    return _between_directions(paths)
-
-
-def _between_directions(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Paths of directions between those of the grid, by the second harmonic through all of the grid."""
-    groups: dict[str, list[Path]] = {}
-    for path in paths:
-        if "direction" in path.fault.candidate.fixed and path.curve is not None:
-            groups.setdefault(path.fault.label, []).append(path)
-    out = list(paths)
-    for group in groups.values():
-        grid = np.array([path.fault.candidate.fixed["direction"] for path in group])
-        curves = [path.curve for path in group if path.curve is not None]
-        alike = all(np.array_equal(curve.at, curves[0].at) for curve in curves)
-        if len(grid) < 3 or not alike:
-            continue
-        for turn in np.arange(1, _BETWEEN) * math.pi / len(grid) / _BETWEEN:
-            for path, angle in zip(group, grid, strict=True):
-                share = (1.0 + 2.0 * np.cos(2.0 * (angle + turn - grid))) / len(grid)
-                columns = np.tensordot(share, [curve.columns for curve in curves], 1)
-                fixed = {**path.fault.candidate.fixed, "direction": float(angle + turn)}
-                fault = replace(path.fault, candidate=replace(path.fault.candidate, fixed=fixed))
-                out.append(Path(fault, columns, AmplitudePath(curves[0].at, columns)))
-    return tuple(out)
+    return tuple(paths)
 
 
 def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequence[float]) -> tuple[Path, ...]:
-    """Paths with one more node, at the end towards which a score went beyond what was laid."""
-    asked = [i for i, (path, size) in enumerate(zip(paths, sizes, strict=True)) if _beyond(path, size)]
-    jobs = [(paths[i].fault, [_FAR * float(np.sign(sizes[i]) * paths[i].fault.width[0])]) for i in asked]
+    """Paths with what a size asks for: typical sizes on both sides, and the end towards which it goes beyond them."""
+    jobs, asked = [], []
+    for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
+        near = _NEAR * float(path.fault.width[0])
+        wanted = [near, -near, *([float(np.copysign(near / _NEAR, size))] if abs(size) > near else [])]
+        if size and path.curve is not None:
+            asked.append((i, path.curve))
+            jobs.append((path.fault, [node for node in wanted if not np.isclose(path.curve.at, node).any()]))
     out = list(paths)
-    for i, row in zip(asked, run(path_changes, jobs), strict=True):
-        curve = paths[i].curve
-        if row and curve is not None:
-            known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
-            out[i] = _curved(paths[i].fault, [*known, *row])
+    for (i, curve), row in zip(asked, run(path_changes, jobs), strict=True):
+        known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
+        out[i] = _curved(paths[i].fault, [*known, *row])
     return tuple(out)
-
-
-def _beyond(path: Path, size: float) -> bool:
-    return path.curve is not None and not path.curve.at[0] <= size <= path.curve.at[-1]
 
 
 def _curved(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:
     curve = path_through([float(at) for at, _ in changes], [change for _, change in changes])
     return Path(fault, curve.columns, curve)
-
-
-def _start(problem: Problem, fault: Fault) -> FloatArray:
-    gone = fault.own >= 0
-    return np.zeros(len(fault.width) + len(problem.nuisances) - gone)

@@ -16,14 +16,14 @@ from scipy.special import logsumexp
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
-from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
 #: Nats that put a coarse start before all others.
@@ -98,9 +98,12 @@ class _Search:
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
         nothing = np.zeros(len(self.problem.nuisances))
-        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)))
+        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)), rough=True)
         self.report("every effect of the library", 0.1)
         self._propose_singles()
+        baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
+        if baseline.posterior.promised + self._log_prior(()) > best - self.settings.worth_derivatives:
+            self.fits[frozenset()] = self._renewed(baseline)
         while (proposal := self._next()) is not None:
             self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / self.settings.most_fits))
             self._fit(proposal)
@@ -128,16 +131,20 @@ class _Search:
         rise = mistaken if plain else float(np.clip(total - self.estimates[leader.labels], 0.0, mistaken))
         return proposal.estimate > total - self.settings.near - rise
 
-    def _fit(self, proposal: Proposal) -> None:
+    def _renewed(self, fit: Fit) -> Fit:
+        """A fit with derivatives of its own, where these do not make it worse."""
+        again = refined(self.run, fit)
+        return again if again.posterior.total > fit.posterior.total - 1.0 else fit
+
+    def _fit(self, proposal: Proposal, rough: bool = False) -> None:
         fit = fitted(self.run, self.problem, proposal)
         if fit is None:
             return
         leader = self._leader()
         right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
         # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
-        if self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
-            again = refined(self.run, fit)
-            fit = again if again.posterior.total > fit.posterior.total - 1.0 else fit
+        if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
+            fit = self._renewed(fit)
         self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
@@ -172,8 +179,9 @@ class _Search:
         strain = self.fits[frozenset()].strain
         first = scores(problem.errors, linear, self.paths, strain)
         suspect = self.settings.suspect
-        rows = {id(score.path): score.amplitudes[0] for score in first}
-        self.paths = lengthened(self.run, problem, self.paths, [float(rows[id(path)]) for path in self.paths])
+        leading = list(dict.fromkeys(score.path.fault.label for score in first))[: Deciding.followed]
+        sizes = {id(score.path): float(score.amplitudes[0]) for score in first if score.path.fault.label in leading}
+        self.paths = lengthened(self.run, problem, self.paths, [sizes.get(id(path), 0.0) for path in self.paths])
         singles = scores(problem.errors, linear, self.paths, strain)
         for end in (-1.0, 1.0) if singles and singles[0].scale > suspect else ():  # a jump hides what lies behind it
             ends = [end * float(path.fault.width[0]) for path in self.paths]
@@ -198,16 +206,14 @@ class _Search:
 
     def _beside(self, path: Path, fit: Fit) -> Path:
         """A path beside a fit: a tolerance's own number has its derivative there, which large faults change."""
-        own = path.fault.own
-        if own < 0:
+        if path.fault.own < 0:
             return path
-        column = fit.unknowns.amplitudes + fit.unknowns.tolerances.index(own)
-        return Path(path.fault, fit.point.jacobian[:, [column]])
+        return Path(path.fault, fit.point.jacobian[:, [fit.unknowns.amplitudes + path.fault.own]])
 
     def _propose(
         self, score: Score, faults: tuple[Fault, ...], theta: FloatArray, jacobian: FloatArray, coarse: bool = False
     ) -> None:
-        """Add a fault to a model: what its tolerance had found becomes the fault's start."""
+        """Add a fault to a model: what its tolerance had found is where it begins."""
         if not np.any(score.amplitudes):
             return
         fault = score.path.fault.turned()
@@ -215,45 +221,36 @@ class _Search:
         estimate = score.total + self._log_prior(faults) + (_FIRST if coarse else 0.0)
         if score.p < self.settings.untenable:  # it would have to be a step on the way
             estimate -= self.settings.near
-        labels = frozenset(f.label for f in faults)
-        if labels in self.fits or (labels in self.proposals and self.proposals[labels].estimate >= estimate):
-            return
-        start = np.zeros(len(fault.width))
-        start[: len(score.amplitudes)] = score.amplitudes
-        columns = np.zeros((len(jacobian), len(start)))
-        slopes = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
-        columns[:, : slopes.shape[1]] = slopes
-        before = Unknowns(self.problem, faults[:-1])
-        first = before.amplitudes
-        rest, kept = theta[first:], jacobian[:, first:]
-        if fault.own >= 0:
-            index = before.tolerances.index(fault.own)
-            start[0] += rest[index]
-            rest, kept = np.delete(rest, index), np.delete(kept, index, axis=1)
-        self.proposals[labels] = Proposal(
-            faults, np.concatenate([theta[:first], start, rest]),
-            np.column_stack([jacobian[:, :first], columns, kept]), coarse, estimate,
-        )  # fmt: skip
+        if fault.own < 0:
+            first = len(theta) - len(self.problem.nuisances)
+            theta = np.insert(theta, [first] * len(fault.width), 0.0)
+            jacobian = np.insert(jacobian, [first] * len(fault.width), 0.0, axis=1)
+        else:
+            theta, jacobian = theta.copy(), jacobian.copy()
+        start = Unknowns(self.problem, faults).slices[-1].start
+        at = slice(start, start + len(score.amplitudes))
+        theta[at] += score.amplitudes
+        jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
+        self._offer(Proposal(faults, theta, jacobian, coarse, estimate))
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model; its tolerance has its stated prior again."""
-        remaining = tuple(f for f in fit.faults if f is not fault)
-        labels = frozenset(f.label for f in remaining)
-        if labels in self.fits:
-            return
+        faults = tuple(f for f in fit.faults if f is not fault)
         point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
-        theta, jacobian = np.delete(point.theta, at), np.delete(point.jacobian, at, axis=1)
-        gone = point.jacobian[:, at] @ point.theta[at]
-        unknowns = Unknowns(self.problem, remaining)
-        if fault.own >= 0:
-            index = unknowns.amplitudes + unknowns.tolerances.index(fault.own)
-            theta = np.insert(theta, index, 0.0)
-            jacobian = np.insert(jacobian, index, point.jacobian[:, at.start], axis=1)
-        residual = self.problem.measured - point.prediction + gone
-        total = posterior(self.problem.errors, Linear(residual, theta, jacobian, unknowns.width)).promised
-        estimate = total + self._log_prior(remaining)
-        if labels not in self.proposals or self.proposals[labels].estimate < estimate:
-            self.proposals[labels] = Proposal(remaining, theta, jacobian, estimate=estimate)
+        residual = self.problem.measured - point.prediction + point.jacobian[:, at] @ point.theta[at]
+        theta, jacobian = point.theta.copy(), point.jacobian
+        theta[at] = 0.0
+        if fault.own < 0:
+            theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
+        linear = Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
+        estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
+        self._offer(Proposal(faults, theta, jacobian, estimate=estimate))
+
+    def _offer(self, proposal: Proposal) -> None:
+        """Keep the likeliest start of every explanation that was not fitted yet."""
+        known = self.proposals.get(proposal.labels)
+        if proposal.labels not in self.fits and (known is None or known.estimate < proposal.estimate):
+            self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:
         """Probabilities among the tenable fits; among all where none is."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tpjb_ident.diagnosis.deciding.constants import Deciding
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
-from tpjb_ident.diagnosis.observations.observe import Tolerance
+from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,21 @@
 """Unknowns: the free numbers of an explanation, and what the bearing model predicts with them.
 
-Amplitudes of faults come first, then the sizes of the tolerances that no fault has taken over; all are counted from
-their priors' means.
+Amplitudes of effects come first, then the sizes of all tolerances, a fault's own number among them: it differs in the
+width of its prior. All are counted from their priors' means.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from model.effects import Effect
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.comparison.faults import Fault
-from tpjb_ident.diagnosis.comparison.problem import Problem
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel
 from tpjb_ident.diagnosis.forward.nuisance import predict
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.errors import TpjbError
 
 #: Steps of derivatives: share of a fault's prior width, stated deviations of a tolerance.
@@ -28,26 +26,31 @@ class Unknowns:
     """The free numbers of a model with some faults beside all tolerances."""
 
     def __init__(self, problem: Problem, faults: Sequence[Fault]) -> None:
-        taken = {fault.own for fault in faults}
         self.faults = tuple(faults)
-        self.tolerances = [i for i in range(len(problem.nuisances)) if i not in taken]
-        count = len(self.tolerances)
-        self.origin = np.concatenate([*(fault.origin for fault in faults), np.zeros(count)])
-        self.width = np.concatenate([*(fault.width for fault in faults), np.ones(count)])
-        self.low = np.concatenate([*(fault.low for fault in faults), np.full(count, -Deciding.reach)]) - self.origin
-        self.high = np.concatenate([*(fault.high for fault in faults), np.full(count, Deciding.reach)]) - self.origin
-        self.amplitudes = len(self.width) - count
-
-    @property
-    def slices(self) -> list[slice]:
-        """Where every fault's amplitudes are."""
-        ends = np.cumsum([0, *(len(fault.width) for fault in self.faults)])
-        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        effects = [fault for fault in faults if fault.own < 0]
+        count = len(problem.nuisances)
+        reach = np.full(count, Deciding.reach)
+        self.origin = np.concatenate([*(fault.origin for fault in effects), np.zeros(count)])
+        self.width = np.concatenate([*(fault.width for fault in effects), np.ones(count)])
+        self.low = np.concatenate([*(fault.low for fault in effects), -reach]) - self.origin
+        self.high = np.concatenate([*(fault.high for fault in effects), reach]) - self.origin
+        self.amplitudes = len(self.width) - count  #: of effects without a tolerance of their own: the first ones
+        self.slices: list[slice] = []  #: where every fault's amplitudes are
+        start = 0
+        for fault in faults:
+            at = start if fault.own < 0 else self.amplitudes + fault.own
+            self.slices.append(slice(at, at + len(fault.width)))
+            if fault.own < 0:
+                start += len(fault.width)
+            else:
+                self.width[at], self.low[at], self.high[at] = fault.width[0], fault.low[0], fault.high[0]
+        taken = {fault.own for fault in faults}
+        #: (t,): where tolerances with their stated prior are
+        self.tolerances = self.amplitudes + np.array([i for i in range(count) if i not in taken], dtype=int)
 
     def is_reading(self, problem: Problem) -> list[bool]:
         """Which numbers act on readings alone: their derivative is known without a prediction, (k,)."""
-        columns = [problem.nuisances[i].column is not None for i in self.tolerances]
-        return [False] * self.amplitudes + columns
+        return [False] * self.amplitudes + [nuisance.column is not None for nuisance in problem.nuisances]
 
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
@@ -57,16 +60,11 @@ class Unknowns:
 
     def predict(self, forward: ForwardModel, problem: Problem, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
-        sizes, effects = np.zeros(len(problem.nuisances)), []
-        sizes[self.tolerances] = theta[self.amplitudes :]
-        for fault, at in zip(self.faults, self.slices, strict=True):
-            amplitudes = theta[at] + fault.origin
-            if fault.own >= 0:
-                sizes[fault.own] = amplitudes[0]
-            else:
-                effects.append(fault.candidate.effect(amplitudes))
+        amplitudes = theta + self.origin
+        pairs = zip(self.faults, self.slices, strict=True)
+        effects = [fault.candidate.effect(amplitudes[at]) for fault, at in pairs if fault.own < 0]
         try:
-            return problem.scaled(predict(forward, effects, problem.nuisances, sizes))
+            return problem.scaled(predict(forward, effects, problem.nuisances, amplitudes[self.amplitudes :]))
         except (ValueError, ArithmeticError, TpjbError):
             return None
 
@@ -86,10 +84,9 @@ def derivatives(
     at_point = unknowns.predict(forward, problem, theta)
     out: list[FloatArray | None] = []
     for index in indices:
-        if index < unknowns.amplitudes:
-            step = _SHARE * unknowns.width[index]
-        else:  # towards zero: there the model surely has an equilibrium
-            step = -_DEVIATIONS if theta[index] > 0.0 else _DEVIATIONS
+        step = _SHARE * unknowns.width[index]
+        if index >= unknowns.amplitudes:  # towards zero: there the model surely has an equilibrium
+            step = -max(step, _DEVIATIONS) if theta[index] > 0.0 else max(step, _DEVIATIONS)
         out.append(
             None if at_point is None else _difference(forward, problem, unknowns, theta, at_point, (index, step))
         )
@@ -113,15 +110,16 @@ def _difference(
 
 
 def path_changes(
-    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float]
+    forward: Forward, problem: Problem, fault: Fault, nodes: Sequence[float], most: int = 9
 ) -> list[tuple[float, FloatArray]]:
-    """Job: changes of the prediction along a fault's first amplitude, everything else as stated."""
+    """Job: changes of the prediction along a fault's first amplitude, all else as stated, at `most` of some nodes."""
     unknowns, base = Unknowns(problem, (fault,)), problem.scaled(problem.base)
-    out = []
+    at = unknowns.slices[0].start
+    out: list[tuple[float, FloatArray]] = []
     for node in nodes:
         theta = np.zeros(len(unknowns.width))
-        theta[0] = node
-        if unknowns.low[0] <= node <= unknowns.high[0]:
+        theta[at] = node
+        if len(out) < most and unknowns.low[at] <= node <= unknowns.high[at]:
             changed = unknowns.predict(forward.fresh(), problem, theta)
             if changed is not None:
                 out.append((node, changed - base))

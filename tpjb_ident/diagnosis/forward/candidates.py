@@ -11,7 +11,7 @@ from model.bearing import Bearing
 from model.effects import Effect, Parameter, known_effects
 from model.effects.kind import EffectKind
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 
 @dataclass(frozen=True)

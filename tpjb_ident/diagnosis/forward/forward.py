@@ -50,7 +50,7 @@ class SolvedPoint:
         return Reading(
             instruments.shown_stiffness(with_structure(setup, self.h, omega), omega) if lines else self.h,
             instruments.shown_position(self.position + setup.structure @ self.force),
-            instruments.shown_load(self.force), self.temperature, self.pad_load,
+            instruments.shown_load(self.force), instruments.shown_temperature(self.temperature), self.pad_load,
         )  # fmt: skip
 
 

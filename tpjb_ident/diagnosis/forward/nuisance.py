@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,20 +29,36 @@ _STEP = 0.3
 
 @dataclass(frozen=True)
 class OwnNumber:
-    """How the size of a tolerance reads as the parameter of an effect, and back."""
+    """A tolerance that an effect says: how its size reads as the effect's parameter, and back."""
 
-    parameter: Callable[[float], float]
-    change: Callable[[float], float]
+    tolerance: str
+    unit: str = "1"
+    place: str = ""  #: what there are several of: a parameter of the effect
+    parameter: Callable[[float], float] = lambda change: change
+    change: Callable[[float], float] = lambda value: value
 
 
-_SAME = OwnNumber(lambda change: change, lambda value: value)
-_RATIO = OwnNumber(math.exp, lambda value: math.log(max(value, 1e-9)))
-_LOST = OwnNumber(lambda change: 1.0 - math.exp(change), lambda value: math.log(max(1.0 - value, 1e-9)))
-#: Effects that are a tolerance's own number: that tolerance has the wide prior then, and no twin beside it.
+_ratio = functools.partial(OwnNumber, parameter=math.exp, change=lambda value: math.log(max(value, 1e-9)))
+#: Everything that may be off, and the effect that says so: that tolerance has the wide prior then, and no twin beside
+#: it.
 OWN_NUMBERS = {
-    "oil_viscosity": _RATIO, "viscosity_law": _RATIO, "supply_temperature": _SAME, "preload_error": _SAME,
-    "heat_loss": _LOST, "pad_offset": _SAME, "soft_pivot": _RATIO,
-}  # fmt: skip
+    "oil_viscosity": _ratio("viscosity"),
+    "viscosity_law": _ratio("viscosity_exponent"),
+    "supply_temperature": OwnNumber("supply_temperature", "K"),
+    "clearance_error": OwnNumber("assembled_clearance", "m"),
+    "preload_error": OwnNumber("pad_clearance", "m"),
+    "pivot_offset_error": OwnNumber("pivot_offset"),
+    "heat_loss": OwnNumber(
+        "film_heat",
+        parameter=lambda change: 1.0 - math.exp(change),
+        change=lambda value: math.log(max(1.0 - value, 1e-9)),
+    ),
+    "pad_offset": OwnNumber("clearance_scatter", "m", "pad"),
+    "soft_pivot": _ratio("pivot_stiffness_scatter", place="pad"),
+    "one_probe_gain": _ratio("probe_gain", place="probe"),
+    "one_cell_gain": _ratio("cell_gain", place="cell"),
+    "thermometer_offset": OwnNumber("thermometer", "K", "pad"),
+}
 
 
 @dataclass(frozen=True)
@@ -87,72 +103,38 @@ class Shift:
 def nuisances(
     elements: Sequence[Element], setup: Setup, tolerances: Tolerances, by_pad: bool = True
 ) -> tuple[Nuisance, ...]:
-    """List what may be off for an observation vector."""
-    own = functools.partial(_own, tolerances)
-    clearance = tolerances["assembled_clearance"]
-    listed = [
-        own("viscosity", "1", "oil_viscosity"),
-        own("viscosity_exponent", "1", "viscosity_law"),
-        own("supply_temperature", "K", "supply_temperature"),
-        Nuisance("assembled_clearance", clearance, "m", change=_assembled),
-        own("pad_clearance", "m", "preload_error"),
-        own("film_heat", "1", "heat_loss"),
-    ]
-    for pad in range(1, len(setup.bearing.pads) + 1) if by_pad else ():
-        listed.append(own("clearance_scatter", "m", "pad_offset", pad))
-        listed.append(own("pivot_stiffness_scatter", "1", "soft_pivot", pad))
-    for i in range(2):
-        gain = functools.partial(_probe, axes=tolerances.probe_axes, index=i)
-        listed.append(Nuisance("probe_gain", tolerances["probe_gain"], "1", f"probe {i + 1}", gain))
-        cell = functools.partial(_cell, index=i)
-        listed.append(Nuisance("cell_gain", tolerances.cell_gain.value, "1", f"cell {'xy'[i]}", cell))
-    listed += _readings(elements, tolerances)
-    return tuple(nuisance for nuisance in listed if nuisance.sigma > 0.0)
-
-
-def _own(known: Tolerances, name: str, unit: str, effect: str, pad: int = 0) -> Nuisance:
-    """A tolerance that an effect of the library says, of a pad or of the whole bearing."""
-    place = f"pad {pad}" if pad else ""
-    change = functools.partial(_changed, effect=effect, pad=pad)
-    return Nuisance(name, known[name], unit, place, change, effect=f"{effect} {place}".strip())
-
-
-def _readings(elements: Sequence[Element], tolerances: Tolerances) -> list[Nuisance]:
+    """List what may be off for an observation vector; `by_pad`: what may be off pad by pad, too."""
+    pads = np.array([e.place("pad") if e.observable == "pad_temperature" else math.nan for e in elements])
+    warm = sorted({int(pad) for pad in pads[np.isfinite(pads)]})
+    listed = []
+    for effect, own in OWN_NUMBERS.items():
+        reads = own.tolerance == "thermometer"
+        count = len(setup.bearing.pads) * by_pad if own.place == "pad" else 2
+        numbers = warm if reads else range(1, count + 1) if own.place else (0,)
+        for number in numbers:
+            sigma, where = tolerances[own.tolerance], {own.place: number} if own.place else {}
+            change = functools.partial(_changed, effect=effect, where=where)
+            column = np.where(pads == number, sigma, 0.0) if reads else None
+            place = f"{own.place} {number}" if own.place else ""
+            label = f"{effect} {place}".strip()
+            listed.append(Nuisance(own.tolerance, sigma, own.unit, place, None if reads else change, column, label))
     shifts = centre_shifts(elements) * tolerances.centre
-    out = [
+    listed += [
         Nuisance("centre", tolerances.centre, "m", letter, column=shifts[:, axis])
         for axis, letter in enumerate("xy") if np.any(shifts[:, axis])
     ]  # fmt: skip
-    pads = np.array([e.place("pad") for e in elements])
-    warm = np.array([e.observable == "pad_temperature" for e in elements], dtype=bool)
-    for pad in sorted(set(pads[warm])):
-        column = np.where(warm & (pads == pad), tolerances["thermometer"], 0.0)
-        out.append(Nuisance("thermometer", tolerances["thermometer"], "K", f"pad {pad:.0f}", column=column))
-    return out
+    return tuple(nuisance for nuisance in listed if nuisance.sigma > 0.0)
 
 
 def at_baseline(
     forward: ForwardModel, effects: Sequence[Effect], setup: Setup, known: Tolerances, base: FloatArray
 ) -> FloatArray:
     """Columns of what may be off in a whole bearing and its instruments, for tests that are only planned, (n, m)."""
-    bearing_nuisances = nuisances(forward.elements, setup, known, by_pad=False)
-    at = np.zeros(len(bearing_nuisances))
-    columns = [column_of(forward, effects, bearing_nuisances, at, base, i) for i in range(len(at))]
+    columns = []
+    for one in nuisances(forward.elements, setup, known, by_pad=False):
+        moved = predict(forward, effects, (one,), np.array([_STEP]))
+        columns.append((moved - base) / _STEP)
     return np.column_stack(columns)
-
-
-def column_of(
-    forward: ForwardModel, effects: Sequence[Effect], unknowns: Sequence[Nuisance], at: FloatArray, base: FloatArray,
-    index: int,
-) -> FloatArray:  # fmt: skip
-    """Change of the observation vector per standard deviation of one nuisance, (n,); `at` (m,), `base` (n,)."""
-    if unknowns[index].column is not None:
-        return np.asarray(unknowns[index].column)
-    # towards zero: there the model surely has an equilibrium
-    step = -_STEP if at[index] > 0.0 else _STEP
-    moved = at.copy()
-    moved[index] += step
-    return (predict(forward, effects, unknowns, moved) - base) / step
 
 
 def predict(
@@ -163,26 +145,7 @@ def predict(
     return forward(effects, shift if np.any(size) else None) + shift.readings
 
 
-def _changed(setup: Setup, change: float, effect: str, pad: int) -> Setup:
+def _changed(setup: Setup, change: float, effect: str, where: Mapping[str, int]) -> Setup:
     """Apply an effect of the size that a tolerance's change is."""
     kind = kind_of(effect)
-    place = {"pad": pad} if pad else {}
-    return kind.apply(setup, **place, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(change)})
-
-
-def _assembled(setup: Setup, change: float) -> Setup:
-    return setup.change_pads(lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + change))
-
-
-def _probe(setup: Setup, change: float, axes: tuple[float, float], index: int) -> Setup:
-    rows = np.array([[math.cos(a), math.sin(a)] for a in axes])
-    scale = np.eye(2)
-    scale[index, index] += change
-    turned = np.linalg.solve(rows, scale @ rows)
-    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: turned))
-
-
-def _cell(setup: Setup, change: float, index: int) -> Setup:
-    scale = np.eye(2)
-    scale[index, index] += change
-    return setup.change(instruments=setup.instruments.read_cells(scale))
+    return kind.apply(setup, **where, **{kind.parameters[-1].name: OWN_NUMBERS[effect].parameter(change)})

@@ -35,7 +35,9 @@ DEFAULTS: dict[str, tuple[float, str]] = {
     "pivot_stiffness_scatter": (0.05, "ratio"),
     "film_heat": (0.07, "ratio"),
     "thermometer": (0.5, "temperature difference"),
+    "pivot_offset": (0.005, "ratio"),
     "probe_gain": (0.005, "ratio"),
+    "cell_gain": (0.002, "ratio"),
     "model": (0.015, "ratio"),
 }
 
@@ -47,8 +49,6 @@ class Tolerances:
     stated: Mapping[str, StatedTolerance] = field(
         default_factory=lambda: {name: StatedTolerance(value) for name, (value, _) in DEFAULTS.items()}
     )
-    probe_axes: tuple[float, float] = (math.pi / 4, 3 * math.pi / 4)
-    cell_gain: StatedTolerance = StatedTolerance(0.002)
     centre: float = 10e-6
 
     def __getitem__(self, name: str) -> float:
@@ -71,7 +71,7 @@ class Tolerances:
             if not 0.0 <= number < math.inf:
                 raise BadInputError(f"tolerance {name} ({source}): must be zero or more, got {value!r}.")
             table[name] = StatedTolerance(number, source)
-        return Tolerances(table, self.probe_axes, self.cell_gain, self.centre)
+        return Tolerances(table, self.centre)
 
     def layered(self, bearing: Bearing) -> Tolerances:
         """Return a copy with what a bearing file states where the command line states nothing."""

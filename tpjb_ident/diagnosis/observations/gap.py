@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -89,3 +90,79 @@ def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
         return np.zeros(len(values))
     middle, half = 0.5 * (finite_values.max() + finite_values.min()), 0.5 * np.ptp(finite_values)
     return np.where(np.isfinite(values), (values - middle) / half, 0.0)
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Where measurement and baseline part."""
+
+    observable: str
+    where: str
+    size_sigma: float
+    share: float
+
+
+#: Rows of the list of disagreements.
+_MOST = 12
+
+
+def localise(observations: Observations, prediction: FloatArray) -> tuple[Disagreement, ...]:
+    """Split the squared gap by observable and region, largest share first; `prediction` (n,)."""
+    z = residuals(observations, prediction)
+    total = float(np.sum(z**2))
+    rows: list[Disagreement] = []
+    for name in dict.fromkeys(e.observable for e in observations.elements):
+        mine = np.array([e.observable == name for e in observations.elements])
+        for where, part in _regions(observations, mine):
+            square = float(np.sum(z[part] ** 2))
+            rows.append(Disagreement(name, where, math.sqrt(square / part.sum()), square / total if total else 0.0))
+    rows.sort(key=lambda d: -d.share)
+    return tuple(rows[:_MOST])
+
+
+#: A factor between these is the one between a radius and a diameter.
+_TWICE = 1.75, 2.3
+
+
+def contradictions(observations: Observations, base: FloatArray) -> tuple[str, ...]:
+    """What static tests say of the bearing file without any search; `base` (n,)."""
+    names = np.array([e.observable for e in observations.elements])
+    said = []
+    polygon = names == "clearance_pushed"
+    if polygon.any():
+        measured, drawn = float(np.mean(observations.value[polygon])), float(np.mean(base[polygon]))
+        low, high = _TWICE
+        ratio = max(measured / drawn, drawn / measured)
+        if low <= ratio <= high:
+            said.append(
+                f"The clearance polygon measures {1e6 * measured:.0f} um where the bearing file leads to "
+                f"{1e6 * drawn:.0f} um, a factor of {ratio:.2f}: look whether the file gives a diameter for a radius."
+            )
+    loads = names == "load_ratio"
+    if loads.any() and abs(off := float(np.median(observations.value[loads] / base[loads])) - 1.0) > _LOADS:
+        said.append(f"The cells read {100 * (1 + off):.0f} % of the loads that were set.")
+    return tuple(said)
+
+
+#: Share by which cells and set loads may part before that is said.
+_LOADS = 0.05
+
+
+def _regions(observations: Observations, mine: BoolArray):  # type: ignore[no-untyped-def]
+    """Halves of the range of the coordinate that varies most among the elements, or single pads."""
+    elements = observations.elements
+    for coordinate, unit, factor in (("pad", "", 1.0), ("load", "N", 1.0), ("direction", "deg", 180 / math.pi)):
+        values = np.array([e.place(coordinate) for e in elements])
+        levels = sorted(set(values[mine & np.isfinite(values)]))
+        if len(levels) < 2:
+            continue
+        if coordinate == "pad":
+            yield from ((f"pad {int(k)}", mine & (values == k)) for k in levels)
+        else:
+            half = len(levels) // 2
+            for part in (levels[:half], levels[half:]):
+                low, high = part[0] * factor, part[-1] * factor
+                name = {"load": "static_load", "direction": "static_load_direction"}[coordinate]
+                yield f"{name} {low:.0f}-{high:.0f} {unit}", mine & np.isin(values, part)
+        return
+    yield "everywhere", mine

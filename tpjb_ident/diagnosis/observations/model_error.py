@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import coordinate
 from tpjb_ident.diagnosis.observations.observe import Element, Observations
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -18,30 +19,13 @@ from rigdata.arrays import FloatArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.compare.coefficient_table import read_coefficients
+from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.terms.mains import MAINS_CORRECTED, MAINS_ON_LINE
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
-
-    How much of it a campaign really needs is summed over (`comparison.evidence`).
-    """
-
-    stiffness: float = 0.015
-    position: float = 0.5e-6
-    temperature: float = 0.5
-    dry: float = 0.02
-    angle: float = 0.003
-    load: float = 0.003
-    idle_temperature: float = 1.0
-    load_miss: float = 0.003
-    direction_miss: float = 0.0035
 
 
 @dataclass(frozen=True)
@@ -304,3 +288,28 @@ def _largest_gap(angle: FloatArray) -> float:
     """Largest angle between neighbouring directions."""
     around = np.sort(np.mod(angle, 2 * math.pi))
     return float(np.diff(np.append(around, around[0] + 2 * math.pi)).max())
+
+
+def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
+    """Read a table of coefficients."""
+    tolerance = tolerance or Tolerance()
+    rows: list[tuple[Element, float, float, float]] = []
+    tests: dict[tuple[float, float, float], list[float]] = {}
+    for entry in read_coefficients(path, reading_error):
+        point = entry.point
+        static = (point.static_load, point.static_load_direction, point.spin)
+        tests.setdefault(static, []).append(point.excitation)
+        where = tuple(zip(("load", "direction", "speed", "excitation"), (*static, point.excitation), strict=True))
+        for part in "kc":
+            factor = point.excitation if part == "c" else 1.0
+            part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
+            direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
+            scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))
+            least = Deciding.axis * scale * (reading_error or 0.0)
+            for name, (value, error) in part_coefficients.items():
+                sigma = max(factor * error, least)
+                rows.append((Element("h", name, where), factor * value, sigma, tolerance.stiffness * scale))
+    dynamic = tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())
+    value, error, sigma = np.array([row[1:] for row in rows]).T
+    elements = tuple(row[0] for row in rows)
+    return Observations(Layout(dynamic), value, np.diag(error**2), sigma, elements)

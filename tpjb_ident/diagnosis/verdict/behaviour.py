@@ -13,9 +13,9 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.fit import Fit
-from tpjb_ident.diagnosis.deciding.constants import Deciding
+from tpjb_ident.diagnosis.comparison.problem import Fault
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 #: What a pad by itself may be off by: kind, effect and parameter that say it, unit.
 _PADS = {

@@ -10,21 +10,64 @@ import numpy as np
 from model.effects import kind_of
 from rigdata.arrays import FloatArray
 from tpjb_ident.compare.effect_words import Estimate
-from tpjb_ident.diagnosis.comparison.faults import Fault
 from tpjb_ident.diagnosis.comparison.fit import Fit
-from tpjb_ident.diagnosis.comparison.problem import Problem
+from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.search import Comparison
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.workers import Map
-from tpjb_ident.diagnosis.observations.gap import gap, gap_by_observable, noise_floor
+from tpjb_ident.diagnosis.observations.constants import Deciding
+from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
 from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
-from tpjb_ident.diagnosis.verdict.plausibility import plausible
-from tpjb_ident.diagnosis.verdict.remainder import localise
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
+
+#: Effect and parameter: what its source allows. What is not here is bounded by three typical sizes of the library,
+#: whose sources stand with the effects.
+_RANGES = {
+    ("oil_viscosity", "factor"): (
+        0.9,
+        1.1,
+        "ISO 3448 holds a grade within 10 %, the next one is 1.5 times as thick or thin",
+    ),
+    ("pivot_flexibility", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
+    ("soft_pivot", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
+    ("hot_oil_carryover", "fraction"): (0.0, 0.95, "groove mixing of 0.4 to 0.95 in flooded bearings"),
+    ("starvation", "arc_fraction"): (0.0, 0.4, "leading-edge starvation of 10 to 40 % at low flow"),
+    ("heat_loss", "share"): (0.0, 0.4, "pads, shaft and drained oil take 5 to 25 % of a film's heat"),
+    ("pad_bending", "compliance_factor"): (0.0, 2.5, "1 is as computed"),
+    ("housing_flexibility", "stiffness"): (1e8, math.inf, "rig housings have 1e9 to 5e9 N/m"),
+    ("structure_compliance", "stiffness"): (1e8, math.inf, "rig structures have 1e9 to 5e9 N/m"),
+    ("channel_delay", "delay"): (-5e-4, 5e-4, "demodulators and anti-alias filters take 20 to 500 us"),
+    ("fluid_inertia", "added_mass"): (0.0, 60.0, "K-C-M fits of tilting-pad bearings: 0 to 60 kg at 100 mm"),
+}
+
+
+def _stands_in(name: str, parameter: str, value: Estimate, pads: int) -> str:
+    """What to say of a size that lies wholly beyond what its source allows; empty where it does not."""
+    kind = kind_of(name)
+    described = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
+    if value.lo == value.hi:
+        return ""
+    if (name, parameter) in _RANGES:
+        low, high, source = _RANGES[(name, parameter)]
+    elif described is None or math.isnan(described.neutral) or math.isnan(described.typical):
+        return ""
+    else:
+        origin, reach = described.to_linear(described.neutral), Deciding.width * described.typical_step
+        ends = sorted(described.from_linear(origin + s * reach) for s in (-1.0, 1.0))
+        low, high = max(ends[0], described.low), min(ends[1], described.high)
+        source = f"three times a typical size; {kind.source}"
+    if value.lo <= high and value.hi >= low:
+        return ""
+    limit = high if value.value > high else low
+    return (
+        f"{name} {parameter} {value.value:.3g} is beyond {limit:.3g}, as far as its source goes ({source}): "
+        "another cause, or a second one, may stand behind this name"
+    )
+
 
 #: Explanations that are listed.
 _MOST_LISTED = 10
@@ -80,6 +123,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         drift=judgement.drift,
         assumptions=_assumptions(problem, model, settings),
         reasons=judgement.reasons,
+        beforehand=contradictions(observations, problem.base),
     )  # fmt: skip
     return Decision(verdict, model, after)
 
@@ -102,18 +146,10 @@ def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect,
             continue
         parameters = parameters_of(fit, index)
         change = float(np.linalg.norm(fit.point.jacobian[:, at] @ fit.point.theta[at]))
-        words = _stands_in(fault.name, parameters, pads)
+        said = (_stands_in(fault.name, key, value, pads) for key, value in parameters.items())
+        words = "; ".join(word for word in said if word)
         rows.append((change, FoundEffect(fault.name, parameters, words, round(shares[fault.name], 4))))
     return tuple(effect for _, effect in sorted(rows, key=lambda row: -row[0]))
-
-
-def _stands_in(name: str, parameters: dict[str, Estimate], pads: int) -> str:
-    words = []
-    for key, value in parameters.items():
-        limits = plausible(name, key, pads) if value.lo < value.hi else None
-        if limits is not None:
-            words.append(limits.words(f"{name} {key}", value.value, value.lo, value.hi))
-    return "; ".join(word for word in words if word)
 
 
 def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
@@ -149,7 +185,9 @@ def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSet
             typical = problem.sigma * (path.neutral_slope @ path.fault.width) / settings.width
             size = float(np.linalg.norm(np.linalg.solve(factor, typical)))
             sizes[path.fault.name] = max(sizes.get(path.fault.name, 0.0), size)
-    names = comparison.best.names
+    beyond = [d.name for d in comparison.best.tolerances if abs(d.significance) > settings.visible]
+    far = {n.effect.split()[0] for n in problem.nuisances if f"{n.name} {n.place}".strip() in beyond and n.effect}
+    names = comparison.best.names | far
     return tuple(sorted(name for name, size in sizes.items() if size < settings.visible and name not in names))
 
 
@@ -182,7 +220,7 @@ def _assumptions(problem: Problem, fit: Fit, settings: DiagnoseSettings) -> tupl
     out = []
     for name, values in fitted.items():
         sigma, unit = units[name]
-        source = tolerances[name].source if name in tolerances else settings.tolerances.cell_gain.source
+        source = tolerances[name].source if name in tolerances else "default"
         value = values if len(values) > 1 else values[0]
         out.append(Assumption(name, sigma, value, unit, source, farthest.get(name, 0.0)))
     stated = settings.tolerance.stiffness

@@ -48,11 +48,13 @@ class HeldOut:
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     """Solve a model with amplitudes from all other points, without its generic terms, every tolerance as stated."""
     theta = np.clip(_from_others(fit), fit.unknowns.low, fit.unknowns.high)
-    plain = [(f, theta[at]) for f, at in zip(fit.faults, fit.unknowns.slices, strict=True) if not f.is_term]
-    faults = tuple(fault for fault, _ in plain)
-    count = len(Unknowns(fit.problem, faults).tolerances)
-    amplitudes = np.concatenate([*(amplitude for _, amplitude in plain), np.zeros(count)])
-    (predicted,) = tuple(run(prediction, [(faults, amplitudes)]))
+    faults = tuple(fault for fault in fit.faults if not fault.is_term)
+    unknowns = Unknowns(fit.problem, faults)
+    alone = np.zeros(len(unknowns.width))
+    for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
+        if not fault.is_term:
+            alone[unknowns.slices[faults.index(fault)]] = theta[at]
+    (predicted,) = tuple(run(prediction, [(faults, alone)]))
     return HeldOut(fit, None if predicted is None else predicted * fit.problem.sigma)
 
 

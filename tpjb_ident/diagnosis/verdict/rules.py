@@ -48,7 +48,7 @@ def _of_model(comparison: Comparison, model: Fit, held: HeldOut, settings: Diagn
     sure = _sure(comparison, settings)
     if model.posterior.scale > settings.right:
         reason = (
-            f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.1f} times the "
+            f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
             f"stated one; right ones need {settings.right:g} at the most"
         )
         return Judgement("unexplained", held, (reason,))
@@ -65,7 +65,7 @@ def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
-        f"something is the matter (a model error of {nothing.posterior.scale:.1f} times the stated one), and no effect "
+        f"something is the matter (a model error of {nothing.posterior.scale:.2f} times the stated one), and no effect "
         "of the library explains it"
     )
     return Judgement("unexplained", held, (reason,))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from model.effects import Effect, kind_of
 from tpjb_ident.compare.effect_words import Estimate
+from tpjb_ident.diagnosis.observations.gap import Disagreement
 from tpjb_ident.diagnosis.verdict.behaviour import Behaviour, Drift
 from tpjb_ident.presentation import json_data
 
@@ -53,16 +54,6 @@ class RankedCandidate:
 
 
 @dataclass(frozen=True)
-class Disagreement:
-    """Where measurement and baseline part."""
-
-    observable: str
-    where: str
-    size_sigma: float
-    share: float
-
-
-@dataclass(frozen=True)
 class Remainder:
     """What is left on unseen points."""
 
@@ -82,6 +73,11 @@ class Assumption:
     unit: str
     source: str
     deviation: float = 0.0  #: standard deviations by which its farthest number is out
+
+    @property
+    def values(self) -> list[float]:
+        """What was fitted, place by place."""
+        return self.fitted if isinstance(self.fitted, list) else [self.fitted]
 
 
 @dataclass(frozen=True)
@@ -113,6 +109,7 @@ class Verdict:
     drift: tuple[Drift, ...] = ()
     assumptions: tuple[Assumption, ...] = ()
     reasons: tuple[str, ...] = ()
+    beforehand: tuple[str, ...] = ()  #: what measurements contradict in the bearing file, before any search
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, in the order of the contract."""
@@ -132,6 +129,7 @@ class Verdict:
             "assumptions": [vars(a) for a in self.assumptions],
             "gap": self.gap,
             "reasons": list(self.reasons),
+            "beforehand": list(self.beforehand),
         }
 
     def to_json(self) -> str:

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.dynamic.broadband.responses import end_columns, place_in_line
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
 
 #: Highest power of frequency, over the bins of a line.
 _ORDER = 2
@@ -48,7 +50,7 @@ def classic_line(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> C
     h1 = (inverse @ flat_F).T
     remaining = flat_F - flat_D @ h1.T
     noise = remaining.T @ remaining.conj() / freedom
-    covariance = real_covariance(np.kron(noise, inverse @ inverse.conj().T))
+    covariance = complex_to_real_covariance(np.kron(noise, inverse @ inverse.conj().T))
     power = np.sum(np.abs(flat_F) ** 2, axis=0) / max(n - basis.shape[1], 1)
     coherence = np.clip(1 - np.diag(noise).real / power, 0.0, 1.0)
     signal = np.linalg.svd(np.concatenate([flat_D, flat_F], axis=1) / scale, full_matrices=False)[2][:2] * scale
@@ -73,17 +75,6 @@ def _rows(
     F = np.concatenate([s.F[:, bins].reshape(-1, 2) for s in spectra])
     if spectra[0].period is not None:
         return D, F, np.zeros((len(D), 0), complex), np.zeros(len(D))
-    place = spectra[0].frequencies[bins] - spectra[0].frequencies[bins].mean()
-    place = place / max(float(np.abs(place).max()), 1e-300)
-    runs = len(spectra) if ends else 0
-    columns = np.zeros((runs, len(spectra), len(bins), _ORDER + 1), complex)
-    for r in range(runs):
-        columns[r, r] = place[:, None] ** np.arange(_ORDER + 1)
-    rows = columns.transpose(1, 2, 0, 3).reshape(len(D), -1)
-    return D, F, rows, np.tile(place, len(spectra))
-
-
-def real_covariance(gamma: ComplexArray) -> FloatArray:
-    """Covariance of real and imaginary parts, (2 m, 2 m), of circular complex errors (m, m)."""
-    half = 0.5 * gamma
-    return np.block([[half.real, -half.imag], [half.imag, half.real]])
+    place = place_in_line(spectra[0].frequencies[bins])
+    columns = end_columns(len(spectra), place, _ORDER)[:, : None if ends else 0]
+    return D, F, columns, np.tile(place, len(spectra))

@@ -14,8 +14,9 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.vector import inverse_directions
-from tpjb_ident.dynamic.broadband.disturbing_lines import Disturbance, bins_taken
+from tpjb_ident.dynamic.broadband.disturbing_lines import bins_taken
 from tpjb_ident.dynamic.broadband.samples import Samples, interpolated
+from tpjb_ident.phasors.lines import Line
 
 #: Pieces of a record,
 _PIECES = 8
@@ -68,15 +69,13 @@ def with_one_clock(samples: Samples, clocks: dict[str, ClockRate]) -> Samples:
     return replace(samples, rows=rows)
 
 
-def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> dict[str, ClockRate]:
+def clock_rates(samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> dict[str, ClockRate]:
     """Rates of the clocks of force and acceleration against the probes', as one run shows them."""
     present = [q for q in ("force", "acceleration") if samples.places(q)]
     return {q: _clock_rate(samples, q, band, lines) for q in present}
 
 
-def _clock_rate(
-    samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Disturbance, ...]
-) -> ClockRate:
+def _clock_rate(samples: Samples, quantity: str, band: tuple[float, float], lines: tuple[Line, ...]) -> ClockRate:
     """Rate of a quantity's clock against the probes'."""
     length = samples.length // _PIECES
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / samples.rate), dtype=float)

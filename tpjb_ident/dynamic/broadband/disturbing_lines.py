@@ -6,49 +6,36 @@ or creeps, is taken along. A periodic excitation is fitted together with them, p
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples
+from tpjb_ident.phasors.found_lines import vertex
+from tpjb_ident.phasors.lines import MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
 
 #: Highest harmonics of shaft and mains that are looked for.
 _SHAFT_HARMONICS, _MAINS_HARMONICS = 8, 5
 #: Highest power of time in a line's amplitude.
 _CREEP = 3
-#: How far shaft (per harmonic) and mains may be from where they are expected [Hz].
-_SHAFT_WANDER, _MAINS_WANDER = 0.08, 0.15
 #: Bins next to a line that are left out, in whole-record bins.
 LEFT_OUT = 4.0
 #: The same of a period, in its own bins: lines between its bins are told from it by all its repeats.
 LEFT_OUT_OF_PERIOD = 0.6
 
 
-@dataclass(frozen=True)
-class Disturbance:
-    """One line."""
-
-    name: str
-    frequency: float
-    order: int = 0
-
-
-def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Disturbance, ...]:
+def find_disturbances(samples: Samples, speed: float, mains: float, top: float) -> tuple[Line, ...]:
     """Shaft harmonics and mains up to above the band, at the frequencies at which the record shows them."""
     reach = min(0.45 * samples.rate, 1.5 * top)
-    candidates = []
-    if speed > 0:
-        shaft = _shown(samples, speed, _SHAFT_WANDER)
-        turns = _SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
-        candidates += [Disturbance(f"{k}X", k * shaft, k) for k in range(1, turns + 1) if k * shaft < reach]
-    if mains > 0:
-        shaft = _shown(samples, mains, _MAINS_WANDER)
-        names = ["mains", *(f"mains {k}" for k in range(2, _MAINS_HARMONICS + 1))]
-        candidates += [Disturbance(name, k * shaft) for k, name in enumerate(names, 1) if k * shaft < reach]
-    resolved: list[Disturbance] = []
-    for line in candidates:
-        if all(abs(line.frequency - other.frequency) > samples.rate / samples.length for other in resolved):
+    shaft = _shown(samples, speed, SPEED_DRIFT) if speed > 0 else 0.0
+    supply = _shown(samples, mains, MAINS_DRIFT) if mains > 0 else 0.0
+    harmonics = _SHAFT_HARMONICS if samples.length / samples.rate * speed > 2 else 0
+    settings = LineSettings(supply, harmonics, mains_harmonics=_MAINS_HARMONICS)
+    resolved: list[Line] = []
+    for line in strong_lines((), shaft, settings):
+        apart = all(abs(line.frequency - other.frequency) > samples.rate / samples.length for other in resolved)
+        if line.frequency < reach and apart:
             resolved.append(line)
     return tuple(resolved)
 
@@ -70,11 +57,10 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
     k = int(np.argmax(power))
     if not 0 < k < len(grid) - 1 or power[k] < 20.0:
         return nominal
-    a, b, c = np.log(power[k - 1 : k + 2])
-    return float(grid[k] + step * 0.5 * (a - c) / (a - 2 * b + c))
+    return float(grid[k] + step * vertex(power[k - 1 : k + 2]))
 
 
-def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], period: int | None = None) -> Samples:
+def without_disturbances(samples: Samples, lines: tuple[Line, ...], period: int | None = None) -> Samples:
     """The record without the lines and without its mean."""
     stack = samples.rows - samples.rows.mean(axis=1, keepdims=True)
     if not lines:
@@ -93,7 +79,7 @@ def without_disturbances(samples: Samples, lines: tuple[Disturbance, ...], perio
     return replace(samples, rows=cleaned)
 
 
-def _columns(samples: Samples, lines: tuple[Disturbance, ...]) -> FloatArray:
+def _columns(samples: Samples, lines: tuple[Line, ...]) -> FloatArray:
     """Cosine and sine of every line times powers of time, (n_columns, n)."""
     n = samples.length
     t = np.arange(n) / samples.rate
@@ -112,12 +98,9 @@ def _without_periodic(rows: FloatArray, period: int) -> FloatArray:
     return np.asarray((folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1))
 
 
-def bins_taken(
-    frequencies: FloatArray, lines: tuple[Disturbance, ...], seconds: float, width: float = LEFT_OUT
-) -> BoolArray:
+def bins_taken(frequencies: FloatArray, lines: tuple[Line, ...], seconds: float, width: float = LEFT_OUT) -> BoolArray:
     """Bins that a line may have spoiled, (n,)."""
     disturbed = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
-        wander = _SHAFT_WANDER * line.order if line.order else _MAINS_WANDER
-        disturbed |= np.abs(frequencies - line.frequency) <= max(width / seconds, wander)
+        disturbed |= np.abs(frequencies - line.frequency) <= max(width / seconds, line.wander)
     return disturbed

@@ -34,11 +34,6 @@ def find_period(samples: Samples, band: tuple[float, float], disturbed: BoolArra
     return period
 
 
-def _signals(samples: Samples) -> FloatArray:
-    """What tells the period, (k, n)."""
-    return np.concatenate(samples.signals())
-
-
 def _inside(samples: Samples, band: tuple[float, float]) -> BoolArray:
     frequency = np.fft.rfftfreq(samples.length, 1 / samples.rate)
     return np.asarray((frequency >= band[0]) & (frequency <= band[1]))
@@ -48,7 +43,7 @@ def _correlation(samples: Samples, band: tuple[float, float], disturbed: BoolArr
     """Correlation of the band-limited signals with themselves over the lag in samples, 1 where all repeats."""
     n = samples.length
     keep = _inside(samples, band) & ~disturbed
-    limited = np.fft.irfft(np.where(keep, np.fft.rfft(_signals(samples), axis=1), 0.0), n, axis=1)
+    limited = np.fft.irfft(np.where(keep, np.fft.rfft(samples.signals(), axis=1), 0.0), n, axis=1)
     padded = np.fft.rfft(limited, 2 * n, axis=1)
     correlation = np.fft.irfft(np.sum(np.abs(padded) ** 2, axis=0))[:n]
     energy = np.cumsum(np.sum(limited**2, axis=0))
@@ -86,7 +81,7 @@ def _sharpened(samples: Samples, samples_each: int, band: tuple[float, float]) -
 
 
 def _periods(samples: Samples, whole: int, band: tuple[float, float]) -> tuple[ComplexArray, FloatArray]:
-    rows = _signals(samples)
+    rows = samples.signals()
     count = rows.shape[1] // whole
     folded = rows[:, : count * whole].reshape(len(rows), count, whole)
     frequency = np.fft.rfftfreq(whole, 1 / samples.rate)

@@ -53,16 +53,22 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
         remaining = rows - mean
         return LineResponse(mean[None], float(len(rows)), _outer(remaining), float(len(rows) - 1))
     u = np.concatenate([_source(run, instrument)[:, bins] for run in runs])
-    frequencies = runs[0].frequencies[bins]
-    place = frequencies - frequencies.mean()
-    place = place / max(float(np.abs(place).max()), 1e-300)
-    nuisance = [u * place[None, :, None]]
-    for r in range(len(runs) if ends else 0):
-        own = np.zeros((len(runs), len(bins), 2), complex)
-        own[r, :, 0], own[r, :, 1] = 1.0, place
-        nuisance.append(own)
-    columns = np.concatenate([part.reshape(len(runs) * len(bins), -1) for part in nuisance], axis=1)
+    place = place_in_line(runs[0].frequencies[bins])
+    sloped = (u * place[None, :, None]).reshape(-1, u.shape[2])
+    columns = np.concatenate([sloped, end_columns(len(runs), place, 1)[:, : None if ends else 0]], axis=1)
     return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), columns)
+
+
+def place_in_line(frequencies: FloatArray) -> FloatArray:
+    """Places (n,) of a line's bins about their mean, 1 at the farthest."""
+    place = frequencies - frequencies.mean()
+    return np.asarray(place / max(float(np.abs(place).max()), 1e-300))
+
+
+def end_columns(runs: int, place: FloatArray, order: int) -> ComplexArray:
+    """What the ends of each run's record leak into its bins: powers of their place, (runs n, runs (order + 1))."""
+    powers = np.vander(place, order + 1, increasing=True)
+    return np.asarray(np.kron(np.eye(runs), powers), dtype=complex)
 
 
 def _source(spectra: RunSpectra, instrument: str) -> ComplexArray:

@@ -8,14 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.clock_rate import ClockRate, clock_rates, vector_rows, with_one_clock
 from tpjb_ident.dynamic.broadband.disturbing_lines import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
-    Disturbance,
     bins_taken,
     find_disturbances,
     without_disturbances,
@@ -25,7 +24,7 @@ from tpjb_ident.dynamic.broadband.samples import Samples, read_samples
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures
 from tpjb_ident.phasors.compensation import compensated, inspect_readings
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors, oil_force
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")
@@ -45,7 +44,7 @@ class RunSpectra:
     phasors: RunPhasors  #: channel by channel
     command: ComplexArray | None  #: (n_windows, n_bins, 2) complex
     taken: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
-    disturbances: tuple[Disturbance, ...]
+    disturbances: tuple[Line, ...]
     period: float | None
     mean_load: FloatArray  #: (2,), N
     position: FloatArray  #: (2,), m
@@ -68,8 +67,7 @@ class RunSpectra:
     @cached_property
     def F(self) -> ComplexArray:
         """Oil force by the accelerometers where there are any, (n_windows, n_bins, 2) [N]."""
-        a = None if self.phasors.acceleration is None else self.phasors.acceleration.phasors
-        return oil_force(self.phasors.cell_force.phasors, a, self.phasors.housing_mass)
+        return self.phasors.oil_force(slice(None))
 
     @property
     def amplitude(self) -> float:
@@ -104,7 +102,7 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:
         text = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
-        raise _error(run, "excitation_band", text, "Sample faster, or excite lower frequencies")
+        raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
     means = {q: vector_rows(samples, q).mean(axis=1) for q in ("force", "displacement")}
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
     samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
@@ -151,18 +149,15 @@ def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
     return (Condition("clocks-differ", f"against the probes' clock: {told}; put right from the start of each record"),)
 
 
-def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", run.file, place, what, cure, run.id))
-
-
-def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Disturbance, ...]) -> float | None:
+def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
     if run.excitation_kind not in _MAY_REPEAT:
         return None
     frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
     period = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
     if period is None and run.excitation_kind == "multisine":
         text = "a multi-sine, but no period is found that the record holds three times"
-        raise _error(run, "excitation", text, 'Record longer; or state excitation = "random" if it does not repeat')
+        cure = 'Record longer; or state excitation = "random" if it does not repeat'
+        raise refuse(run.file, "excitation", text, cure, run.id)
     return period
 
 

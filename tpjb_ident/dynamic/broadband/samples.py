@@ -9,11 +9,12 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import COLLINEAR_SINE
+from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
+from tpjb_ident.phasors.run_data import QUANTITIES
 
 #: Share of a channel's samples that may be missing and bridged by straight lines,
 _MAX_LOST = 0.01
@@ -47,8 +48,8 @@ class Samples:
         """Rows of a quantity's channels."""
         return [j for j, channel in enumerate(self.channels) if channel.quantity == quantity]
 
-    def signals(self) -> tuple[FloatArray, ...]:
-        """Rows about their means by quantity, each of unit power in all: an idle channel weighs nothing beside others.
+    def signals(self) -> FloatArray:
+        """Rows (k, n) about their means, each quantity of unit power: an idle channel weighs nothing beside others.
 
         The command comes alone where there is one: what was meant to move the shaft tells the period best.
         """
@@ -57,7 +58,7 @@ class Samples:
             groups = [self.command]
         centred = [rows - rows.mean(axis=1, keepdims=True) for rows in groups]
         sizes = [float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0 for rows in centred]
-        return tuple(rows / size for rows, size in zip(centred, sizes) if size > 0)
+        return np.concatenate([rows / size for rows, size in zip(centred, sizes) if size > 0])
 
     def each(self, rate: float, change: Callable[[FloatArray], FloatArray]) -> Samples:
         """The record on another grid; `change` takes rows (k, n)."""
@@ -74,24 +75,21 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     """Read a run from its beginning."""
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
-    readers = _alike(run, device_readers(run))
+    readers = device_readers(run)
+    _refuse_unlike(run, readers)
     parts = [reader.read(0, n) for reader in readers]
     if parts[0].time is not None:
         _even(run, parts[0].time, rate)
-    table: dict[str, tuple[Channel, FloatArray]] = {}
-    for reader, part in zip(readers, parts):
-        table |= {channel.name: (channel, row) for channel, row in zip(reader.channels, part.rows)}
-    order = [name for reader in readers for name in (c.name for c in reader.channels)]
-    order.sort(key=lambda name: _ORDER.index(table[name][0].quantity))
+    recorded = [pair for reader, part in zip(readers, parts) for pair in zip(reader.channels, part.rows)]
+    recorded.sort(key=lambda pair: QUANTITIES.index(pair[0].quantity))
     channels, rows, lost = [], [], 0.0
-    for name in order:
-        channel, values = table[name]
+    for channel, values in recorded:
         missing = float((~np.isfinite(values)).mean())
-        if missing > _MAX_LOST and _spare(channel, [c for c, _ in table.values()]):
+        if missing > _MAX_LOST and is_spare(channel, [c for c, _ in recorded]):
             continue
-        bridged, share = _bridged(run, f"channel {name}", values[None])
+        bridged, share = _bridged(run, channel, values)
         channels.append(channel)
-        rows.append(bridged[0])
+        rows.append(bridged)
         lost = max(lost, share)
     conditions = (
         (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > _TOLD_LOST else ()
@@ -99,28 +97,14 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
     return Samples(rate, tuple(channels), np.array(rows), _command(run, n), _angle(run, n, rate), conditions)
 
 
-_ORDER = ("displacement", "force", "acceleration")
-
-
-def _alike(run: Run, readers: tuple[DeviceReader, ...]) -> tuple[DeviceReader, ...]:
-    """Devices of one rate and length: over a band, all channels share a transform."""
+def _refuse_unlike(run: Run, readers: tuple[DeviceReader, ...]) -> None:
+    """Refuse devices of several rates or lengths: over a band, all channels share a transform."""
     first = readers[0]
     for reader in readers[1:]:
         if reader.length != first.length or abs(reader.rate / first.rate - 1) > 1e-3:
             listed = f"{first.rate:.6g} Hz and {reader.rate:.6g} Hz"
             text = f"are sampled at {listed}; over a band all channels need one rate"
-            raise _error(run, "channels", text, "Record them at one rate, or excite by sines")
-    return readers
-
-
-def _spare(channel: Channel, channels: list[Channel]) -> bool:
-    """Whether the other channels of its quantity still span the plane."""
-    axes = [float(c.axis or 0.0) for c in channels if c.quantity == channel.quantity and c.name != channel.name]
-    return bool(axes) and bool(np.max(np.abs(np.sin(np.array(axes) - axes[0]))) > COLLINEAR_SINE)
-
-
-def _error(run: Run, place: str, what: str, cure: str) -> RigDataError:
-    return RigDataError(Problem("error", run.file, place, what, cure, run.id))
+            raise refuse(run.file, "channels", text, "Record them at one rate, or excite by sines", run.id)
 
 
 def _even(run: Run, time: FloatArray, rate: float) -> None:
@@ -132,7 +116,7 @@ def _even(run: Run, time: FloatArray, rate: float) -> None:
     drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
     if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[finite]):
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
-        raise _error(run, "time", text, "Resample the record, or export it without gaps")
+        raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
 
 
 def _rounding(time: FloatArray) -> float:
@@ -145,19 +129,17 @@ def _rounding(time: FloatArray) -> float:
     return 0.0
 
 
-def _bridged(run: Run, place: str, rows: FloatArray) -> tuple[FloatArray, float]:
-    """Rows with what is missing bridged by straight lines, and the share that was missing."""
-    missing = ~np.isfinite(rows)
-    if not missing.any():
-        return rows, 0.0
-    share = float(missing.mean(axis=1).max())
+def _bridged(run: Run, channel: Channel, values: FloatArray) -> tuple[FloatArray, float]:
+    """A channel (n,) with what is missing bridged by straight lines, and the share that was missing."""
+    missing = ~np.isfinite(values)
+    share = float(missing.mean())
     if share > _MAX_LOST:
-        raise _error(run, place, f"{share:.1%} of its samples are missing", "Repeat the run")
-    out = rows.copy()
-    at = np.arange(rows.shape[1])
-    for row, gap in zip(out, missing):
-        row[gap] = np.interp(at[gap], at[~gap], row[~gap])
-    return out, share
+        text = f"{share:.1%} of its samples are missing"
+        raise refuse(run.file, f"channel {channel.name}", text, "Repeat the run", run.id)
+    if not share:
+        return values, 0.0
+    at = np.arange(len(values))
+    return np.interp(at, at[~missing], values[~missing]), share
 
 
 def _command(run: Run, n: int) -> FloatArray | None:
@@ -167,11 +149,11 @@ def _command(run: Run, n: int) -> FloatArray | None:
         return None
     total = np.zeros((2, n))
     for channel in channels:
-        values, _ = _bridged(run, f"channel {channel.name}", run.record(channel.name, 0, n).values[None])
+        values, _ = _bridged(run, channel, np.asarray(run.record(channel.name, 0, n).values))
         angle = float(channel.axis or 0.0)
         if len(channels) == 1 and run.excitation_direction is not None:
             angle = run.excitation_direction
-        total += np.outer([np.cos(angle), np.sin(angle)], values[0] - values[0].mean())
+        total += np.outer([np.cos(angle), np.sin(angle)], values - values.mean())
     return total if np.abs(total).max() > 0 else None
 
 

@@ -39,8 +39,6 @@ class LoadMiss:
 
     size: FloatArray  #: (n_runs,)
     sideways: FloatArray  #: (n_runs,), rad: the same across it
-    uncertainty: float = 0.0
-    turn_uncertainty: float = 0.0
 
 
 class LoadCase(Protocol):
@@ -79,30 +77,21 @@ def campaign_zero(points: Sequence[LoadCase], stated: float = 0.0) -> CellZero:
 def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
-    The ratio is the mean over the runs without outliers; what it is uncertain by, all misses are. Cells that show
-    no static force have no ratio: it is zero then.
+    The ratio is the mean over the runs without outliers. Cells that show no static force have none: it is zero then.
     """
     ratios = [load_ratio(data, zero) for data in points]
-    finite_ratios = np.concatenate(ratios)
-    finite_ratios = finite_ratios[np.isfinite(finite_ratios)]
-    middle = (
-        complex(np.median(finite_ratios.real), np.median(finite_ratios.imag)) if len(finite_ratios) else complex(1.0)
-    )
-    if without_static_part(finite_ratios):
-        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], 0j
-    if not len(finite_ratios) or not 0.5 < abs(middle.real) < 2.0:
-        # nothing to correct by such cells, but the ratio itself must be told
-        return [LoadMiss(np.zeros(len(r)), np.zeros(len(r)), 0.0) for r in ratios], middle
-    distance = np.abs(finite_ratios - middle)
-    inner = finite_ratios[distance <= 4 * np.median(distance) + 1e-12]
-    common = complex(inner.mean())
-    spread = (inner / common - 1.0) / np.sqrt(max(len(inner) * (len(inner) - 1), 1))
-    known_to = float(np.linalg.norm(spread.real)), float(np.linalg.norm(spread.imag))
-    misses = []
-    for ratio in ratios:
-        relative = np.nan_to_num(ratio / common - 1.0)
-        misses.append(LoadMiss(relative.real, relative.imag, *known_to))
-    return misses, common
+    known = np.concatenate(ratios)
+    known = known[np.isfinite(known)]
+    middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    none = [LoadMiss(np.zeros(len(r)), np.zeros(len(r))) for r in ratios]
+    if without_static_part(known):
+        return none, 0j
+    if not len(known) or not 0.5 < abs(middle.real) < 2.0:
+        return none, middle  # nothing to correct by such cells, but the ratio itself must be told
+    distance = np.abs(known - middle)
+    common = complex(known[distance <= 4 * np.median(distance) + 1e-12].mean())
+    relative = [np.nan_to_num(ratio / common - 1.0) for ratio in ratios]
+    return [LoadMiss(r.real, r.imag) for r in relative], common
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:

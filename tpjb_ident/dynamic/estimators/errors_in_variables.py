@@ -132,14 +132,14 @@ def eiv_fit(repeats: Repeats, directions_differ: bool = False) -> EivFit:
     repeat = bread @ meat @ bread.conj().T
     shares = VarianceByDirection(score, parts, repeat, 2 * repeats.spare, pooled)
     covariance, dof = spread_of(shares, chi_square, directions_differ)
-    return EivFit(h, covariance, dof, chi_square, _attenuation(means, noise))
+    return EivFit(h, covariance, dof, chi_square, attenuation(means.D, means.count, noise[:2, :2]))
 
 
-def _attenuation(means: DirectionMeans, noise: ComplexArray) -> FloatArray:
-    """Noise power over total power of the displacements along their principal directions."""
-    signal = (means.count[:, None] * means.D).T @ means.D.conj() / means.count.sum()
-    total = signal + noise[:2, :2] * (1 - len(means) / means.count.sum())
-    return np.sort(np.linalg.eigvals(np.linalg.solve(total, noise[:2, :2])).real)[::-1]
+def attenuation(D: ComplexArray, count: FloatArray, noise: ComplexArray) -> FloatArray:
+    """Noise power over total power of the displacements D (g, 2) along their principal directions, larger first."""
+    total = count.sum()
+    power = (count[:, None] * D).T @ D.conj() / total + noise * (1 - len(D) / total)
+    return np.sort(np.linalg.eigvals(np.linalg.solve(power, noise)).real)[::-1]
 
 
 def _closed_form(means: DirectionMeans, noise: ComplexArray) -> ComplexArray:

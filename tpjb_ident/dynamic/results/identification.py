@@ -40,7 +40,7 @@ class Identification(Presented):
     points : tuple of PointResult
         Sorted by load, direction, speed, excitation.
     calibration_changes : (n, 8 P) ndarray
-        What n draws of the calibration do to the entries of all P points, in their order [N/m].
+        What n sources that the points share do to the entries of all P points, in their order [N/m].
     conditions : tuple of Condition
         About the campaign as a whole.
     bands : tuple of BandResult
@@ -65,8 +65,12 @@ class Identification(Presented):
 
     @property
     def systematic(self) -> FloatArray:
-        """Calibration covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
-        return np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
+        """Systematic covariance over all P points, (8 P, 8 P) [N^2/m^2]; made when asked for: it grows with P^2."""
+        joint = np.asarray(self.calibration_changes.T @ self.calibration_changes / len(self.calibration_changes))
+        for p, point in enumerate(self.points):
+            if point.stiffness.systematic is not None:  # what no point shares stands with its own alone
+                joint[8 * p : 8 * p + 8, 8 * p : 8 * p + 8] = point.stiffness.systematic
+        return joint
 
     def summary(self) -> str:
         """Direct coefficients of every point with half their 95 % intervals, and its flags."""

@@ -14,14 +14,12 @@ from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.results.point_result import PointResult, WindowVerdict, by_static_point
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.terms.housing import HARMLESS
+from tpjb_ident.terms.housing import HARMLESS, SOFT
 
 #: Share of the windows without phasors beyond which what is left may not stand for the record.
 _MAX_LOST = 0.6
 #: Share of the force that H leaves in the runs' means beyond which they have no H in common.
 _MAX_DISAGREEMENT = 0.06
-#: Stiffness of cells that are as soft as any [N/m].
-_SOFT = 3e8
 #: What a few runs show of a force of random phase may be so many times its size.
 _KNOWN_SCATTERS = 1.5
 #: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
@@ -105,7 +103,7 @@ def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tup
 
 def _inertia_left(mass: float, omega: float) -> Condition:
     """What the housing's inertia may come to where nothing measures it: on soft cells."""
-    share = mass * omega**2 / _SOFT
+    share = mass * omega**2 * SOFT * 1e-9
     text = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
     return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", text)
 

@@ -43,32 +43,25 @@ def all_runs(
     workers: Workers | None = None,
     store: RunStore | None = None,
 ) -> FinishedRuns:
-    """Phasors and temperatures of every dynamic run, put away kept that the caller closes.
-
-    A run that cannot be used is left out, and `FinishedRuns` names it.
-    """
+    """Phasors and temperatures of every dynamic run; one that cannot be used is left out and named."""
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
     finished_runs = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
     jobs = [(_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs]
     outcomes = (workers or Workers()).outcomes(process_run, jobs)
-    try:
-        for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
-            mark, result = outcome.get()
-            if isinstance(result, ExcludedRun):
-                finished_runs.leave_out(index, result)
-            else:
-                if store is not None and result is not None and mark:
-                    store.keep(mark, result)
-                finished_runs.put(index, result, mark)
-            progress(runs[index].id, done, len(runs))
-        finished_runs.leave_out_dead_accelerometers()
-        if runs and not finished_runs.places:
-            raise finished_runs.left_out[0].error
-    except BaseException:
-        finished_runs.close()
-        raise
+    for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
+        mark, result = outcome.get()
+        if isinstance(result, ExcludedRun):
+            finished_runs.leave_out(index, result)
+        else:
+            if store is not None and result is not None and mark:
+                store.keep(mark, result)
+            finished_runs.put(index, result, mark)
+        progress(runs[index].id, done, len(runs))
+    finished_runs.leave_out_dead_accelerometers()
+    if runs and not finished_runs.places:
+        raise finished_runs.left_out[0].error
     return finished_runs
 
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from rigdata.operating_point import ROTATIONS
 from tpjb_ident.compare.comparison import Comparison, comparison_frame
 from tpjb_ident.diagnosis.observations.gap import residuals
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, coefficient_column
+from tpjb_ident.report.drawing.series import COEFFICIENTS
+from tpjb_ident.schema import POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     from tpjb_ident.diagnosis.diagnose import Diagnosis
 
-#: Names of the eight coefficients of a residual: kxx to cyy.
-COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
-
-_COLUMNS = ("model", "entry", "static_load_N", "excitation_Hz", "z")
+_COLUMNS = ("model", "entry", *POINT_KEY, "z")
 
 _TWO_SIDED_95 = 1.959964
 
@@ -28,7 +28,7 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
     A table of comparison.csv does as well as a `Comparison` or a `Diagnosis`.
     """
     if isinstance(source, pd.DataFrame):
-        return source if set(_COLUMNS) <= set(source.columns) else _of_comparison(source)
+        return source if {"model", "entry", "z"} <= set(source.columns) else _of_comparison(source)
     if isinstance(source, Comparison):
         return _of_comparison(comparison_frame(source))
     return _of_diagnosis(source)
@@ -42,8 +42,10 @@ def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
         z = residuals(diagnosis.observations, prediction)
         for element, value in zip(diagnosis.observations.elements, z, strict=True):
             if element.family == "h":
-                frequency = element.place("excitation") / (2 * np.pi)
-                rows.append((model, element.observable, element.place("load"), round(frequency, 6), float(value)))
+                direction = round(math.degrees(element.place("direction")), 6)
+                speed, excitation = (round(element.place(name) / (2 * np.pi), 6) for name in ("speed", "excitation"))
+                point = (element.place("load"), direction, abs(speed), excitation, ROTATIONS[speed < 0.0])
+                rows.append((model, element.observable, *point, float(value)))
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
@@ -52,15 +54,7 @@ def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
     for entry in COEFFICIENTS:
         key = coefficient_column(entry)
         sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * _TWO_SIDED_95)
-        frames.append(
-            pd.DataFrame(
-                {
-                    "model": table["pivots"],
-                    "entry": entry,
-                    "static_load_N": table["static_load_N"],
-                    "excitation_Hz": table["excitation_Hz"],
-                    "z": (table[key] - table[f"{key}_predicted"]) / sigma,
-                }
-            )
-        )
+        place = table[[name for name in POINT_KEY if name in table]]
+        residual = (table[key] - table[f"{key}_predicted"]) / sigma
+        frames.append(place.assign(model=table["pivots"], entry=entry, z=residual))
     return pd.concat(frames, ignore_index=True)

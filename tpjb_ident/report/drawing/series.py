@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
-from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.schema import STATIC_KEY
+from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
+from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
@@ -24,6 +26,9 @@ _AXES = {
 }
 #: Points from which on a line joins them; between fewer nobody knows what it would do.
 CURVE = 5
+#: Height of a further line of ticks [inches].
+_LINE = 0.16
+COEFFICIENTS = tuple(column[:3] for column in COEFFICIENT_COLUMNS)
 DIRECT = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
 
@@ -62,6 +67,34 @@ def constant_along(series: pd.DataFrame, axis: str) -> str:
 def point_label(p: PointResult) -> str:
     """Load and excitation of a point, in words."""
     return place_of(p.point.static_load, p.point.excitation_hz)
+
+
+def points_table(points: Sequence[PointResult]) -> pd.DataFrame:
+    """Set points of results, by the columns of every table."""
+    return pd.DataFrame([p.point.key for p in points], columns=list(POINT_KEY))
+
+
+def point_labels(table: pd.DataFrame) -> list[str]:
+    """Load and excitation of every row, in words, and what else tells the rows apart."""
+    return [", ".join([place_of(load, excitation), *others]) for load, excitation, others in _set_points(table)]
+
+
+def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
+    """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
+    lines = [[f"{load * per('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
+    axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=FONT_SIZE - 1.0)
+    shrink(axes, bottom=0.09 + _LINE * (len(lines[0]) - 1 if lines else 0))
+
+
+def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
+    """Load, excitation and, in words, what of these differs between rows: direction of the load, speed and sense."""
+    forms = {"static_load_direction_deg": "{:g}°", "shaft_speed_Hz": "shaft {:g} Hz", "rotation": "{}"}
+    varied = [name for name in forms if name in table and len(table[name].drop_duplicates()) > 1]
+    short = table.replace({"rotation": dict(zip(ROTATIONS, ("ccw", "cw"), strict=True))}) if varied else table
+    return [
+        (row["static_load_N"], row["excitation_Hz"], [forms[name].format(row[name]) for name in varied])
+        for row in short.to_dict("records")
+    ]
 
 
 def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import INK, LIGHT, VARIANT_LABEL, Style, style_of_variant
 from tpjb_ident.report.drawing.picture import add_legend, from_zero, label, new_pictures
-from tpjb_ident.report.drawing.series import CURVE, DIRECT, axis_of, longest_series, with_errors
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, coefficient_column
+from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, DIRECT, axis_of, longest_series, with_errors
+from tpjb_ident.schema import KINDS, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +30,7 @@ def coefficient(
     comparison: Comparison | pd.DataFrame,
     name: str,
     *,
-    over: Literal["load", "frequency"] = "load",
+    over: str = "load",
     title: str | None = None,
 ) -> Figure:
     """Draw one coefficient over load or frequency (the paper's Fig. 17 to 20).
@@ -52,9 +52,8 @@ def coefficient(
     ValueError
         For an unknown coefficient, or when nothing varies over `over`.
     """
-    names = [column[:3] for column in COEFFICIENT_COLUMNS]
-    if name not in names:
-        raise ValueError(f"name must be one of {', '.join(names)}; got {name!r}")
+    if name not in COEFFICIENTS:
+        raise ValueError(f"name must be one of {', '.join(COEFFICIENTS)}; got {name!r}")
     series = longest_series(_comparison_table(comparison), over)
     if series is None:
         raise ValueError(f"the campaign has no two points that differ in {over} alone")

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, symbol
+from tpjb_ident.columns import symbol
 from tpjb_ident.report.drawing.colours import INK, LIGHT
-from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, label, new_pictures, shrink
-from tpjb_ident.report.drawing.series import as_table
+from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.series import as_table, set_point_ticks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +44,6 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     width = max(4.6, 0.36 * len(rows) + 1.2)
     figure, ((axes,),) = new_pictures(1, 1, title=title, width=width, height=3.4)
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "1 - coherence")
-    shrink(axes, bottom=0.25)
     low = unexplained > 1.0 - _FLAGGED
     at = np.arange(len(rows))
     for mask, colour, marker, name in ((~low, "blue", "o", "operating point"), (low, "red", "X", "flagged")):
@@ -55,8 +54,7 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
     axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
-    ticks = [f"{w * per('load'):.4g}\n{f:g}" for w, f in zip(rows["static_load_N"], rows["excitation_Hz"], strict=True)]
-    axes.set_xticks(at, ticks, fontsize=FONT_SIZE - 1.0)
+    set_point_ticks(axes, rows)
     axes.grid(axis="x", visible=False)
     add_legend(axes)
     return figure

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT
@@ -76,11 +77,9 @@ def _multiple_coherence(
     good = np.isfinite(force).all(axis=1) & np.isfinite(move).all(axis=1)
     signals = np.column_stack([move, force])
     signals = np.where(np.asarray(good)[:, None], signals, signals[good].mean(axis=0))
-    window = np.hanning(piece)
-    starts = range(0, len(signals) - piece + 1, piece // 2)
-    spectra = np.array([np.fft.rfft((s - s.mean(axis=0)) * window[:, None], axis=0)
-                        for s in (signals[a : a + piece] for a in starts)])  # fmt: skip
-    cross = np.einsum("kfi,kfj->fij", spectra.conj(), spectra)
+    pieces = sliding_window_view(signals, piece, axis=0)[:: piece // 2]
+    spectra = np.fft.rfft((pieces - pieces.mean(axis=-1, keepdims=True)) * np.hanning(piece))
+    cross = np.einsum("kif,kjf->fij", spectra.conj(), spectra)
     inputs, joint, power = cross[:, :2, :2], cross[:, :2, 2:], np.einsum("fii->fi", cross[:, 2:, 2:]).real
     explained = np.einsum("fij,fij->fj", joint.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ joint).real
     value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)

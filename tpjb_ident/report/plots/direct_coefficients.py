@@ -32,7 +32,7 @@ def direct_coefficients(
     bearings: Mapping[str, Identification | pd.DataFrame],
     part: Literal["k", "c"] = "k",
     *,
-    over: Literal["load", "frequency"] = "load",
+    over: str = "load",
     entries: tuple[str, ...] = ("xx", "yy"),
     title: str | None = None,
 ) -> Figure:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 def gap(
     source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
     *,
-    logarithmic: bool | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
@@ -32,8 +31,6 @@ def gap(
     ----------
     source : Diagnosis, Verdict or mapping
         Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
-    logarithmic : bool, optional
-        Default: when the gaps span more than a factor of thirty.
     title : str, optional
     """
     gaps = _gaps(source)
@@ -55,11 +52,6 @@ def gap(
     axes.grid(axis="y", visible=False)
     axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
     handles = axes.get_legend_handles_labels()[0]
-    sizes = np.concatenate([before, after])
-    wide = float(sizes.max()) > 30.0 * max(float(sizes[sizes > 0].min(initial=1.0)), 1e-3)
-    if logarithmic or (logarithmic is None and wide):
-        axes.set_xscale("log")
-        axes.set_xlim(left=max(0.7 * float(sizes[sizes > 0].min(initial=1.0)), 1e-2))
     add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
     return figure
 

@@ -23,7 +23,6 @@ def load_deflection(
     curves: PivotCurve | Sequence[PivotCurve],
     *,
     up_to: float | None = None,
-    level: float = 0.95,
     title: str | None = None,
 ) -> Figure:
     """Draw the settled steps of dry tests and the laws fitted to them (the paper's Fig. 11).
@@ -38,8 +37,6 @@ def load_deflection(
         One or several pads.
     up_to : float, optional
         Largest load [N]; default: the largest measured one.
-    level : float
-        Coverage of the bands: of what the probes should read at given load, about the points' own zero.
     title : str, optional
     """
     chosen = list(curves) if isinstance(curves, Sequence) else [curves]
@@ -49,7 +46,7 @@ def load_deflection(
         f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}", title=title
     )
     for curve in chosen:
-        _draw_law(axes, curve, up_to or curve.valid_to, level)
+        _draw_law(axes, curve, up_to or curve.valid_to)
         _draw_steps(axes, curve)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     from_zero(axes)
@@ -78,11 +75,11 @@ def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
                   color=INK, label="step left out", zorder=5)  # fmt: skip
 
 
-def _draw_law(axes: Axes, curve: PivotCurve, top: float, level: float) -> None:
+def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
     """The law, its band, and the way into contact."""
     colour, _, _ = style_of_pad(curve.pad)
     load = np.linspace(0.0, top, _LAW_POINTS)[1:]
-    reading, low, high = (per("length") * part for part in curve.reading_band(load, level))
+    reading, low, high = (per("length") * part for part in curve.reading_band(load))
     measured = ~curve.is_extrapolated(load)
     axes.fill_betweenx(load * per("load"), low, high, color=colour, alpha=0.25, linewidth=0)
     deflection = per("length") * curve.deflection(load)

@@ -30,8 +30,6 @@ def pivot_stiffness(
     formula: Formula | None = None,
     *,
     loads: ArrayLike | None = None,
-    secant: bool = False,
-    level: float = 0.95,
     title: str | None = None,
 ) -> Figure:
     """Draw the stiffness of every pad's pivot over its load (the paper's Fig. 12).
@@ -48,22 +46,17 @@ def pivot_stiffness(
         paper prints is the secant.
     loads : (n,) array_like, optional
         Pad loads [N]; default: up to the largest measured one.
-    secant : bool
-        Draw W/delta in place of dW/d delta.
-    level : float
-        Coverage of the bands.
     title : str, optional
     """
     if not curves:
         raise ValueError("curves must hold at least one PivotCurve")
     top = max(curve.valid_to for curve in curves)
     grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
-    kind = "secant" if secant else "tangent"
     figure, axes = new_picture(
-        f"load on the pad, {symbol('load')}", f"{kind} stiffness, {symbol('stiffness')}", title=title
+        f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}", title=title
     )
     for curve in curves:
-        _draw_stiffness(axes, curve, grid, secant, level)
+        _draw_stiffness(axes, curve, grid)
     if formula is not None:
         printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
         axes.plot(grid * per("load"), printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
@@ -76,10 +69,9 @@ def pivot_stiffness(
     return figure
 
 
-def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray, secant: bool, level: float) -> None:
+def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
     colour, dashes, _ = style_of_pad(curve.pad)
-    value = (curve.secant(grid) if secant else curve.stiffness(grid)) * per("stiffness")
-    band = curve.secant_band(grid, level) if secant else curve.stiffness_band(grid, level)
+    value, band = curve.stiffness(grid) * per("stiffness"), curve.stiffness_band(grid)
     outside = curve.is_extrapolated(grid)
     low, high = (np.where(outside, np.nan, b * per("stiffness")) for b in band)
     axes.fill_between(grid * per("load"), low, high, color=colour, alpha=0.2, linewidth=0)

@@ -5,18 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
-from tpjb_ident.columns import per, symbol
+from tpjb_ident.columns import symbol
 from tpjb_ident.report.drawing.colours import DIVERGING, INK, VARIANT_LABEL
-from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures, shrink
-from tpjb_ident.report.drawing.residual_frame import COEFFICIENTS, residual_frame
+from tpjb_ident.report.drawing.picture import FONT_SIZE, add_colour_bar, label, new_pictures
+from tpjb_ident.report.drawing.residual_frame import residual_frame
+from tpjb_ident.report.drawing.series import COEFFICIENTS, set_point_ticks
+from tpjb_ident.schema import POINT_KEY
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
 
@@ -46,7 +47,8 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     models = list(dict.fromkeys(frame["model"]))
     if not models:
         raise ValueError("there are no residuals of coefficients to draw")
-    points = sorted(set(zip(frame["static_load_N"], frame["excitation_Hz"], strict=True)))
+    place = [name for name in ("static_load_N", "excitation_Hz", *POINT_KEY[1:3], "rotation") if name in frame]
+    points = frame[place].drop_duplicates().sort_values(place)
     width = max(_SHORTEST, _CELL * len(points) + 1.9)
     figure, grid = new_pictures(len(models), 1, title=title, width=width, height=_HEIGHT)
     limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
@@ -56,18 +58,15 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     return figure
 
 
-def _draw_map(axes: Axes, frame: pd.DataFrame, points: list[tuple[float, float]], norm: Any, name: str) -> None:
-    table = np.full((len(COEFFICIENTS), len(points)), np.nan)
-    column = {point: j for j, point in enumerate(points)}
-    for entry, load, frequency, z in frame[["entry", "static_load_N", "excitation_Hz", "z"]].to_numpy():
-        table[COEFFICIENTS.index(entry), column[load, frequency]] = z
+def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, name: str) -> None:
+    cells = frame.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
+    table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
     size = float(np.sqrt(np.nanmean(table**2)))
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
-    shrink(axes, bottom=0.25)
     image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
     axes.grid(False)
     axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
-    axes.set_xticks(range(len(points)), [f"{w * per('load'):.4g}\n{f:g}" for w, f in points], fontsize=FONT_SIZE - 1.0)
+    set_point_ticks(axes, points)
     axes.axhline(3.5, color=INK, linewidth=0.8)
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
 from tpjb_ident.report.drawing.colours import LIGHT, PAPER, RULE, VARIANT_LABEL
 from tpjb_ident.report.drawing.picture import add_legend, new_picture
 from tpjb_ident.report.drawing.residual_frame import residual_frame
-from tpjb_ident.report.drawing.series import CURVE, axis_of
+from tpjb_ident.report.drawing.series import CURVE, axis_of, longest_series
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +25,7 @@ _DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
 
 def residual_series(
     source: Diagnosis | Comparison | pd.DataFrame,
-    over: Literal["load", "frequency"] = "load",
+    over: str = "load",
     *,
     entries: Sequence[str] | None = None,
     title: str | None = None,
@@ -51,11 +51,9 @@ def residual_series(
     """
     frame = residual_frame(source)
     column, scale, text = axis_of(over)
-    fixed_column = axis_of("frequency" if over == "load" else "load")[0]
-    counts = frame.groupby(fixed_column)[column].nunique()
-    if frame.empty or counts.max() < 2:
+    series = longest_series(frame, over)
+    if series is None:
         raise ValueError(f"there are no two points that differ in {over} alone")
-    series = frame[frame[fixed_column] == counts.idxmax()]
     models = list(dict.fromkeys(frame["model"]))
     chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
     figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)

@@ -64,6 +64,8 @@ class Deciding:
     silent = 0.05
 
     # Search.
+    #: Faults that lead by straight paths and of which the whole path is asked: right ones are among the first five.
+    followed = 12
     #: Nats that a fit rises above its score at the most, and so may its rivals: derivatives from elsewhere miss that.
     mistaken = 25.0
     #: Nats behind the leader within which a fit gets derivatives of its own.
@@ -107,3 +109,21 @@ class Deciding:
     enough, margin = 5.0, 9.0
     #: Other explanations that a confirming test is chosen against.
     impostors = 2
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Stated model tolerances of `outputs.md`, one standard deviation: the sigma in which the gap is told.
+
+    How much of it a campaign really needs is summed over (`comparison.evidence`).
+    """
+
+    stiffness: float = 0.015
+    position: float = 0.5e-6
+    temperature: float = 0.5
+    dry: float = 0.02
+    angle: float = 0.003
+    load: float = 0.003
+    idle_temperature: float = 1.0
+    load_miss: float = 0.003
+    direction_miss: float = 0.0035

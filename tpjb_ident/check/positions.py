@@ -1,21 +1,14 @@
-"""Runs against each other: static loads as the cells read them, mean positions."""
+"""Mean positions of the shaft, run against run."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import plane_vector
+from tpjb_ident.phasors.bad_samples import robust_deviation
 
-#: Runs needed before one can be told apart.
-_MIN_RUNS = 4
-#: A load that differs by this share (or this angle, as a share of the load) from the others' is no scatter.
-_LOAD_OFF = 0.04
-#: In units of the robust standard deviation over the runs.
-_MANY = 6.0
 #: No film bearing lets its shaft travel further [m].
 _MAX_TRAVEL = 1e-3
 #: Runs needed before one can be told apart.
@@ -27,35 +20,6 @@ _MIN_JUMP = {"running": 100e-6, "dry": 300e-6}
 #: Runs of one operating point needed, distance from their median in robust standard deviations, and the least [m]: a
 #: probe that drifts by 1.5 % of a gap of 1 mm within an operating point was touched, or its amplifier was.
 _LIKE_RUNS, _STEP, _LEAST_STEP = 4, 6.0, 15e-6
-
-
-def check_load_ratios(runs: Sequence[Observation]) -> None:
-    """Mean force over set point of every dynamic and locus run against that of all others."""
-    shown: list[tuple[Observation, complex]] = []
-    for observation in runs:
-        nominal = observation.run.point.static_load
-        if observation.run.kind not in {"dynamic", "locus"} or observation.lines is None or not nominal > 0:
-            continue
-        mean = plane_vector(observation, "force", observation.lines.mean)
-        if mean is not None:
-            turn = complex(np.exp(1j * observation.run.point.static_load_direction))
-            shown.append((observation, complex(mean[0], mean[1]) / (nominal * turn)))
-    if len(shown) < _MIN_RUNS:
-        return
-    ratios = np.array([r for _, r in shown])
-    middle = complex(np.median(ratios.real), np.median(ratios.imag))
-    off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
-    allowed = max(_LOAD_OFF, _MANY * 1.4826 * float(np.median(off)))
-    for (observation, ratio), distance in zip(shown, off):
-        reported = any(f.key.startswith("load ") for f in observation.report.found)
-        if distance > allowed and not reported:
-            turned = math.degrees(np.angle(ratio / middle))
-            text = (
-                f"is {abs(ratio / middle) - 1:+.1%} in size and {turned:+.1f} deg in direction off what the set point "
-                "and the other runs of the campaign let one expect"
-            )
-            cure = "Check static_load and its direction in this run, and the gain of the cells"
-            observation.report.say("load ratio", "warning", "mean force", text, cure)
 
 
 def check_positions(runs: Sequence[Observation]) -> None:
@@ -89,7 +53,7 @@ def _check_steps(name: str, means: Sequence[tuple[Observation, float]]) -> None:
         return
     values = np.array([m for _, m in means])
     off = values - np.median(values)
-    allowed = max(_STEP * 1.4826 * float(np.median(np.abs(off))), _LEAST_STEP)
+    allowed = max(_STEP * robust_deviation(off), _LEAST_STEP)
     for (observation, _), distance in zip(means, off):
         if abs(distance) > allowed and "displacement" not in observation.report.doubts:
             text = f"reads {1e6 * distance:+.0f} um on average beside the other runs at this operating point"

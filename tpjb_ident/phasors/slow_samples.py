@@ -8,6 +8,7 @@ ramp.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,8 @@ from scipy import ndimage
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
+from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.bad_samples import robust_deviation
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -41,6 +44,13 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
     slower = force if len(force) < len(displacement) else displacement
     load, place = force.at(slower.time), displacement.at(slower.time)
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
+
+
+def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
+    """A condition that names the runs which were left out, with the first reason of each; none where all are used."""
+    reasons = {str(problem.run): problem.what for problem in reversed(problems)}
+    listed = "; ".join(f"{run} ({reasons[run]})" for run in sorted(reasons))
+    return (Condition("runs-refused", listed),) if reasons else ()
 
 
 def piece_means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
@@ -85,7 +95,7 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
 
 def _noise(x: FloatArray, median: FloatArray) -> float:
     """Robust standard deviation about the running median, never below the recording's resolution."""
-    spread = 1.4826 * float(np.median(np.abs(x - median)))
+    spread = robust_deviation(x - median)
     steps = np.abs(np.diff(x))
     # two converters turned into X and Y leave rounding residues: those are no steps
     steps = steps[steps > 1e-6 * np.ptp(x)]

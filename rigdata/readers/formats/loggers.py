@@ -1,0 +1,190 @@
+"""Formats of loggers and programs, each read by its own library, which is imported when such a file comes."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from rigdata.problem import refuse
+from rigdata.readers.base import SAMPLE, refuse_claim
+from rigdata.readers.formats.sandbox import read_sandboxed
+from rigdata.readers.series import Series, equidistant, is_time, seconds, to_temporary_file
+
+#: Function types of data set 58 that are records over time.
+_GENERAL, _TIME_RESPONSE = 0, 1
+_FUNCTIONS = {1: "complex time response", 2: "auto spectrum", 3: "cross spectrum", 4: "frequency response function",
+              6: "coherence", 7: "auto correlation", 9: "power spectral density", 12: "spectrum"}  # fmt: skip
+
+
+def read_tdms(path: Path) -> list[Series]:
+    """Read every channel of numbers.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.tdms`` file; its index file is not needed.
+
+    Returns
+    -------
+    list of Series
+    """
+    from nptdms import TdmsFile
+
+    series: list[Series] = []
+    # opened here: npTDMS leaves a file open that it cannot read
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:
+        samples = 0
+        for group in file.groups():
+            samples += sum(len(channel) for channel in group.channels())
+        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
+        for group in file.groups():
+            channels = [c for c in group.channels() if np.issubdtype(c.dtype or object, np.number)]
+            clock = next((c for c in channels if is_time(c.name) and len(c)), None)
+            shared = None if clock is None else seconds(_waveform(clock, group.name, None))
+            series += [_waveform(channel, group.name, shared) for channel in channels if channel is not clock]
+    return series
+
+
+def _waveform(channel: Any, group: str, shared: FloatArray | None) -> Series:
+    values = to_temporary_file(np.asarray(channel[:], dtype=float))
+    unit = str(channel.properties.get("unit_string", ""))
+    step = channel.properties.get("wf_increment")
+    time = shared if shared is not None and len(shared) == len(values) else None
+    if step is not None and float(step) > 0:
+        time = equidistant(len(values), float(step), float(channel.properties.get("wf_start_offset", 0.0)))
+    return Series(channel.name, unit, values, time, group)
+
+
+def read_uff(path: Path) -> list[Series]:
+    """Read every time record of a universal file.
+
+    A record is named by its ID line 1, or else by its response node and direction (``"Rsp 7+X"``).
+
+    Parameters
+    ----------
+    path : Path
+        ``.uff``, ``.unv`` or ``.58``.
+
+    Raises
+    ------
+    RigDataError
+        It holds none: says what it holds.
+    """
+    import pyuff
+
+    file = pyuff.UFF(str(path))
+    series: list[Series] = []
+    unusable: Counter[str] = Counter()
+    for index, kind in enumerate(file.get_set_types()):
+        if int(kind) != 58:
+            unusable[f"data set {int(kind)}"] += 1
+            continue
+        data = file.read_sets(index)
+        function = int(data.get("func_type", 0))
+        if function in (_GENERAL, _TIME_RESPONSE) and not np.iscomplexobj(data["data"]):
+            series.append(_time_record(data, index))
+        else:
+            unusable[_FUNCTIONS.get(function, f"function type {function}")] += 1
+    if not series:
+        counts = ", ".join([f"{count} x {kind}" for kind, count in unusable.items()][:6])
+        fault = f"holds no record over time, only {counts}" if counts else "holds no data set"
+        raise refuse(path.name, "", fault, "Export the time records (data set 58, time response)")
+    return series
+
+
+def _time_record(data: dict[str, Any], index: int) -> Series:
+    values = to_temporary_file(np.asarray(data["data"], dtype=float))
+    x = data.get("x")
+    step = float(data.get("abscissa_inc") or 0.0)
+    time: FloatArray | None = None
+    if x is not None and len(x) == len(values):
+        time = to_temporary_file(np.asarray(x, dtype=float))
+    elif step > 0:
+        time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
+    unit = str(data.get("ordinate_axis_units_lab") or "").strip()
+    return Series(_record_name(data, index), "" if unit.upper() == "NONE" else unit, values, time, f"set {index + 1}")
+
+
+def _record_name(data: dict[str, Any], index: int) -> str:
+    for key in ("id1", "id4", "ordinate_axis_lab"):
+        text = str(data.get(key) or "").strip()
+        if text and text.upper() != "NONE":
+            return text
+    node, code = data.get("rsp_node"), data.get("rsp_dir")
+    if not node:
+        return f"set {index + 1}"
+    number = int(code) if isinstance(code, (int, float)) else 0
+    direction = ""
+    if 1 <= abs(number) <= 3:
+        direction = ("+" if number > 0 else "-") + "XYZ"[abs(number) - 1]
+    return f"Rsp {node}{direction}"
+
+
+def read_mdf(path: Path) -> list[Series]:
+    """Read every channel of numbers, converted to what the file calls its physical value.
+
+    Parameters
+    ----------
+    path : Path
+        ``.mf4`` or ``.mdf``.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        asammdf is not installed.
+    RigDataError
+        The file is damaged.
+    """
+    if importlib.util.find_spec("asammdf") is None:
+        raise ModuleNotFoundError("No module named 'asammdf'", name="asammdf")
+    return read_sandboxed("mdf_in_sandbox", path)
+
+
+def mdf_in_sandbox(path: Path) -> list[Series]:
+    """As `read_mdf`, in this process: a damaged file can end it."""
+    from asammdf import MDF
+
+    series = []
+    with MDF(path) as file:
+        samples = sum(group.channel_group.cycles_nr * len(group.channels) for group in file.groups)
+        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
+        for signal in file.iter_channels(skip_master=True):
+            values = signal.samples
+            if values.ndim == 1 and np.issubdtype(values.dtype, np.number):
+                time = np.asarray(signal.timestamps, dtype=float)
+                group = f"group {signal.group_index + 1}"
+                series.append(Series(signal.name, signal.unit or "", np.asarray(values, dtype=float), time, group))
+    return series
+
+
+def read_parquet(path: Path) -> list[Series]:
+    """Read every column of numbers.
+
+    Field metadata ``unit`` gives a column's unit, table metadata ``sample_rate_hz`` the rate where no column is a time.
+
+    Parameters
+    ----------
+    path : Path
+        ``.parquet``.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns, units = {}, {}
+    with path.open("rb") as stream, pq.ParquetFile(stream) as table:
+        schema, rows = table.schema_arrow, table.metadata.num_rows
+        numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
+        refuse_claim(SAMPLE * rows * (len(numeric) + 1), path.stat().st_size, path.name)
+        for column in numeric:
+            values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
+            columns[column.name] = to_temporary_file(values)
+            units[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+    rate = (schema.metadata or {}).get(b"sample_rate_hz")
+    is_timed = any(map(is_time, columns))
+    time = equidistant(rows, 1.0 / float(rate)) if rate is not None and not is_timed else None
+    return [Series(name, units[name], values, time) for name, values in columns.items()]
