@@ -42,10 +42,10 @@ def as_bearing(value: Any, name: str) -> Bearing:
     raise ArgumentError(f"{name}: must be a Bearing or the path of a bearing file, got {type(value).__name__}.")
 
 
-def _path(value: Any, name: str) -> Path:
+def _path(value: Any, name: str) -> Any:
     if not isinstance(value, (str, os.PathLike)):
         raise ArgumentError(f"{name}: must be a path, got {type(value).__name__}.")
-    return Path(value)
+    return value
 
 
 def _curves(value: Any, name: str) -> Any:
@@ -87,8 +87,8 @@ def _with_clearance(settings: Any, campaign: Campaign) -> Any:
 
 #: What arguments of these names may be.
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path, "folder": _path,
-    "curves": _curves, "comparison": _comparison,
+    "campaign": as_campaign, "bearing": as_bearing, "source": _path, "path": _path,
+    "folder": lambda value, name: Path(_path(value, name)), "curves": _curves, "comparison": _comparison,
 }  # fmt: skip
 
 

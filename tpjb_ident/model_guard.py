@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-
 
 def check_model() -> None:
     """Do nothing if `import model` gives the bundled bearing model."""
-    package = importlib.import_module("model")
-    if getattr(package, "DISTRIBUTION", None) != "tpjb-ident":
+    import model
+
+    if getattr(model, "DISTRIBUTION", None) != "tpjb-ident":
         raise ImportError(
-            f"another package named 'model' ({package}) hides the bearing model of tpjb-ident. Rename it, start "
+            f"another package named 'model' ({model}) hides the bearing model of tpjb-ident. Rename it, start "
             "Python from another folder, or take its folder off sys.path / PYTHONPATH."
         )
