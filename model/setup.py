@@ -125,8 +125,8 @@ class Setup:
 
     def __post_init__(self) -> None:
         check_known("thermal", self.thermal, _THERMAL)
-        if self.thermal == "thd" and (self.options.cavitation, self.options.turbulence) != ("swift-stieber", "none"):
-            raise OptionError('thermal "thd" is for laminar films that rupture by swift-stieber; take "adiabatic"')
+        if self.thermal == "thd" and self.options.cavitation != "swift-stieber":
+            raise OptionError('thermal "thd" is for films that rupture by swift-stieber; take "adiabatic"')
         if self.thermal == "thd" and self.options.perturbed_heat:
             raise OptionError('perturbed_heat is for films of one temperature across; take "adiabatic" or "tehd"')
         if self.options.axial_tilt and self.bearing.pivot.kind != "spherical":

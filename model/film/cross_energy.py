@@ -108,6 +108,7 @@ def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: in
     centre = f1 / f0
     h = 0.5 * (work.thickness[i, j] + work.thickness[i + 1, j])
     pull = (work.pressure[i + 1, j] - work.pressure[i, j]) / grid.dx * h * h
+    pull *= 0.5 * (cross.driven[i, j, 0] + cross.driven[i + 1, j, 0])
     mass = 0.5 * (work.density[i, j] + work.density[i + 1, j]) * h * grid.height[j]
     below, total, driven = 0.0, 0.0, 0.0
     for m in range(cells):
@@ -195,6 +196,7 @@ def _box(
     lines, cells = space.theta.shape
     edges, conductivity, specific = cross.edges, heat[1], heat[0]
     up, sideways, low, high, first, last, carried, theta, shares = space
+    resists = np.empty(cells)  # of half a cell
     for j in range(lines - 1):
         _side_shares(cross, i, j, shares)
         aside = 0.5 * (work.flow_z[i, j] + work.flow_z[i + 1, j])
@@ -206,16 +208,18 @@ def _box(
         least = 0.25 * _LEAST_FLOW * speed * h * (work.density[i, j] + work.density[i + 1, j]) * grid.height[j]
         _upward(flows, sideways, grid.first, i, j, up[j])
         for m in range(cells):
-            wide, at = edges[m + 1] - edges[m], 0.5 * (edges[m + 1] + edges[m])
+            resists[m] = (edges[m + 1] - edges[m]) / (cross.mixing[i, j, m] + cross.mixing[i + 1, j, m])
+        for m in range(cells):
+            wide = edges[m + 1] - edges[m]
             carried[j, m] = specific * max(flows[i, j, m], least * wide)
             if m > 0:
-                pass_on = station / (at - 0.5 * (edges[m] + edges[m - 1]))
+                pass_on = station / (resists[m] + resists[m - 1])
                 low[j, m] = max(pass_on + 0.5 * specific * up[j, m], max(0.0, specific * up[j, m]))
             if m < cells - 1:
-                pass_on = station / (0.5 * (edges[m + 2] + edges[m + 1]) - at)
+                pass_on = station / (resists[m + 1] + resists[m])
                 high[j, m] = max(pass_on - 0.5 * specific * up[j, m + 1], max(0.0, -specific * up[j, m + 1]))
             else:
-                high[j, m] = heat[3] * station / (1.0 - at)
+                high[j, m] = heat[3] * station / resists[m]
             if j == lines - 1:  # the edge is upwind: what leaves takes its temperature along
                 first[j, m] = 0.5 * specific * max(sideways[j, m], 0.0)
             elif j > 0:
@@ -305,13 +309,14 @@ def _dissipation(
             across = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0] * h
         else:
             across = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1]) * h
-        drag, driven = speed * cross.shear[i, j] / h, slope * slope + across * across
+        along, aside = cross.driven[i, j, 0], cross.driven[i, j, 1]
+        drag, driven = speed * cross.shear[i, j] / h, along * slope * slope + aside * across * across
         station = h * grid.dx * grid.height[j]
         for m in range(cells):
             wide = edges[m + 1] - edges[m]
             away = 0.5 * (edges[m + 1] + edges[m]) - cross.centre[i, j]
-            shear = drag + slope * away
-            squared = shear * shear + (across * away) ** 2 + driven * wide * wide / 12.0
+            squared = (drag + slope * away) * (drag + along * slope * away)
+            squared += aside * (across * away) ** 2 + driven * wide * wide / 12.0
             dissipation[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
 
 

@@ -9,6 +9,10 @@ the flow per width is  U h (1 - e) - f2 h^3 dp/dx  along and  - f2 h^3 dp/dz  ac
 U / (h f0) + h (eta - e) dp/dx. All are exact for viscosities that are constant in each cell; one viscosity gives
 e = 1/2 and f2 = 1 / (12 mu).
 
+In a turbulent film eddies add to the viscosity and to the conduction of heat across (`model.film.turbulence`): f0 and
+e are those of the film with them, f2 that of the oil, which Ng and Pan's factors lower; what flows then has the profile
+of the film with eddies.
+
 D. Dowson, Int. J. Mech. Sci. 4 (1962) 159, Eq. (22), with the density taken at the mean temperature.
 """
 
@@ -21,6 +25,7 @@ import numpy as np
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import change_by_oil
+from model.film.turbulence import ACROSS, ALONG, excess, still_shares
 from rigdata.arrays import FloatArray
 
 #: Cells across the film: the temperatures of pad and film move by less than 0.2 K with twice as many.
@@ -38,6 +43,10 @@ class CrossFilm(NamedTuple):
     fluidity: FloatArray  #: (nt + 1, nz + 1, n): 1 / mu, as the pressure was solved with [1/(Pa s)].
     shear: FloatArray  #: (nt + 1, nz + 1): 1 / f0, the viscosity that shears [Pa s].
     centre: FloatArray  #: (nt + 1, nz + 1): e.
+    eddy: FloatArray  #: (nt + 1, nz + 1, n): What eddies add to the viscosity [Pa s], zero in a laminar film.
+    mixing: FloatArray  #: (nt + 1, nz + 1, n): Conduction across over that of the oil at rest, 1 in a laminar film.
+    #: (nt + 1, nz + 1, 2): Flow that pressure drives along and across, over that of the profile; 1 in a laminar film.
+    driven: FloatArray
 
 
 class CrossOperator(NamedTuple):
@@ -80,16 +89,32 @@ def cross_film(work: FilmWork, temperature: float, cells: int = _CELLS) -> Cross
         np.ones((*shape, cells)),
         np.ones(shape),
         np.full(shape, 0.5),
+        np.zeros((*shape, cells)),
+        np.ones((*shape, cells)),
+        np.ones((*shape, 2)),
     )
 
 
 @compiled
-def set_cross_viscosity(cross: CrossFilm, work: FilmWork, oil: tuple[float, float, float, float]) -> None:
-    """Viscosities of the cells, and what the pressure solution needs of them."""
+def set_cross_viscosity(
+    cross: CrossFilm,
+    work: FilmWork,
+    oil: tuple[float, float, float, float],
+    turbulent: tuple[float, float] = (0.0, 0.0),
+) -> None:
+    """Viscosities of the cells, and what the pressure solution needs of them.
+
+    `turbulent`: the journal's speed and the oil's c / k [m s/kg]; a laminar film has none.
+    """
     rows, columns, _ = cross.temperature.shape
     for i in range(rows):
         for j in range(columns):
             mean, f0, centre, f2 = _integrals(cross, i, j, oil)
+            if turbulent[0] > 0.0:
+                density = oil[2] * (1.0 + oil[3] * (40.0 - mean))
+                reynolds = 12.0 * f2 * density * turbulent[0] * work.thickness[i, j]
+                _set_eddies(cross, i, j, reynolds, turbulent[1])
+                mean, f0, centre, f2 = _integrals(cross, i, j, oil)
             cross.shear[i, j], cross.centre[i, j] = 1.0 / f0, centre
             work.temperature[i, j] = mean
             work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - mean))
@@ -98,16 +123,34 @@ def set_cross_viscosity(cross: CrossFilm, work: FilmWork, oil: tuple[float, floa
 
 
 @inner
+def _set_eddies(cross: CrossFilm, i: int, j: int, reynolds: float, by_heat: float) -> None:
+    """What eddies do at a node: `by_heat` is c / k of the oil [m s/kg]."""
+    edges, calm, swirled, centre = cross.edges, 0.0, 0.0, cross.centre[i, j]
+    for m in range(len(edges) - 1):
+        fluidity = cross.fluidity[i, j, m]
+        light = fluidity / (1.0 - fluidity * cross.eddy[i, j, m])
+        sheared, warmed = still_shares(reynolds, (edges[m], edges[m + 1]), by_heat / light)
+        cross.eddy[i, j, m], cross.mixing[i, j, m] = (1.0 / sheared - 1.0) / light, 1.0 / warmed
+        wide = edges[m + 1] - edges[m]
+        away = 0.5 * (edges[m + 1] + edges[m]) - centre
+        calm += wide * light * (away * away + wide * wide / 12.0)
+        swirled += wide * light * sheared * (away * away + wide * wide / 12.0)
+    cross.driven[i, j, 0] = calm / swirled / (1.0 + excess(reynolds, ALONG[0], ALONG[1])[0] / 12.0)
+    cross.driven[i, j, 1] = calm / swirled / (1.0 + excess(reynolds, ACROSS[0], ACROSS[1])[0] / 12.0)
+
+
+@inner
 def _integrals(
     cross: CrossFilm, i: int, j: int, oil: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Mean temperature, f0, e and f2 at a node; its cells' fluidity is set."""
+    """Mean temperature, f0, e and f2 at a node; its cells' fluidity is set, at the eddies that there are."""
     edges = cross.edges
     mean, f0, f1, f2 = 0.0, 0.0, 0.0, 0.0
     for m in range(len(edges) - 1):
         wide = edges[m + 1] - edges[m]
         t = cross.temperature[i, j, m]
         light = np.exp(-oil[1] * (40.0 - t)) / oil[0]
+        light = light / (1.0 + light * cross.eddy[i, j, m])
         cross.fluidity[i, j, m] = light
         mean += wide * t
         f0 += wide * light
@@ -116,7 +159,8 @@ def _integrals(
     for m in range(len(edges) - 1):
         wide = edges[m + 1] - edges[m]
         away = 0.5 * (edges[m + 1] + edges[m]) - centre
-        f2 += wide * cross.fluidity[i, j, m] * (away * away + wide * wide / 12.0)
+        light = cross.fluidity[i, j, m] / (1.0 - cross.fluidity[i, j, m] * cross.eddy[i, j, m])
+        f2 += wide * light * (away * away + wide * wide / 12.0)
     return mean, f0, centre, f2
 
 

@@ -40,22 +40,27 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
             loss[i, j] = work.exchange[i, j] + less
     for j in range(columns):
         temperature[0, j] = inlet
-    return march(grid, work, running, loss, fields, sources)
+    return march(grid, work, running, loss, fields, between(sources))
+
+
+@inner
+def between(sources: FloatArray) -> FloatArray:
+    """What stations make, (m, nt + 1, nz + 1), as what is made between them, (m, nt, nz + 1)."""
+    return 0.5 * (sources[:, :-1] + sources[:, 1:])
 
 
 @compiled
-def march(
-    grid: FilmGrid, work: FilmWork, running: Running, loss: FloatArray, fields: FloatArray, sources: FloatArray
-) -> float:
+def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: Any, sources: Any) -> float:
     """March any number of temperature fields that differ in their inlet and sources: the equation is linear.
 
-    `loss` (nt + 1, nz + 1) [W/K], `fields` (m, nt + 1, nz + 1) [degC], `sources` (m, nt + 1, nz + 1) [W].
+    Real or complex: `loss` (nt + 1, nz + 1) [W/K], `fields` (m, nt + 1, nz + 1) [degC], `sources` (m, nt, nz + 1) [W].
     """
     nz, count = work.flow_z.shape[1], fields.shape[0]
     conduct = np.empty(nz)
     for j in range(nz):
         conduct[j] = 0.25 * running.heat[1] * grid.dx / grid.dz[j]
-    line = (np.zeros(nz + 1), np.zeros(nz + 1), np.zeros(nz + 1), np.zeros((nz + 1, count)))
+    main, rhs = np.zeros(nz + 1, dtype=loss.dtype), np.zeros((nz + 1, count), dtype=fields.dtype)
+    line = (np.zeros(nz + 1), main, np.zeros(nz + 1), rhs)
     return _march_lines(grid, work, running, (loss, fields, sources), line, conduct)
 
 
@@ -64,8 +69,8 @@ def _march_lines(
     grid: FilmGrid,
     work: FilmWork,
     running: Running,
-    march: tuple[FloatArray, FloatArray, FloatArray],
-    line: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    march: tuple[Any, Any, Any],
+    line: tuple[Any, Any, Any, Any],
     conduct: FloatArray,
 ) -> float:
     """Set up and solve the equations of every line between two stations; see `march`."""
@@ -99,7 +104,7 @@ def _march_lines(
             for m in range(rhs.shape[1]):
                 t = fields[m]
                 value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
-                value += 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
+                value += sources[m, i, j]
                 if j > 0:
                     value -= low * t[i, j - 1]
                 if j < nz:

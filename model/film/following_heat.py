@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import tridiagonal
+from model.film.energy import march
 from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
@@ -193,24 +193,6 @@ def _steepness(grid, p, q, i, j):  # type: ignore[no-untyped-def]
     return total
 
 
-class _March(NamedTuple):
-    """What the change of temperature is marched with.
-
-    The film's conductances; what a kelvin loses; the change found so far [K/m]; of the line between two stations the
-    changes of heat made and of flows across at either, and its tridiagonal equations.
-    """
-
-    conductance: tuple[FloatArray, FloatArray]
-    loss: ComplexArray
-    response: ComplexArray
-    dissipated: ComplexArray
-    sides: ComplexArray
-    lower: ComplexArray
-    main: ComplexArray
-    upper: ComplexArray
-    rhs: ComplexArray
-
-
 @inner
 def _temperature(
     grid: FilmGrid,
@@ -222,28 +204,29 @@ def _temperature(
 ) -> ComplexArray:
     """March the change of temperature for changes of thickness and pressure, (nt + 1, nz + 1) [K/m]."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    march = _March(
-        conductance,
-        loss,
-        np.zeros((nt + 1, nz + 1), dtype=np.complex128),
-        np.empty((2, nz + 1), dtype=np.complex128),
-        np.zeros((2, nz), dtype=np.complex128),
-        np.zeros(nz + 1, dtype=np.complex128),
-        np.zeros(nz + 1, dtype=np.complex128),
-        np.zeros(nz + 1, dtype=np.complex128),
-        np.zeros((nz + 1, 1), dtype=np.complex128),
-    )
-    _march_lines(grid, work, running, change, march)
-    return march.response
+    fields = np.zeros((1, nt + 1, nz + 1), dtype=np.complex128)
+    gained = np.empty((1, nt, nz + 1), dtype=np.complex128)
+    _gain(grid, work, running, conductance, change, gained[0])
+    march(grid, work, running, loss, fields, gained)
+    return fields[0]
 
 
 @inner
-def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Change, march: _March) -> None:
-    """Set up and solve the equations of every line between two stations, one after the other."""
-    (gx, gz), loss, out, dissipated, sides, lower, main, upper, rhs = march
+def _gain(
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    conductance: tuple[FloatArray, FloatArray],
+    change: _Change,
+    gained: ComplexArray,
+) -> None:
+    """Change of the heat that the oil gains between stations at its old temperature, (nt, nz + 1) [W/m]."""
+    gx, gz = conductance
     thicker, warmer, pressure = change
     t, h, flow_x, flow_z = work.temperature, work.thickness, work.flow_x, work.flow_z
     heat, nz = running.heat, flow_z.shape[1]
+    dissipated = np.empty((2, nz + 1), dtype=np.complex128)
+    sides = np.empty((2, nz), dtype=np.complex128)
     _dissipation(grid, work, running.speed, change, 0, dissipated[1])
     _sides(work, running.oil, gz, change, 0, sides[1])
     for i in range(flow_x.shape[0]):
@@ -257,38 +240,20 @@ def _march_lines(grid: FilmGrid, work: FilmWork, running: Running, change: _Chan
             driven = couette - flow_x[i, j]
             flow = couette * (share + denser) - driven * (3.0 * share + ratio)
             flow -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
-            advect = heat[0] * flow_x[i, j]
             value = 0.5 * (dissipated[0, j] + dissipated[1, j]) - heat[0] * flow * (t[i + 1, j] - t[i, j])
-            low, high = 0.0, 0.0
-            if j > 0:
-                south = 0.5 * (flow_z[i, j - 1] + flow_z[i + 1, j - 1])
-                more = 0.5 * (sides[0, j - 1] + sides[1, j - 1])
-                film = 0.25 * (h[i, j] + h[i, j - 1] + h[i + 1, j] + h[i + 1, j - 1])
-                pass_on = heat[1] * grid.dx / grid.dz[j - 1]
-                low, changed = -0.5 * (0.5 * heat[0] * south + pass_on * film), -0.25 * heat[0] * more
-                if j == nz:
-                    low = -0.25 * heat[0] * max(south, 0.0)
-                    changed = changed if south > 0.0 else 0.0 * changed
-                else:
-                    changed -= 0.5 * pass_on * thick
-                value -= changed * (t[i + 1, j - 1] - t[i + 1, j] + t[i, j - 1] - t[i, j])
-                value -= low * (out[i, j - 1] - out[i, j])
-            if j < nz:
-                north, more = 0.5 * (flow_z[i, j] + flow_z[i + 1, j]), 0.5 * (sides[0, j] + sides[1, j])
-                film = 0.25 * (h[i, j] + h[i, j + 1] + h[i + 1, j] + h[i + 1, j + 1])
-                pass_on = heat[1] * grid.dx / grid.dz[j]
-                high, changed = -0.5 * (-0.5 * heat[0] * north + pass_on * film), 0.25 * heat[0] * more
-                if j == 0 and grid.first == 1:
-                    high = -0.25 * heat[0] * max(-north, 0.0)
-                    changed = changed if north < 0.0 else 0.0 * changed
-                else:
-                    changed -= 0.5 * pass_on * thick
-                value -= changed * (t[i + 1, j + 1] - t[i + 1, j] + t[i, j + 1] - t[i, j])
-                value -= high * (out[i, j + 1] - out[i, j])
-            rhs[j, 0] = value + (advect - 0.5 * loss[i, j]) * out[i, j]
-            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
-        tridiagonal(lower, main, upper, rhs)
-        out[i + 1] = rhs[:, 0]
+            for side in range(-1, 2, 2):
+                line = j + side
+                if not 0 <= line <= nz:
+                    continue
+                face, edge = min(j, line), j == (nz if side < 0 else 0) and (side < 0 or grid.first == 1)
+                out = side * 0.5 * (flow_z[i, face] + flow_z[i + 1, face])
+                changed = side * 0.25 * heat[0] * (sides[0, face] + sides[1, face]) * 0.5
+                if not edge:
+                    changed -= 0.5 * heat[1] * grid.dx / grid.dz[face] * thick
+                elif not out < 0.0:
+                    changed *= 0.0
+                value -= changed * (t[i + 1, line] - t[i + 1, j] + t[i, line] - t[i, j])
+            gained[i, j] = value
 
 
 @inner

@@ -35,12 +35,12 @@ def assemble(band: FloatArray, gx: FloatArray, gz: FloatArray, ruptured: BoolArr
                 band[k, width] -= gx[i, j]
 
 
-def _factoriser(width: int) -> Any:
+def _factoriser(known: int | None) -> Any:
     """`factorise` for one width: what the compiler knows, it keeps in registers."""
 
     @inner
-    def factorise_unrolled(band: FloatArray) -> None:
-        n = band.shape[0]
+    def factorise_band(band: FloatArray) -> None:
+        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
         for k in range(n):
             inverse = 1.0 / band[k, 0]
             if k < n - width:
@@ -56,15 +56,15 @@ def _factoriser(width: int) -> Any:
             for r in range(1, width + 1):
                 band[k, r] *= inverse
 
-    return factorise_unrolled
+    return factorise_band
 
 
-def _substitution(width: int) -> Any:
+def _substitution(known: int | None) -> Any:
     """`substitute` for one width: an unknown's nearest neighbour comes last, so that nothing waits for memory."""
 
     @inner
-    def substitute_unrolled(band: FloatArray, x: FloatArray) -> None:
-        n = band.shape[0]
+    def substitute_band(band: FloatArray, x: FloatArray) -> None:
+        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
         for k in range(1, n):
             total = x[k]
             if k >= width:
@@ -86,15 +86,15 @@ def _substitution(width: int) -> Any:
                     total -= band[k, r] * x[k + r]
             x[k] = total
 
-    return substitute_unrolled
+    return substitute_band
 
 
-def _substitution_of_four(width: int) -> Any:
+def _substitution_of_four(known: int | None) -> Any:
     """`substitute_four` for one width, see `_substitution`."""
 
     @inner
-    def substitute_four_unrolled(band: FloatArray, x: FloatArray) -> None:
-        n = band.shape[0]
+    def substitute_four_bands(band: FloatArray, x: FloatArray) -> None:
+        n, width = band.shape[0], band.shape[1] - 1 if known is None else known
         for k in range(1, n):
             a, b, c, d = x[k, 0], x[k, 1], x[k, 2], x[k, 3]
             for r in range(width, 0, -1):
@@ -113,53 +113,35 @@ def _substitution_of_four(width: int) -> Any:
                     c, d = c - f * x[k + r, 2], d - f * x[k + r, 3]
             x[k, 0], x[k, 1], x[k, 2], x[k, 3] = a, b, c, d
 
-    return substitute_four_unrolled
+    return substitute_four_bands
 
 
-#: Of the default mesh, half a film of 6 intervals, and of the coarser one where many models are compared.
+#: Of the default mesh, half a film of 6 intervals, of the coarser one where many models are compared, of any other.
 _factorise_6, _substitute_6, _substitute_four_6 = _factoriser(6), _substitution(6), _substitution_of_four(6)
 _factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(4), _substitution_of_four(4)
+_factorise, _substitute, _substitute_four = _factoriser(None), _substitution(None), _substitution_of_four(None)
 
 
 @inner
 def factorise(band: FloatArray) -> None:
     """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]; `band` (n, width + 1)."""
-    n, width = band.shape[0], band.shape[1] - 1
-    if width == 6 and n > width:
+    if band.shape[1] == 7:
         _factorise_6(band)
-        return
-    if width == 4 and n > width:
+    elif band.shape[1] == 5:
         _factorise_4(band)
-        return
-    for k in range(n):
-        pivot = band[k, 0]
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k, r] / pivot
-            if factor != 0.0:
-                for s in range(r, width + 1):
-                    band[k + r, s - r] -= factor * band[k, s]
-        for r in range(1, width + 1):
-            band[k, r] /= pivot
+    else:
+        _factorise(band)
 
 
 @inner
 def substitute(band: FloatArray, x: FloatArray) -> None:
     """Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,)."""
-    n, width = band.shape[0], band.shape[1] - 1
-    if width == 6 and n > width:
+    if band.shape[1] == 7:
         _substitute_6(band, x)
-        return
-    if width == 4 and n > width:
+    elif band.shape[1] == 5:
         _substitute_4(band, x)
-        return
-    for k in range(n):
-        for r in range(1, min(width, n - 1 - k) + 1):
-            x[k + r] -= band[k, r] * x[k]
-    for k in range(n - 1, -1, -1):
-        total = x[k] / band[k, 0]
-        for r in range(1, min(width, n - 1 - k) + 1):
-            total -= band[k, r] * x[k + r]
-        x[k] = total
+    else:
+        _substitute(band, x)
 
 
 @inner
@@ -168,26 +150,12 @@ def substitute_four(band: FloatArray, x: FloatArray) -> None:
 
     `band` (n, width + 1), `x` (n, 4).
     """
-    n, width = band.shape[0], band.shape[1] - 1
-    if width == 6 and n > width:
+    if band.shape[1] == 7:
         _substitute_four_6(band, x)
-        return
-    if width == 4 and n > width:
+    elif band.shape[1] == 5:
         _substitute_four_4(band, x)
-        return
-    for k in range(n):
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k, r]
-            for m in range(4):
-                x[k + r, m] -= factor * x[k, m]
-    for k in range(n - 1, -1, -1):
-        pivot = band[k, 0]
-        for m in range(4):
-            x[k, m] /= pivot
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k, r]
-            for m in range(4):
-                x[k, m] -= factor * x[k + r, m]
+    else:
+        _substitute_four(band, x)
 
 
 @inner

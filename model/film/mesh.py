@@ -111,13 +111,13 @@ def _parabolic_weights(z: FloatArray) -> FloatArray:
     return weights
 
 
-def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
-    """Allocate the arrays of one film, at rest at the inlet temperature."""
-    nt, nz = len(grid.angle) - 1, len(grid.z) - 1
-    shape = (nt + 1, nz + 1)
-    unknowns = nz - grid.first
-    n = (nt - 1) * unknowns
-    return FilmWork(
+def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWork, list[FilmWork]]:
+    """Allocate the arrays of films of one mesh side by side, and as parts, at rest at the inlet temperature."""
+    nt, nz = len(grids[0].angle) - 1, len(grids[0].z) - 1
+    unknowns = nz - grids[0].first
+    count, n = len(grids), (nt - 1) * unknowns
+    shape = (count, nt + 1, nz + 1)
+    stack = FilmWork(
         pressure=np.zeros(shape),
         ruptured=np.zeros(shape, dtype=np.bool_),
         temperature=np.full(shape, inlet_temperature),
@@ -128,9 +128,15 @@ def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
         gained=np.zeros(shape),
         thickness=np.zeros(shape),
         extra=np.zeros(shape),
-        flow_x=np.zeros((nt, nz + 1)),
-        flow_z=np.zeros((nt + 1, nz)),
-        band=np.zeros((n, unknowns + 1)),
-        unknown=np.zeros(n),
-        slopes=np.zeros((n, 4)),
+        flow_x=np.zeros((count, nt, nz + 1)),
+        flow_z=np.zeros((count, nt + 1, nz)),
+        band=np.zeros((count, n, unknowns + 1)),
+        unknown=np.zeros((count, n)),
+        slopes=np.zeros((count, n, 4)),
     )
+    return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
+
+
+def film_work(grid: FilmGrid, inlet_temperature: float) -> FilmWork:
+    """Allocate the arrays of one film."""
+    return film_works([grid], inlet_temperature)[1][0]

@@ -6,7 +6,6 @@ from model.compilation import inner
 from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
-from model.film.turbulence import solve_turbulent_film
 
 _JFO, _TURBULENT = range(2)
 #: Names, and by what compiled loops know them.
@@ -31,4 +30,4 @@ def solve_by(
         return solve_film(grid, work, wedge, speed, sharp)
     if model == _JFO:
         return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
-    return solve_turbulent_film(grid, work, wedge, speed, sharp)
+    return solve_film(grid, work, wedge, speed, sharp, True)

@@ -26,6 +26,7 @@ from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.slopes import derivatives, rupture_line
+from model.film.turbulence import heat_beyond, resist
 from rigdata.arrays import BoolArray, FloatArray
 
 #: A cold start moves the rupture line by one node a step, so that fine meshes need many.
@@ -58,7 +59,12 @@ class FilmForces(NamedTuple):
 
 @compiled
 def solve_film(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, sharp: bool
+    grid: FilmGrid,
+    work: FilmWork,
+    wedge: tuple[float, float, float],
+    speed: float,
+    sharp: bool,
+    turbulent: bool | None = None,
 ) -> FilmForces:
     """Pressure of one film and its derivatives.
 
@@ -74,6 +80,8 @@ def solve_film(
     sharp : bool
         Let the perturbed pressure vanish at the rupture line itself, not at the next node: second order in the
         mesh, for one more factorisation. Newton steps do without.
+    turbulent : bool, optional
+        True: by `model.film.turbulence`; `work.gained` is set to the heat beyond that of a laminar film [W].
 
     Returns
     -------
@@ -88,6 +96,9 @@ def solve_film(
     if not min_film > 0.0:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
     gx, gz = conductances(grid, work, clearance, a, b)
+    powers = None
+    if turbulent is not None:
+        powers = resist(grid, work, wedge, speed, (gx, gz))
     source = _source(grid, work, clearance, a, b, speed)
     steps = _active_set(grid, work, gx, gz, source)
     weight = grid.area
@@ -97,7 +108,9 @@ def solve_film(
             assemble(work.band, gx, gz, work.ruptured, grid.first)
             add_diagonal(work.band, diagonal, grid.first)
             factorise(work.band)
-        derivatives(grid, work, wedge, (gx, gz), None)
+        derivatives(grid, work, wedge, (gx, gz), powers)
+        if turbulent is not None:
+            heat_beyond(grid, work, speed)
     force, stiffness, damping = _integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, min_film, steps)
 

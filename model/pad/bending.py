@@ -37,7 +37,6 @@ class PadDeformation:
     shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
     amplitudes: FloatArray  #: (m, n): Amplitudes of the shapes in a deformation.
     response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
-    weights: FloatArray  #: (2, unknowns): Radial and tangential force by that pressure [m^2].
 
 
 class AxialTilt(NamedTuple):
@@ -78,7 +77,6 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     inner = np.zeros((len(angle), len(z)), dtype=bool)
     inner[1:-1, 0 if abs(z[0]) < 1e-9 * z[-1] else 1 : -1] = True
     unknown = inner.ravel()
-    weights = area * np.repeat(np.stack([np.cos(angle), np.sin(angle)]), len(z), axis=1)
     return PadDeformation(
         compliance=compliance,
         to_coarse=np.ascontiguousarray(to_coarse[:, wet]),
@@ -87,7 +85,6 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
         shapes=shapes.reshape(-1, len(z), SHAPES),
         amplitudes=amplitudes,
         response=np.ascontiguousarray((amplitudes @ compliance)[:, unknown]),
-        weights=np.ascontiguousarray(weights[:, unknown]),
     )
 
 

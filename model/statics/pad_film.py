@@ -9,13 +9,12 @@ import numpy as np
 
 from model.bearing import Oil, Pad
 from model.film.cross_film import CrossFilm, cross_film
-from model.film.mesh import FilmGrid, FilmWork, film_grid
+from model.film.mesh import FilmGrid, FilmWork, film_grid, film_works
 from model.film.oil_state import Running
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
 from model.setup import Setup
-from model.statics.compiled.stack import film_works
 from rigdata.arrays import FloatArray
 
 

@@ -25,7 +25,7 @@ def power_loss(equilibrium: Equilibrium, surface_speed: float, turbulent: bool =
             return math.nan
         shearing = work.viscosity if film.cross is None else film.cross.shear
         couette = shearing * surface_speed**2 / work.thickness
-        if turbulent:
+        if turbulent and film.cross is None:
             couette = couette * shear_factor(work, surface_speed)
         total += float((grid.area * couette * striation(work)).sum())
         slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx

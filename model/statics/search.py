@@ -11,6 +11,7 @@ import numpy as np
 from model.conditions import has_answer, named
 from model.film.attitudes import attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
+from model.film.following_heat import heat_impedance
 from model.film.models import FILM_MODELS
 from model.film.oil_state import Running, set_viscosity
 from model.film.resting import RestingFilm
@@ -27,6 +28,7 @@ from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
     ASKS_OIL,
+    ASKS_STABLE,
     BOUNDLESS_HEAT,
     FILM_LOST,
     HEAT,
@@ -35,13 +37,14 @@ from model.statics.compiled.iteration import (
     RESIDUAL,
     SETTLED,
     SINGULAR,
+    STABLE,
     Memory,
     fresh_memory,
     iterate,
     vector_size,
 )
 from model.statics.compiled.laws import OTHER, ask_laws, encoded
-from model.statics.compiled.place import place_pads
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
 from model.statics.compiled.start import first_position, pivot_curve, warm_film
 from model.statics.cross_heat import settle_cross_temperatures
@@ -330,18 +333,43 @@ class Search:
         size = vector_size(self.state, self.case)
         memory = fresh_memory(size, self.warm or self.case.thermal == ACROSS)
         code = ASKS_OIL
-        while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS):
+        while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):
             code = iterate(self.shapes, self.pads, self.works, self.state, self.case, memory)
             if code == ASKS_OIL:
+                running = self.case.running
+                turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))
                 for m, film in enumerate(self.films):
                     if not self.state.idle[m] and film.cross is not None:
-                        set_cross_viscosity(film.cross, film.work, self.case.running.oil)
+                        eddies = turbulent if film.rupture == "turbulent" else (0.0, 0.0)
+                        set_cross_viscosity(film.cross, film.work, running.oil, eddies)
             elif code == ASKS_HEAT:
                 memory.trail[HEAT] = self._heat_across(memory)
             elif code == ASKS_LAWS:
                 ask_laws(self.setup.pivots, self.pads.laws, self.state.felt[:, 0])
+            elif code == ASKS_STABLE:
+                memory.trail[STABLE] = float(not self._leave_unstable())
         self._take_over()
         return self._ended(code, memory)
+
+    def _leave_unstable(self) -> bool:
+        """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold."""
+        pads, state, moved = self.pads, self.state, False
+        for m in np.flatnonzero(state.solved).tolist():
+            if not is_doubtful(self.case, pads, state, m):
+                continue
+            if not is_stable(self.case, pads, state, m, state.stiffness[m] + self._heat_stiffness(m)):
+                moved = True
+                if not rescue(pads, self.works, state, m):
+                    let_idle(state, m)
+        return moved
+
+    def _heat_stiffness(self, m: int) -> FloatArray:
+        """What a temperature that follows adds to a film's stiffness, (2, 2) [N/m]."""
+        if self.case.thermal not in (ALONE, COUPLED):
+            return np.zeros((2, 2))
+        film, wedge = self.films[m], (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
+        running = film.running(self.surface_speed, self.setup.bearing.oil)
+        return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0).real)
 
     def _heat_across(self, memory: Memory) -> float:
         """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
@@ -377,12 +405,9 @@ class Search:
             else:
                 film.resting = RestingFilm(*state.resting[m].tolist())
             if grown_by:
-                less = film.pad.pad_clearance - float(self.pads.clearance[m])
-                film.pad = replace(
-                    film.pad,
-                    pad_clearance=film.pad.pad_clearance - less,
-                    assembled_clearance=film.pad.assembled_clearance - less,
-                )
+                clearance = float(self.pads.clearance[m])
+                assembled = film.pad.assembled_clearance + clearance - film.pad.pad_clearance
+                film.pad = replace(film.pad, pad_clearance=clearance, assembled_clearance=assembled)
 
     def _ended(self, code: int, memory: Memory) -> Equilibrium:
         """The state as an answer."""
@@ -395,13 +420,11 @@ class Search:
             names.insert(0, named("no pads against the load"))
         if has_answer(names):
             names += conditions.overloaded_pads(films)
-        idle = [f.number for f in films if f.idle]
-        if idle:
+        if idle := [f.number for f in films if f.idle]:
             names.append(named("idle pads {pads}", idle))
         if figures[BACKFLOW] > 0.0:
             names.append(named("flow back at a leading edge"))
-        short = starved(films)
-        if short:
+        if short := starved(films):
             ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
             names.append(named("pads {pads} are short of oil", short, ends))
         names += conditions.regimes(self.setup, films, self.surface_speed)
@@ -416,13 +439,11 @@ class Search:
         if not self.setup.friction:
             return []
         tilts = np.abs(self.state.moves[:, 0])
-        swinging = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
-        return [named("pads {pads} neither stick nor slide at rest", swinging.tolist())]
+        largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
+        return [named("pads {pads} neither stick nor slide at rest", largest.tolist())]
 
 
 def _as_started(setup: Setup) -> Setup:
     """The set-up with the clearances of a journal as warm as the supply."""
     supply, growth = setup.inlet_temperature, setup.growth
-    if growth is None:
-        return setup
-    return setup.change(bearing=grown(setup.bearing, growth, supply, supply))
+    return setup if growth is None else setup.change(bearing=grown(setup.bearing, growth, supply, supply))

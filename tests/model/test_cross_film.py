@@ -236,10 +236,9 @@ def test_temperatures_and_coefficients_hardly_hang_on_the_mesh(rocker):
     np.testing.assert_allclose(np.diag(p.c), np.diag(fine.c), rtol=0.01)
 
 
-def test_it_is_for_laminar_films_that_rupture(rocker):
-    for options in (Options(turbulence="ng-pan"), Options(cavitation="jfo")):
-        with pytest.raises(OptionError, match="laminar films"):
-            predict(rocker, 5000.0, DOWN, SPEED, thermal="thd", options=options)
+def test_it_is_for_films_that_rupture_by_swift_stieber(rocker):
+    with pytest.raises(OptionError, match="rupture by swift-stieber"):
+        predict(rocker, 5000.0, DOWN, SPEED, thermal="thd", options=Options(cavitation="jfo"))
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -78,3 +79,17 @@ def test_two_side_pads_that_only_carry_together_are_found_from_a_neighbour_witho
     warm = predict(ring, load_direction=-math.pi / 2, start=turned, **point)
     assert cold.idle_pads == warm.idle_pads == (3,)
     np.testing.assert_allclose(warm.h, cold.h, rtol=1e-5, atol=1e-5 * np.abs(cold.h).max())
+
+
+@pytest.mark.parametrize(("preload", "load", "direction"), [(0.1, 8750.0, -0.5), (0.05, 5000.0, -0.3)])
+def test_a_pad_near_its_fold_that_only_a_frozen_film_calls_unstable_carries(spherical, preload, load, direction):
+    pads = (replace(p, pad_clearance=p.assembled_clearance / (1.0 - preload)) for p in spherical.pads)
+    bearing = spherical.with_pads(tuple(pads))
+    point = {"load_direction": direction * math.pi, "speed": 2 * math.pi * 500.0}
+    p = predict(bearing, load, **point)
+    assert p.converged, p.status
+    assert p.idle_pads == ()
+    # the heated film holds it: a little more load moves the journal a little further, along the same branch
+    near = [predict(bearing, s * load, **point).position for s in (0.998, 1.002)]
+    np.testing.assert_allclose(0.5 * (near[0] + near[1]), p.position, rtol=2e-3, atol=1e-12)
+    assert 0.0 < float(np.hypot(*(near[1] - near[0]))) < 1e-6

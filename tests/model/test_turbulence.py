@@ -12,9 +12,11 @@ from scipy.optimize import brentq
 
 from model.bearing import Bearing
 from model.dynamics import bearing_impedance
+from model.film.cross_energy import cross_operator
+from model.film.cross_film import CrossOperator, cross_film, set_cross_viscosity
 from model.film.mesh import film_grid, film_work
 from model.film.reynolds import solve_film
-from model.film.turbulence import ACROSS, ALONG, SHEAR, excess, solve_turbulent_film
+from model.film.turbulence import ACROSS, ALONG, SHEAR, excess
 from model.options import Options
 from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
@@ -61,11 +63,11 @@ def test_thick_oil_is_laminar(rocker):
     np.testing.assert_allclose(p.h, laminar.h, rtol=1e-9, atol=1e-9 * np.abs(laminar.h).max())
 
 
-def film(a: float, b: float, speed: float, length: float, shape: tuple[int, int], solver=solve_turbulent_film):
+def film(a: float, b: float, speed: float, length: float, shape: tuple[int, int], turbulent: bool | None = True):
     grid = film_grid(-0.5, 0.5, 0.05, length, shape, True)
     work = film_work(grid, 40.0)
     work.viscosity[:], work.density[:] = 7e-4, 850.0
-    return solver(grid, work, (1.2e-4, a, b), speed, True), work, grid
+    return solve_film(grid, work, (1.2e-4, a, b), speed, True, turbulent), work, grid
 
 
 def test_an_endless_slider_is_its_quadrature():
@@ -85,7 +87,7 @@ def test_an_endless_slider_is_its_quadrature():
     for i in (80, 160, 240):
         exact = quad(slope, -0.5, grid.angle[i], args=(flow,))[0]
         assert work.pressure[i, 0] == pytest.approx(exact, rel=2e-4)
-    assert work.pressure.max() > 3.0 * film(a, b, speed, 50.0, (320, 4), solve_film)[1].pressure.max()
+    assert work.pressure.max() > 3.0 * film(a, b, speed, 50.0, (320, 4), None)[1].pressure.max()
 
 
 @pytest.mark.parametrize(("a", "b"), [(2e-5, 5e-5), (5e-5, 2e-5)])
@@ -138,3 +140,70 @@ def test_a_turbulent_film_is_asked_for_by_name(rocker):
         Options(turbulence="ngpan")
     with pytest.raises(ValueError, match="ruptures by swift-stieber"):
         Options(turbulence="ng-pan", cavitation="jfo")
+
+
+def across(reynolds: float, cells: int = 6):
+    """A film of one temperature and of a Reynolds number at its middle, with eddies across it."""
+    grid = film_grid(-0.5, 0.5, 0.05, 0.07, (80, 6), True)
+    work, oil = film_work(grid, 40.0), (7e-4, 0.0, 850.0, 0.0)
+    cross = cross_film(work, 40.0, cells)
+    speed = reynolds * 7e-4 / (850.0 * 1e-4)
+    work.thickness[:] = 1e-4
+    set_cross_viscosity(cross, work, oil, (speed, 2000.0 / 0.13))
+    return grid, work, cross, speed
+
+
+@pytest.mark.parametrize("reynolds", [1000.0, 2000.0, 5000.0, 2e4])
+def test_eddies_across_the_film_are_those_of_ng_and_pan(reynolds):
+    # their factors are fits to the same law of the wall, integrated across
+    coarse, fine = across(reynolds), across(reynolds, 60)
+    for _, work, cross, _ in (coarse, fine):
+        np.testing.assert_allclose(work.viscosity, 7e-4, rtol=1e-12)  # which the factors lower
+        assert cross.shear[0, 0] / 7e-4 == pytest.approx(1.0 + 0.0012 * reynolds**0.94, rel=0.04)
+    cross = fine[2]
+    middle, wide = 0.5 * (cross.edges[1:] + cross.edges[:-1]), np.diff(cross.edges)
+    driven = 12.0 * 7e-4 * float((wide * cross.fluidity[0, 0] * ((middle - 0.5) ** 2 + wide**2 / 12.0)).sum())
+    assert 12.0 / driven == pytest.approx(12.0 + 0.0043 * reynolds**0.96, rel=0.05)
+
+
+def test_a_turbulent_film_of_one_temperature_across_is_the_film_without_cells():
+    grid, work, _, speed = across(4000.0)
+    plain = film_work(grid, 40.0)
+    plain.viscosity[:], plain.density[:] = 7e-4, 850.0
+    wedge = (1.2e-4, 2e-5, 5e-5)
+    ours, theirs = (solve_film(grid, w, wedge, speed, True, True) for w in (work, plain))
+    for name in ("force", "stiffness", "damping"):
+        np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), rtol=1e-9)
+
+
+def test_heat_made_across_a_turbulent_film_is_the_work_of_its_shear_and_little_more():
+    grid, work, cross, speed = across(4000.0)
+    for _ in range(3):  # eddies by the film's own thickness
+        solve_film(grid, work, (1.2e-4, 2e-5, 5e-5), speed, False, True)
+        set_cross_viscosity(cross, work, (7e-4, 0.0, 850.0, 0.0), (speed, 2000.0 / 0.13))
+    operator = CrossOperator.place(*cross.temperature.shape)
+    cross_operator(grid, work, cross, speed, (2000.0, 0.13, 1.0, 1.0, 0.0), operator)
+    shear = cross.shear * speed**2 / work.thickness
+    made = 2.0 * operator.dissipation.sum()
+    weight = 2.0 * grid.dx * np.where(np.arange(81) % 80, 1.0, 0.5)[:, None] * grid.height
+    plain = float((weight * shear).sum())
+    assert plain < made < 1.1 * plain
+
+
+def test_temperatures_across_a_turbulent_film(rocker):
+    thin_oil = thin(rocker, 0.05)
+    p = run(thin_oil, "thd")
+    flat = run(thin_oil, "adiabatic")
+    assert p.reynolds > 1500.0
+    assert p.power_loss == pytest.approx(flat.power_loss, rel=0.15)
+    np.testing.assert_allclose(np.diag(p.k), np.diag(flat.k), rtol=0.25)
+    # eddies mix what a laminar film keeps apart
+    laminar = predict(thin_oil, 2000.0, DOWN, FAST, thermal="thd")
+    spread = [float(np.ptp(q.equilibrium.films[0].cross.temperature, axis=2).max()) for q in (p, laminar)]
+    assert spread[0] < 0.7 * spread[1]
+
+
+def test_below_a_reynolds_number_of_500_the_film_across_is_laminar(rocker):
+    laminar = predict(rocker, 5000.0, DOWN, 138.23, thermal="thd")
+    p = predict(rocker, 5000.0, DOWN, 138.23, thermal="thd", options=TURBULENT)
+    np.testing.assert_allclose(p.h, laminar.h, rtol=1e-9)

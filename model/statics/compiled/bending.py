@@ -31,10 +31,7 @@ class BodyStack(NamedTuple):
     to_coarse: np.ndarray  #: (k, c, n) of float32: Those temperatures by the film's.
     shapes: FloatArray  #: (k, nt + 1, nz + 1, m)
     amplitudes: FloatArray  #: (k, m, n)
-    response: FloatArray  #: (k, m, unknowns)
-    #: (k, 2, unknowns): See `model.pad.bending.PadDeformation`; the factor on the deformation is in `answer` and
-    #: `response`.
-    weights: FloatArray
+    response: FloatArray  #: (k, m, unknowns): With the factor on the deformation, as `answer`.
     supply: float
 
 
@@ -69,7 +66,6 @@ def _stacked(bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], facto
         np.array([b.shapes for b in kinds]),
         np.array([b.amplitudes for b in kinds]),
         np.array([factor * b.response for b in kinds]),
-        np.array([b.weights for b in kinds]),
         0.0,
     )
 
@@ -80,7 +76,6 @@ _RIGID = BodyStack(
     _NOTHING.astype(np.float32),
     _NOTHING.astype(np.float32),
     np.zeros((0, 0, 0, 0)),
-    _NOTHING,
     _NOTHING,
     _NOTHING,
     0.0,
@@ -178,7 +173,7 @@ def _close_loop(
     response, weights = np.empty((count, unknowns)), np.empty((2, unknowns))
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
     if body >= 0:
-        shapes[:, :, :bending], response[:bending], weights[:] = bodies.shapes[body], bodies.response[body], 0.0
+        shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
         for r in range(bending):
             matrix[r, r] = 1.0
             for q in range(change.size):

@@ -23,7 +23,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.edge_flows import edge_flows
-from model.film.energy import dissipate, heat_step, march
+from model.film.energy import between, dissipate, heat_step, march
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.film.slopes import pressure_change
@@ -170,7 +170,7 @@ def _answer(
         _into_pad(grid, bodies, bodies.which[m], rise, heat)
         for q in range(len(rise)):
             sources[0, q // columns, q % columns] -= heat[q]
-    backflow = march(grid, work, case.running, loss, fields, sources)
+    backflow = march(grid, work, case.running, loss, fields, between(sources))
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], backflow)
     if conducts and _bounded(fields):
         _conduct(grid, work, bodies, state, case, (m, loss), fields)
@@ -267,7 +267,7 @@ def _krylov(
         for q in range(nodes):
             taken[0, q // columns, q % columns] = -heat[q]
         fields[0, 0] = 0.0
-        march(grid, work, case.running, loss, fields, taken)
+        march(grid, work, case.running, loss, fields, between(taken))
         for q in range(nodes):
             images[k, q] = basis[k, q] - fields[0, q // columns, q % columns]
         if not _product(images[k], images[k]) < BOUNDLESS:

@@ -32,16 +32,17 @@ from model.statics.compiled.constants import (
     SLOW_ACROSS,
 )
 from model.statics.compiled.heat import Conduction, exchange_heat, heat_films
-from model.statics.compiled.place import is_stable, let_idle, rescue
+from model.statics.compiled.place import is_doubtful
 from model.statics.compiled.stack import BACKFLOW, GROWN, GridStack, PadStack, PadState
 from model.statics.compiled.step import grow_and_bend, move, newton, solve_pressures
 from rigdata.arrays import FloatArray
 
-#: How an iteration ends, or what it asks Python for: viscosities, temperatures for the pressures, the pivots' laws.
-SETTLED, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED, ASKS_OIL, ASKS_HEAT, ASKS_LAWS = range(8)
+#: How an iteration ends, or what it asks Python for: viscosities, temperatures for the pressures, the pivots' laws,
+#: whether pads are stable whose frozen film does not say so.
+SETTLED, FILM_LOST, BOUNDLESS_HEAT, SINGULAR, NOT_CONVERGED, ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE = range(9)
 
 #: Places in `Memory.trail`.
-_STAGE, ITERATION, RESIDUAL, HEAT, _BEST, _STALLED, _LEFT, _BEST_LEFT, RELAXED, _COUNT, _KEPT, TRAIL = range(12)
+_STAGE, ITERATION, RESIDUAL, HEAT, _BEST, _STALLED, _LEFT, _BEST_LEFT, RELAXED, _COUNT, _KEPT, STABLE, TRAIL = range(13)
 #: `_STAGE`
 _BEGIN, _PRESSURE, _HEATING, _STEPPING = range(4)
 
@@ -104,9 +105,10 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
             trail[RESIDUAL] = math.inf
             return SINGULAR
         if residual < accuracy and trail[HEAT] < HEAT_PER_FORCE * accuracy:
-            if not _leave_unstable(case, pads, works, state):
-                sharp, trail[_STAGE] = True, _PRESSURE
             trail[_COUNT] = 0
+            if trail[STABLE] == 0.0 and _doubts(case, pads, state):
+                return ASKS_STABLE
+            sharp, trail[_STAGE] = True, _PRESSURE
             continue
         _go_on(shapes, pads, works, state, case, memory, shift)
 
@@ -200,15 +202,10 @@ def _remember(memory: Memory) -> int:
 
 
 @inner
-def _leave_unstable(case: Case, pads: PadStack, works: FilmWork, state: PadState) -> bool:
-    """Move pads off attitudes that nothing holds, the part of a curve that comes back from its fold."""
+def _doubts(case: Case, pads: PadStack, state: PadState) -> bool:
     found = False
     for m in range(len(state.tilt)):
-        if not state.solved[m] or case.hold.flexure > 0.0 or is_stable(case, pads, state, m):
-            continue
-        found = True
-        if not rescue(pads, works, state, m):
-            let_idle(state, m)
+        found = found or (state.solved[m] and is_doubtful(case, pads, state, m))
     return found
 
 

@@ -7,11 +7,11 @@ import math
 from model.compilation import compiled, inner
 from model.film.mesh import FilmWork
 from model.interpolation import row_below
-from model.statics.compiled.case import Case, along, rigid_approach
+from model.statics.compiled.case import ALONE, COUPLED, Case, along, rigid_approach
 from model.statics.compiled.laws import compliance
 from model.statics.compiled.stack import PadStack, PadState
 from model.tilt_hold import held_moment
-from rigdata.arrays import BoolArray
+from rigdata.arrays import BoolArray, FloatArray
 
 #: How often a search puts a pad back on its loaded attitude that has lost it on the way.
 _RESCUES = 12
@@ -64,18 +64,28 @@ def margin(pads: PadStack, state: PadState, m: int) -> float:
 
 
 @inner
-def is_stable(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
-    """Whether film and pivot push a pad back from a small change of tilt and deflection.
+def is_doubtful(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
+    """Whether the frozen film leaves a pad's stability in doubt, or its wedge is flatter than that of its fold."""
+    if case.hold.flexure > 0.0:
+        return False
+    heated = case.thermal == ALONE or case.thermal == COUPLED
+    flat = heated and pads.rows[m] >= 2 and state.wedge[m, 1] < pads.attitudes[m, 2, 0]
+    return flat or not is_stable(case, pads, state, m, state.stiffness[m])
+
+
+@inner
+def is_stable(case: Case, pads: PadStack, state: PadState, m: int, k: FloatArray) -> bool:
+    """Whether film and pivot push a pad back from a small change of tilt and deflection: `k` (2, 2) of the film [N/m].
 
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
-    with what holds the tilt back added to the film's moment. These slopes are those of a film that stays as warm as it
-    is; on the heated film the branch that comes back from the fold is unstable, whose wedges are flatter than the
-    fold's. An unloaded film leaves a wedge that opens, or a load that is not told from none.
+    with what holds the tilt back added to the film's moment. What counts is the film whose heat follows: the branch
+    that comes back from the fold is unstable by it, and near a fold the frozen one calls unstable what is not. An
+    unloaded film leaves a wedge that opens, or a load that is not told from none.
     """
     none = case.accuracy * math.hypot(case.load[0], case.load[1])
     if case.hold.slip == 0.0 and (state.wedge[m, 1] <= pads.flattest[m] or state.force[m, 0] <= none):
         return False
-    k, load, radius = state.stiffness[m], state.force[m, 0], pads.pivot_radius[m]
+    load, radius = state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
     _, stiffness, arm, _ = held_moment(case.hold, state.tilt[m], load)
     arm = arm / radius

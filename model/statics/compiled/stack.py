@@ -112,34 +112,6 @@ def _stacked(same: tuple[_Same, ...]) -> GridStack:
     return GridStack(**arrays, first=grids[0].first)
 
 
-def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWork, list[FilmWork]]:
-    """Allocate the arrays of all films, at rest at the inlet temperature."""
-    nt, nz = len(grids[0].angle) - 1, len(grids[0].z) - 1
-    unknowns = nz - grids[0].first
-    count, n = len(grids), (nt - 1) * unknowns
-    fields = np.zeros((8, count, nt + 1, nz + 1))
-    fields[1] = inlet_temperature
-    pressure, temperature, viscosity, density, exchange, gained, thickness, extra = fields
-    stack = FilmWork(
-        pressure,
-        np.zeros((count, nt + 1, nz + 1), dtype=np.bool_),
-        temperature,
-        viscosity,
-        density,
-        np.ones((count, nt + 1, nz + 1)),
-        exchange,
-        gained,
-        thickness,
-        extra,
-        np.zeros((count, nt, nz + 1)),
-        np.zeros((count, nt + 1, nz)),
-        np.zeros((count, n, unknowns + 1)),
-        np.zeros((count, n)),
-        np.zeros((count, n, 4)),
-    )
-    return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
-
-
 @inner
 def grid_of(grids: GridStack, m: int) -> FilmGrid:
     """One pad's mesh."""
