@@ -332,7 +332,7 @@ def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
         nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
         return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
 
-    meant: dict[str, tuple[Callable[[list[float], float], bool], Callable[[float], float]]] = {
+    meant: dict[str, tuple[Any, Any]] = {
         "direction": (close, rounded),
         "speed": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),
         "excitation": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),

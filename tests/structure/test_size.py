@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (134.78, 16_146),
     "model": (92.4, 12_060),
-    "rigdata": (70.94, 9_495),
+    "rigdata": (70.98, 9_495),
     "diagnosis": (38.77, 4_790),
     "cli": (29.3, 4_095),
     "report": (28.29, 3_630),
