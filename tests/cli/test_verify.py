@@ -8,6 +8,8 @@ import shutil
 import pytest
 
 from tests.command_line import tpjb
+from tpjb_ident.cli.commands.verify import files_of
+from tpjb_ident.cli.common.command import Command
 from tpjb_ident.runtime.output_folder import READY
 
 
@@ -115,3 +117,24 @@ def test_another_version_is_a_note_and_the_answer_can_be_written(place, tmp_path
     answer = json.loads((tmp_path / "answer" / "verify.json").read_text())
     assert {f["state"] for f in answer["files"]} == {"same"}
     assert {f["role"] for f in answer["files"]} == {"result", "input"}
+
+
+def test_inputs_of_one_name_are_told_apart_by_their_folders(tmp_path):
+    command = Command("compare", {}, tmp_path / "out")
+    for folder in ("before", "after", "after/again"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "rig.toml").write_text(folder, encoding="utf-8")
+        command.file(tmp_path / folder / "rig.toml")
+    assert list(command.inputs) == ["rig.toml", "after/rig.toml", "again/rig.toml"]
+    paths = {name: f"../{folder}/rig.toml" for name, folder in (("a", "before"), ("b", "after"), ("c", "after/again"))}
+    entry = {"inputs_at": paths, "inputs_sha256": command.inputs}
+    (tmp_path / "out").mkdir()
+
+    def states():
+        return [file["state"] for file in files_of(tmp_path / "out", "compare", entry, ())]
+
+    assert states() == ["same", "same", "same"]
+    (tmp_path / "after" / "rig.toml").write_text("changed", encoding="utf-8")
+    assert states() == ["same", "differs", "same"]
+    (tmp_path / "before" / "rig.toml").write_text("changed", encoding="utf-8")
+    assert states() == ["differs", "differs", "same"]

@@ -63,6 +63,7 @@ def test_the_delimiter_is_that_of_the_names(tmp_path, delimiter):
         (GOOD.replace("22", "22 Hz"), "line 2, shaft_speed_Hz: '22 Hz' is no number"),
         (GOOD.replace("22", "1_000"), "is no number"),
         (GOOD.replace("22", "٢٢"), "is no number"),
+        (GOOD.replace("22", '"22,5"'), "'22,5' is no number. Write a decimal point"),
         (GOOD.replace("5000", "inf"), "'inf' is no number"),
         (GOOD.replace("5000", "1e999"), "is no number"),
         (GOOD.replace("5000", "-5000"), "static_load_N: -5000 is below 0"),

@@ -72,7 +72,7 @@ MUTANTS = (
     Mutant(_COMPARISON, "= values[name], low, high", "= values[name], high, low"),
     Mutant(_EFFECTS, "value[p.name] - s", "value[p.name] + s"),
     Mutant(_EFFECTS, "min(ends), max(ends)", "max(ends), max(ends)"),
-    Mutant(_EXPORTS, "low[name], high[name] = high[name], low[name]", "pass"),
+    Mutant(_EXPORTS, 'zip(ENDS, ("", "_hi", "_lo")', 'zip(ENDS, ("", "_lo", "_hi")'),
 )  # fmt: skip
 
 

@@ -158,7 +158,8 @@ def _value(cell: str, column: Column | None, ending: str, place: str) -> object:
         return _INFINITE[cell]
     number = float(cell) if _NUMBER.fullmatch(cell) else math.nan
     if not math.isfinite(number):
-        remedy = "Leave the cell empty where nothing is known"
+        is_comma = _NUMBER.fullmatch(cell.replace(",", "."))
+        remedy = "Write a decimal point" if is_comma else "Leave the cell empty where nothing is known"
         raise BadInputError(f"{place}: {cell[:40]!r} is no number. {remedy}.")
     least = column.least(ending)
     if number < least:

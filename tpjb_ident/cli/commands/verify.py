@@ -88,9 +88,13 @@ def files_of(results: Path, name: str, entry: dict[str, Any], given: Sequence[Pa
     for place in places:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
+    around = [parent for folder in folders for parent in folder.resolve().parents]
     for file, recorded_hash in _texts(entry.get("inputs_sha256")).items():
         if recorded_hash != "missing":  # it was not there then either
-            yield {"command": name, "role": "input", "file": file, "state": _state(folders, file, recorded_hash)}
+            state = _state(folders, file, recorded_hash)
+            if state == "missing" and "/" in file:  # its folder tells it from another file of its name
+                state = _state(around, file, recorded_hash)
+            yield {"command": name, "role": "input", "file": file, "state": state}
 
 
 def _texts(entry: Any) -> dict[str, str]:

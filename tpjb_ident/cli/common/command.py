@@ -123,10 +123,15 @@ class Command(Terminal):
 
     @functools.cached_property
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of everything that was opened, by file; worked out when it is first asked for."""
+        """SHA-256 of everything that was opened, by file, with its folder where another file has its name."""
         hashes: dict[str, str] = {}
         for source in self._opened:
-            hashes |= {source.name: sha256(source)} if isinstance(source, Path) else source.fingerprint()
+            files = {source.name: sha256(source)} if isinstance(source, Path) else source.fingerprint()
+            path = (source if isinstance(source, Path) else source.path).resolve()
+            folder, prefix = path if path.is_dir() else path.parent, ""
+            while any(hashes.get(prefix + name, digest) != digest for name, digest in files.items()):
+                folder, prefix = folder.parent, f"{folder.name}/{prefix}"
+            hashes |= {prefix + name: digest for name, digest in files.items()}
         return hashes
 
     @contextlib.contextmanager
