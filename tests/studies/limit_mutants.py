@@ -32,7 +32,7 @@ class Mutant(NamedTuple):
 
 _IDENTIFIED = "tpjb_ident/dynamic/results/identification.py"
 _STIFFNESS = "tpjb_ident/dynamic/estimators/stiffness.py"
-_BANDS = "tpjb_ident/dynamic/broadband/band_result.py"
+_BANDS = "tpjb_ident/dynamic/results/band_result.py"
 _PIVOTS = "tpjb_ident/pivot/curve.py"
 _PIVOT_TABLE = "tpjb_ident/pivot/tables.py"
 _DIFFERENCE = "tpjb_ident/compare/difference.py"
