@@ -33,6 +33,7 @@ class Mutant(NamedTuple):
 _IDENTIFIED = "tpjb_ident/dynamic/results/identification.py"
 _STIFFNESS = "tpjb_ident/dynamic/estimators/stiffness.py"
 _BANDS = "tpjb_ident/dynamic/results/band_result.py"
+_MODELS = "tpjb_ident/dynamic/results/frequency_model.py"
 _PIVOTS = "tpjb_ident/pivot/curve.py"
 _PIVOT_TABLE = "tpjb_ident/pivot/tables.py"
 _DIFFERENCE = "tpjb_ident/compare/difference.py"
@@ -44,6 +45,7 @@ TESTS = {
     _IDENTIFIED: ("tests/runtime/test_intervals.py", "-k", "points"),
     _STIFFNESS: ("tests/dynamic/test_joints.py",),
     _BANDS: ("tests/runtime/test_intervals.py", "-k", "bands"),
+    _MODELS: ("tests/runtime/test_intervals.py",),
     _PIVOTS: ("tests/pivot/test_tables.py",),
     _PIVOT_TABLE: ("tests/pivot/test_tables.py",),
     _DIFFERENCE: ("tests/compare/test_difference.py", "-m", "not slow"),
@@ -61,8 +63,8 @@ MUTANTS = (
     Mutant(_STIFFNESS, "np.hypot(random, calibration)", "random"),
     Mutant(_BANDS, '_lo": value - half[i], f', '_lo": value + half[i], f'),
     Mutant(_BANDS, '_hi": value + half[i]}', '_hi": value - half[i]}'),
-    Mutant(_BANDS, '_lo": value - half[i] if', '_lo": value + half[i] if'),
-    Mutant(_BANDS, '_hi": value + half[i] if', '_hi": value - half[i] if'),
+    Mutant(_MODELS, "value - half, value + half,", "value + half, value + half,"),
+    Mutant(_MODELS, "value - half, value + half,", "value - half, value - half,"),
     Mutant(_PIVOTS, "centre * np.exp(-half)", "centre * np.exp(half)"),
     Mutant(_PIVOTS, "np.asarray(centre * np.exp(half))", "np.asarray(centre * np.exp(-half))"),
     Mutant(_PIVOT_TABLE, 'f"{TANGENT}_lo": lo', 'f"{TANGENT}_lo": hi'),
