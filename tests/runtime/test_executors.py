@@ -229,3 +229,17 @@ def test_what_somebody_else_froze_for_the_garbage_collector_stays_frozen():
         assert gc.get_freeze_count() > 0
     finally:
         gc.freeze()
+
+
+def test_a_signal_that_is_held_is_heard_where_the_block_fails_too():
+    def call_a_worker():
+        with executors._interrupts_held():
+            signal.raise_signal(signal.SIGINT)
+            raise RuntimeError("the same signal ended the worker")
+
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            call_a_worker()
+    finally:
+        signal.signal(signal.SIGINT, former)

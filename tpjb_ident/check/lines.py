@@ -56,12 +56,15 @@ def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) 
     return RecordLines(fit.mean[0], missing + 0j, missing, fit.scale[0])
 
 
-def other_line(phasors: RunPhasors | None) -> float:
-    """Frequency of the line that nobody mentioned and that is strongest in the cells [Hz]; NaN where there is none."""
+def other_line(phasors: RunPhasors | None, astray: Sequence[int] = ()) -> float:
+    """Frequency of the line that nobody mentioned and that is strongest in the cells [Hz]; NaN where there is none.
+
+    Excitation lines that are `astray`, by number, are not where they were said to be: nobody mentioned them either.
+    """
     strongest, frequency = 0.0, float("nan")
     known = phasors.lines.excitation + phasors.lines.nuisance if phasors is not None else ()
     for k, line in enumerate(known):
-        if line.name == "found" and phasors is not None:
+        if (line.name == "found" or k in astray) and phasors is not None:
             sizes = np.linalg.norm(phasors.cell_force.phasors[:, k], axis=1)
             size = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
             if size > strongest:

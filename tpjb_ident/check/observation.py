@@ -102,12 +102,14 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
     thin = slice(None, None, max(1, len(time) // _DECIMATED))
     band, omega, lines = _over_band(run, live, used[:_FITTED], lines)
+    places = range(len(phasors.lines.excitation)) if phasors is not None else ()
+    astray = [k for k in places if phasors is not None and not _near_set_point(run, phasors, k)]
     return Observation(
         run=run,
         channels=live,
         lines=lines,
         spread=_spread(used),
-        other_line=other_line(phasors),
+        other_line=other_line(phasors, astray),
         samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,

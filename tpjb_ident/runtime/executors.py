@@ -283,8 +283,8 @@ def _interrupts_held() -> Iterator[None]:
     finally:
         for kind, handler in former.items():
             signal.signal(kind, handler or signal.SIG_DFL)
-    for number in held[:1]:
-        signal.raise_signal(number)
+        for number in held[:1]:  # also where the block failed: the signal may have ended the workers that it calls
+            signal.raise_signal(number)
 
 
 @contextmanager
