@@ -92,6 +92,8 @@ WARNINGS = {
     "of the other is off.",
     "directional-rejection": "Rejected windows gather in some excitation directions: that is how physics looks, "
     "not glitches. Look at these runs before relying on the point.",
+    "excitation-not-stated": "The table does not say how fast the shaft was shaken: once a turn was supposed. "
+    "State excitation_Hz.",
     "frame-turned": "All sides of the polygon are turned alike: probes or pads stand at other angles than stated.",
     "harmonic on excitation line": "A harmonic of another excitation falls on this one. Excite the two apart.",
     "inertia-not-corrected": "Without accelerometers the housing's inertia stays in the force: small at low "

@@ -32,6 +32,7 @@ def test_the_table_is_read_as_the_diagnosis_reads_it_and_gaps_stay_gaps(table, r
     assert frame["kyy_N_per_m"].tolist() == [told["kyy", 5000.0], told["kyy", 8750.0]]
     assert frame["cyy_Ns_per_m"][0] == pytest.approx(told["cyy", 5000.0] / (2 * math.pi * 25))
     assert frame["kyy_N_per_m_hi"][0] == pytest.approx(2e8 * (1 + 1.96 * 0.05), rel=1e-4)
+    assert frame["kxx_N_per_m"][0] == 1.2e8  # though its damping is missing
     assert np.isnan(frame["kxx_N_per_m"][1])
     assert frame["kxy_N_per_m"].isna().all()
 
@@ -45,6 +46,16 @@ def test_predictions_are_those_of_predict_and_measured_pivots_are_no_choice(tabl
     own = prediction_frame(predict_points(bearing, points, ModelSettings("kirk", "isothermal")), mesh_error=False)
     frame = comparison_frame(result)
     assert frame[frame["pivots"] == "kirk"]["kyy_N_per_m_predicted"].tolist() == own["kyy_N_per_m"].tolist()
+
+
+def test_a_table_without_excitations_says_what_was_supposed(tmp_path):
+    path = tmp_path / "read_off.csv"
+    path.write_text("static_load_N,shaft_speed_Hz,kxx_N_per_m\n5000,22,1.2e8\n6000,22,1.3e8\n", encoding="utf-8")
+    identification = compare_table(path, None, reading_error=0.05).identification
+    frame = identification.to_frame()
+    assert frame["excitation_Hz"].tolist() == [22.0, 22.0]
+    assert set(frame["quality"]) == {"excitation-not-stated"}
+    assert any("excitation-not-stated" in remark for remark in identification.remarks())
 
 
 @pytest.mark.slow
@@ -71,8 +82,9 @@ def test_what_is_missing_is_said(table, more, said):
 
 def test_our_own_table_keeps_its_whole_interval_and_its_flags(tmp_path):
     path = tmp_path / "coefficients.csv"
-    path.write_text("static_load_N,shaft_speed_Hz,kyy_N_per_m,kyy_N_per_m_se,kyy_N_per_m_lo,kyy_N_per_m_hi,quality\n"
-                    "5000,22,2e8,1e6,1.9e8,2.1e8,large-amplitude\n8750,22,3e8,2e6,,,ok\n", "utf-8")  # fmt: skip
+    path.write_text("static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m,kyy_N_per_m_se,kyy_N_per_m_lo,"
+                    "kyy_N_per_m_hi,quality\n5000,22,22,2e8,1e6,1.9e8,2.1e8,large-amplitude\n"
+                    "8750,22,22,3e8,2e6,,,ok\n", "utf-8")  # fmt: skip
     first, second = compare_table(path, None).identification.points
     assert first.stiffness.half_width()[3] == pytest.approx(1e7, rel=1e-4)
     assert second.stiffness.half_width()[3] == pytest.approx(1.96 * 2e6, rel=1e-4)

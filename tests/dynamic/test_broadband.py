@@ -328,6 +328,11 @@ def test_gains_that_differ_from_run_to_run_are_in_all_intervals(tmp_path):
     assert np.abs(z).max() < 1.5
 
 
+def _column(name: str, kind: str) -> str:
+    unit = "N_per_m" if name.startswith("k") else "Ns_per_m"
+    return f"{name}_{unit}_se" + ("" if kind == "random" else "_systematic")
+
+
 @pytest.mark.slow
 def test_the_command_writes_h_over_the_band_whole(tmp_path):
     path = campaign(tmp_path, BandRig(kind="multisine", seconds=6.0))
@@ -342,6 +347,12 @@ def test_the_command_writes_h_over_the_band_whole(tmp_path):
     rows = pd.read_csv(tmp_path / "out" / "coefficients.csv")
     assert len(rows) == 8
     assert set(rows["method"]) == {"band-periods"}
+    budget = pd.read_csv(tmp_path / "out" / "budget.csv")
+    kinds = (
+        budget["standard_uncertainty"].pow(2).groupby([budget["excitation_Hz"], budget["coefficient"], budget["kind"]])
+    )
+    for (_, name, kind), variance in kinds.sum().items():
+        assert np.isclose(rows[_column(name, kind)], np.sqrt(variance), rtol=1e-9).any(), (name, kind)
     exported = tpjb("export", tmp_path / "out", "--to", "ross", "--out", tmp_path / "ross")
     assert exported.exit_code == 0, exported.output
     assert tpjb("check", path, "--out", tmp_path / "checked").exit_code == 0

@@ -27,7 +27,10 @@ CLASSES = {
     "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
-NAMES = {"tpjb_ident/identification/point.py": {"load direction", "load miss", "amplitude"}}
+NAMES = {
+    "tpjb_ident/identification/shared_changes.py": {"load direction", "load miss"},
+    "tpjb_ident/identification/point.py": {"amplitude"},
+}
 #: Columns of the blocks that have the name of a term.
 COLUMNS = {field.name for field in dataclasses.fields(Blocks)}
 

@@ -125,6 +125,7 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     errors = np.where(np.isnan(stated), errors, stated)
     text = cells.get("quality") or cells.get("status") or ""
     status = tuple(name for name in str(text).split("; ") if name not in ("", "ok", "nan"))
+    status += ("excitation-not-stated",) if math.isnan(excitation) else ()
     position = (cells.get("x_m", math.nan), cells.get("y_m", math.nan))
     return TableRow(line, point, values, errors, position, cells.get("converged") is not False, status)
 

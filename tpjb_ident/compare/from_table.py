@@ -43,7 +43,7 @@ def compare_table(
             model = ModelSettings(name, settings.thermal, settings.effects)
             predictions = predict_points(bearing, [p.point for p in points], model, progress)
             variants.append(Variant(name, predictions))
-    identification = Identification(path.stem, _METHOD, points, np.zeros((0, 8 * len(points))))
+    identification = Identification(path.stem, _METHOD, points, np.zeros((1, 8 * len(points))))
     source = TableSource(path.stem)
     return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
 
@@ -51,7 +51,8 @@ def compare_table(
 def _point(row: TableRow) -> PointResult:
     """A row as if it had been identified; what it does not hold is NaN."""
     omega = row.point.excitation
-    h, errors = row.k + 1j * omega * row.c, row.errors * np.repeat([1.0, omega], 4)
+    h, errors = row.k.astype(complex), row.errors * np.repeat([1.0, omega], 4)
+    h.imag = omega * row.c  # a sum would lose a stiffness that stands without its damping
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
     quality = tuple(Condition(name) for name in row.status if name in KINDS)

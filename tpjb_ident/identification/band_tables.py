@@ -24,7 +24,7 @@ from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
-from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
+from tpjb_ident.identification.shared_changes import RUN_TERMS, SharedChanges, shared_changes
 
 #: Degrees of freedom of the noise of a model: it averages over many lines.
 _MANY = 1e4
@@ -223,6 +223,7 @@ def _estimate(
     part, solution = solved.first.parts[q], solved.first.part
     h, bracket = solved.between([s.part_h[q] for s in solved.solutions])
     shared = {name: share[q] for name, share in solution.shares.items() if np.any(share[q])}
+    own = {"random": solution.records[q]} | {name: shared.pop(name) for name in RUN_TERMS if name in shared}
     rig = point.baseline.at(part.omega)
     if rig is not None:
         shared["baseline"] = rig[1]
@@ -231,8 +232,8 @@ def _estimate(
     of_part = _part_of_block(solved)
     dof = _freedom(solved, solution, of_part, q, _noise_dof(solved, of_part == q))
     condition = float(np.median([line.stiffness.condition for line in result.lines])) if result.lines else np.nan
-    est = DynamicStiffness(
-        h, part.omega, solution.records[q], dof, f"band-{point.method}", np.ones((1, 2)), condition=condition
-    )
-    systematic = np.sum([np.zeros((8, 8)), *shared.values()], axis=0)
-    return replace(est, systematic=systematic), {"random": solution.records[q]} | shared
+    covariance, systematic = (np.sum([np.zeros((8, 8)), *parts.values()], axis=0) for parts in (own, shared))
+    return DynamicStiffness(
+        h, part.omega, covariance, dof, f"band-{point.method}", np.ones((1, 2)), condition=condition,
+        systematic=systematic,
+    ), own | shared  # fmt: skip

@@ -193,15 +193,10 @@ def _mains(
         usual = float(np.median(np.linalg.norm(F[mine], axis=1))) if mine.any() else 1.0
         in_cells = float(np.linalg.norm(force)) / usual / np.sqrt(2)
         scatter = float(np.hypot(max(typical, _LEAST_SCATTER), in_cells if in_cells > typical else 0.0))
-        fit = fit_mains(D[mine], F[mine], pickup, scatter) if solution_possible(solution, p) else None
+        fit = fit_mains(D[mine], F[mine], pickup, scatter) if np.isfinite(solution.h[p]).all() else None
         if fit is not None:
             fits[p] = fit
     return pickup, fits
-
-
-def solution_possible(solution: Solution, p: int) -> bool:
-    """Whether a point has an answer."""
-    return bool(np.isfinite(solution.h[p]).all())
 
 
 def at_set_point(rig: Rig, blocks: Blocks, solution: Solution) -> tuple[ComplexArray, ComplexArray]:

@@ -26,7 +26,7 @@ from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
 from tpjb_ident.identification.methods import own_method
-from tpjb_ident.identification.point import RUN_TERMS, PointTask, finished_point, point_share
+from tpjb_ident.identification.point import PointTask, finished_point, point_share
 from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.runtime.executors import Workers, map_ordered
@@ -158,6 +158,6 @@ def assemble(
     excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
     conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
     named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
-    shared = shared_changes(solved.solution, range(len(sources)), RUN_TERMS)
+    shared = shared_changes(solved.solution, range(len(sources)))
     remarks = unstated(campaign) + conditions
     return Identification(campaign.id, settings.method, named, shared.changes, remarks, calibration_names=shared.names)

@@ -30,9 +30,8 @@ from tpjb_ident.identification.point_means import (
     vectors,
     window_times,
 )
+from tpjb_ident.identification.shared_changes import RUN_TERMS
 
-#: Terms whose uncertainty scatters with the runs; that of all others is common to the campaign.
-RUN_TERMS = ("load miss", "load direction")
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
 

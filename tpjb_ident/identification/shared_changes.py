@@ -10,6 +10,9 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from tpjb_ident.estimate.solve import Solution
 
+#: Terms whose uncertainty scatters with the runs; that of all others is common to the campaign.
+RUN_TERMS = ("load miss", "load direction")
+
 
 @dataclass(frozen=True)
 class SharedChanges:
@@ -32,10 +35,10 @@ class SharedChanges:
         return SharedChanges(rows, names)
 
 
-def shared_changes(solution: Solution, points: Sequence[int], scattering: Sequence[str] = ()) -> SharedChanges:
+def shared_changes(solution: Solution, points: Sequence[int]) -> SharedChanges:
     """Changes of some points of a solve by all terms but points' own, and those that scatter from run to run."""
     shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
-    rows = [k for k, (term, _) in enumerate(shared) if term.name not in scattering]
+    rows = [k for k, (term, _) in enumerate(shared) if term.name not in RUN_TERMS]
     names = tuple(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows)
     if not rows:
         return SharedChanges(np.zeros((1, 8 * len(points))))

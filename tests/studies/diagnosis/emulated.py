@@ -24,6 +24,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from model.effects import Effect, apply_effects
+from model.effects.kind import EffectError
 from model.pivots import PivotLaw, ScaledPivot
 from model.setup import Setup
 from rigdata.arrays import FloatArray
@@ -305,7 +306,7 @@ def _spline(
         told = known if isinstance(known, np.ndarray) else known(share * reach)
         try:
             values.append(solve(forward, moved(share * reach), points) - told if share else np.zeros_like(told))
-        except NoEquilibriumError:
+        except (NoEquilibriumError, EffectError):  # none there, or nothing that could be built
             continue
         nodes.append(share * reach)
     return CubicSpline(np.array(nodes), np.array(values), bc_type="natural")

@@ -109,6 +109,11 @@ class Fit:
         out = (theta <= unknowns.low + near) | (theta >= unknowns.high - near)
         return any(out[at].any() for at in unknowns.slices)
 
+    def needs_more(self, settings: Deciding) -> bool:
+        """Whether it surely leaves a larger model error than right models do."""
+        wrong = self.problem.errors.scales > settings.right
+        return float(self.posterior.weights[wrong].sum()) >= settings.included
+
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
@@ -178,19 +183,21 @@ class Start:
     theta: FloatArray = field(repr=False)
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
+    solved: Point | None = None  #: where the model that it was proposed beside was solved
 
 
 def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
+    point = start.solved
     for share in _SHARES:  # nearer to what is stated, where there is no equilibrium
         theta = share * np.clip(start.theta, unknowns.low, unknowns.high)
         (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
         if predicted is not None:
+            point = _better(problem, unknowns, Point(theta, predicted, start.jacobian), start)
             break
-    else:
+    if point is None:
         return None
-    point = Point(theta, predicted, start.jacobian)
     if start.coarse:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
@@ -198,8 +205,17 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
         point = _renewed(run, problem, unknowns, point)  # those from before the jump say nothing behind it
         point = _stepped(run, problem, unknowns, point, coarse, held)
         point = _stepped(run, problem, unknowns, point, coarse, unknowns.width)
+        point = _renewed(run, problem, unknowns, point)
     point = _stepped(run, problem, unknowns, point, problem.errors, unknowns.width)
     return Fit(problem, unknowns, point, posterior(problem.errors, _linear(problem, unknowns, point)))
+
+
+def _better(problem: Problem, unknowns: Unknowns, point: Point, start: Start) -> Point:
+    """What a step promised, or where it began: a jump of K and C may lie between them."""
+    if start.solved is None or start.coarse:
+        return point
+    totals = [posterior(problem.errors, _linear(problem, unknowns, p)).total for p in (point, start.solved)]
+    return point if totals[0] >= totals[1] else start.solved
 
 
 def refined(run: Map, fit: Fit) -> Fit:

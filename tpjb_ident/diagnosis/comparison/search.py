@@ -14,9 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
+from tpjb_ident.diagnosis.comparison.fit import Fit, Point, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, scores
@@ -26,8 +25,8 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
-#: Nats that put a coarse start before all others.
-_FIRST = 1e6
+#: Nats that put a coarse start before all others; nats that make another start worth a fit.
+_FIRST, _CLEAR = 1e6, 1.0
 
 
 @dataclass(frozen=True)
@@ -90,6 +89,7 @@ class _Search:
     def __init__(self, run: Map, problem: Problem, settings: DiagnoseSettings, report: Progress) -> None:
         self.run, self.problem, self.settings, self.report = run, problem, settings, report
         self.fits: dict[frozenset[str], Fit] = {}
+        self.tried = 0
         self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Proposal] = {}
         self.paths: tuple[Path, ...] = ()
@@ -103,7 +103,8 @@ class _Search:
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
         if baseline.posterior.promised + self._log_prior(()) > best - self.settings.worth_derivatives:
-            self.fits[frozenset()] = self._renewed(baseline)
+            self.fits[frozenset()] = baseline = self._renewed(baseline)
+        self._propose_neighbours(baseline)  # from where its tolerances have gone, as from every other fit
         while (proposal := self._next()) is not None:
             self.report(f"fits, {len(self.fits)}", min(0.9, 0.2 + 0.7 * len(self.fits) / self.settings.most_fits))
             self._fit(proposal)
@@ -111,11 +112,11 @@ class _Search:
 
     def _next(self) -> Proposal | None:
         """The likeliest proposal; None where none comes near the leader."""
-        if len(self.fits) >= self.settings.most_fits:
+        if self.tried >= self.settings.most_fits:
             return None
         order = sorted(self.proposals.values(), key=lambda p: -p.estimate)
         leader = self._leader()
-        if leader is not None and leader.posterior.scale <= self.settings.right:
+        if leader is not None and not leader.needs_more(self.settings):
             order = [p for p in order if self._promising(p, leader)]
         return self.proposals.pop(order[0].labels) if order else None
 
@@ -136,15 +137,26 @@ class _Search:
         again = refined(self.run, fit)
         return again if again.posterior.total > fit.posterior.total - 1.0 else fit
 
+    def _past_jumps(self, fit: Fit) -> Fit:
+        """A fit that leads and is surely wrong, begun coarsely where that makes it better."""
+        again = fitted(self.run, self.problem, Start(fit.faults, fit.point.theta, fit.point.jacobian, coarse=True))
+        return fit if again is None or again.posterior.total <= fit.posterior.total else again
+
     def _fit(self, proposal: Proposal, rough: bool = False) -> None:
         fit = fitted(self.run, self.problem, proposal)
+        self.tried += 1
         if fit is None:
             return
         leader = self._leader()
-        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
+        right = leader is not None and not (leader.needs_more(self.settings) and fit.needs_more(self.settings))
         # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
         if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
             fit = self._renewed(fit)
+        if not rough and fit.needs_more(self.settings) and self._near(fit, fit.posterior.promised, 0.0):
+            fit = self._past_jumps(fit)
+        known = self.fits.get(proposal.labels)
+        if known is not None and known.posterior.total >= fit.posterior.total:
+            return
         self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
@@ -187,19 +199,20 @@ class _Search:
             ends = [end * float(path.fault.width[0]) for path in self.paths]
             self.paths = lengthened(self.run, problem, self.paths, ends)
             singles = scores(problem.errors, linear, self.paths, strain)
+        stated = Point(nothing, base, columns)
         for score in singles:
-            self._propose(score, (), nothing, columns)
+            self._propose(score, (), stated)
         if singles and singles[0].scale > suspect:
             held = Linear(linear.residual, nothing, columns, np.full(len(nothing), self.settings.held))
             for score in scores(problem.errors.coarse, held, self.paths, strain)[: self.settings.coarse]:
-                self._propose(score, (), nothing, columns, coarse=True)
+                self._propose(score, (), stated, coarse=True)
 
     def _propose_neighbours(self, fit: Fit) -> None:
         """One fault more, and one less."""
         if len(fit.faults) < len(self.settings.prior) - 1:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
-                self._propose(score, fit.faults, fit.point.theta, fit.point.jacobian)
+                self._propose(score, fit.faults, fit.point)
         if len(fit.faults) > 1:
             for fault in fit.faults:
                 self._propose_without(fit, fault)
@@ -210,10 +223,8 @@ class _Search:
             return path
         return Path(path.fault, fit.point.jacobian[:, [fit.unknowns.amplitudes + path.fault.own]])
 
-    def _propose(
-        self, score: Score, faults: tuple[Fault, ...], theta: FloatArray, jacobian: FloatArray, coarse: bool = False
-    ) -> None:
-        """Add a fault to a model: what its tolerance had found is where it begins."""
+    def _propose(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> None:
+        """Add a fault to a model."""
         if not np.any(score.amplitudes):
             return
         fault = score.path.fault.turned()
@@ -221,35 +232,38 @@ class _Search:
         estimate = score.total + self._log_prior(faults) + (_FIRST if coarse else 0.0)
         if score.p < self.settings.untenable:  # it would have to be a step on the way
             estimate -= self.settings.near
+        theta, jacobian = point.theta, point.jacobian
         if fault.own < 0:
             first = len(theta) - len(self.problem.nuisances)
             theta = np.insert(theta, [first] * len(fault.width), 0.0)
             jacobian = np.insert(jacobian, [first] * len(fault.width), 0.0, axis=1)
-        else:
-            theta, jacobian = theta.copy(), jacobian.copy()
         start = Unknowns(self.problem, faults).slices[-1].start
         at = slice(start, start + len(score.amplitudes))
-        theta[at] += score.amplitudes
+        jacobian = jacobian.copy()
         jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
-        self._offer(Proposal(faults, theta, jacobian, coarse, estimate))
+        solved = Point(theta, point.prediction, jacobian)
+        theta = theta.copy()
+        theta[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
+        self._offer(Proposal(faults, theta, jacobian, coarse, solved, estimate))
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
-        """Take a fault from a model; its tolerance has its stated prior again."""
+        """Take a fault from a model; its tolerance has its stated prior again, and stays where it is."""
         faults = tuple(f for f in fit.faults if f is not fault)
         point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
-        residual = self.problem.measured - point.prediction + point.jacobian[:, at] @ point.theta[at]
-        theta, jacobian = point.theta.copy(), point.jacobian
-        theta[at] = 0.0
+        residual = self.problem.measured - point.prediction
+        theta, jacobian = point.theta, point.jacobian
         if fault.own < 0:
+            residual = residual + jacobian[:, at] @ theta[at]
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
         linear = Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
         estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
         self._offer(Proposal(faults, theta, jacobian, estimate=estimate))
 
     def _offer(self, proposal: Proposal) -> None:
-        """Keep the likeliest start of every explanation that was not fitted yet."""
-        known = self.proposals.get(proposal.labels)
-        if proposal.labels not in self.fits and (known is None or known.estimate < proposal.estimate):
+        """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
+        known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
+        better = fit is None or proposal.estimate > self._log_probability(fit) + _CLEAR
+        if better and (known is None or known.estimate < proposal.estimate):
             self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:

@@ -37,7 +37,7 @@ def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judge
     if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
         return _without_effects(held, settings)
     sure = _sure(comparison, settings)
-    model = _exactly(comparison, sure) or comparison.best
+    model = _exactly(comparison, sure, settings) or comparison.best
     held = held_out_gap(run, model)
     judgement = _of_model(comparison, model, held, settings)
     return replace(judgement, drift=drifts(model, settings.drifting)) if model.faults else judgement
@@ -46,7 +46,7 @@ def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judge
 def _of_model(comparison: Comparison, model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
     sure = _sure(comparison, settings)
-    if model.posterior.scale > settings.right:
+    if model.needs_more(settings):
         reason = (
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
             f"stated one; right ones need {settings.right:g} at the most"
@@ -61,7 +61,7 @@ def _of_model(comparison: Comparison, model: Fit, held: HeldOut, settings: Diagn
 
 def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     nothing = held.fit
-    if held.before <= settings.quiet or nothing.posterior.scale <= settings.right:
+    if held.before <= settings.quiet or not nothing.needs_more(settings):
         reason = f"no disagreement beyond noise and stated tolerances (p = {nothing.p:.2g})"
         return Judgement("consistent", held, (reason,))
     reason = (
@@ -75,9 +75,11 @@ def _sure(comparison: Comparison, settings: DiagnoseSettings) -> frozenset[str]:
     return frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
 
 
-def _exactly(comparison: Comparison, names: frozenset[str]) -> Fit | None:
-    """The most probable tenable fit with exactly these names."""
-    return next((f for f in comparison.fits if names and f.names == names and comparison.is_tenable(f)), None)
+def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> Fit | None:
+    """The most probable tenable fit with exactly these names, unless it is as sure that one of a few stands beside."""
+    fit = next((f for f in comparison.fits if sure and f.names == sure and comparison.is_tenable(f)), None)
+    beside = fit is not None and comparison.probability(fit) <= 1.0 - settings.included
+    return None if beside and _family(comparison, sure, settings) else fit
 
 
 def _family(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> tuple[str, ...]:

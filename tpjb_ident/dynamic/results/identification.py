@@ -186,7 +186,7 @@ def _estimate_row(p: PointResult, est: DynamicStiffness, group: StaticFits | Non
         n_records=p.n_records,
         n_windows=p.n_windows,
         condition_number=est.condition,
-        outlier_fraction=float((weights < REJECTED_WEIGHT).mean()),
+        outlier_fraction=float((weights < REJECTED_WEIGHT).sum()) / max(len(weights), 1),
         quality="; ".join(str(c) for c in conditions) or "ok",
         quality_detail="; ".join(c.sentence() for c in conditions),
         n_windows_rejected=int((weights < REJECTED_WEIGHT).sum()),
