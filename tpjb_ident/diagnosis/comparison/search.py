@@ -116,7 +116,7 @@ class _Search:
             return None
         order = sorted(self.proposals.values(), key=lambda p: -p.estimate)
         leader = self._leader()
-        if leader is not None and not leader.needs_more(self.settings):
+        if leader is not None and leader.posterior.scale <= self.settings.right:
             order = [p for p in order if self._promising(p, leader)]
         return self.proposals.pop(order[0].labels) if order else None
 
@@ -148,7 +148,7 @@ class _Search:
         if fit is None:
             return
         leader = self._leader()
-        right = leader is not None and not (leader.needs_more(self.settings) and fit.needs_more(self.settings))
+        right = leader is not None and min(leader.posterior.scale, fit.posterior.scale) <= self.settings.right
         # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
         if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
             fit = self._renewed(fit)
