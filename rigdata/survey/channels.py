@@ -19,7 +19,7 @@ _WORDS = (
     ("speed", r"speed|rpm|drehzahl|tach|keyph|vitesse|giri|^n\d*$|^k\d*$"),
     ("temperature", r"temp|^t\d+|thermo|^tc\d*"),
     ("acceleration", r"acc|beschl|^a\d*[a-z]?$|^a\d+[hvxy]$"),
-    ("force", r"force|load|kraft|last|forza|^f[xyhv]?\d*$|^l\d+[hvxy]?$|^lc\b|cell"),
+    ("force", r"force|load|kraft|last|forza|^f[xyhv]?\d*$|^l\d+[hvxy]?$|^lc(?![a-z])|cell"),
     ("pressure", r"press|druck|^p\d+$"),
     ("displacement", r"disp|prox|probe|weg|gap|sonde|^x\d*[ab]?$|^y\d*[ab]?$|^d[xy]?\d*$|^x\d+[a-d]$|^y\d+[a-d]$"),
 )
@@ -40,6 +40,8 @@ PAD = "(?:pad|shoe|segment|schuh|klotz|patin)"
 _HINTS = {
     0.0: r"(?:horiz|waa?ge?r)\w*$|(?:^[fdal]?|[\d_\-. ])[xh]$",
     90.0: r"(?:vert|senkr|lotr)\w*$|(?:^[fdal]?|[\d_\-. ])[yv]$",
+    45.0: r"[a-z _\-]45(?: ?deg)?$",
+    135.0: r"[a-z _\-]135(?: ?deg)?$",
 }
 
 

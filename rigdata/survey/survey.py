@@ -189,11 +189,11 @@ class _Folder:
                 self._frame_by_sweep(pair, cells),
             ]
             if proposals := [frame for frame in frames if frame is not None]:
-                with_axes(self.channels, min(proposals, key=lambda frame: frame.error))
+                with_axes(self.channels, min(proposals, key=lambda frame: frame.error), cells.source)
         for pair in pairs(self.channels, "acceleration"):
             frame = self._frame_by_excitation(pair, cells) or stated_frame(pair, self.channels)
             if frame is not None:
-                with_axes(self.channels, frame)
+                with_axes(self.channels, frame, cells.source)
 
     def _frame_by_sweep(self, pair: tuple[str, str], cells: Frame) -> Frame | None:
         """Frame of two probes by a small load that goes around: the shaft follows it from corner to corner."""
