@@ -131,15 +131,14 @@ def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:
         guess = ChannelGuess(Entry(quantity, "file"), guess.unit)
     quantity = guess.quantity.value or ""
     unit = unit or guess.unit
-    polarity = -1 if table.get("polarity") == -1 else 1
     gain = math.nan
     with contextlib.suppress(UnitError, KeyError):
         gain = reading_gain(quantity, unit, *(table.get(key) for key in ("sensitivity", "full_scale", "excitation")))
-    sign = polarity if table.get("polarity") in (1, -1) else 0
+    sign = table["polarity"] if table.get("polarity") in (1, -1) else 0
     guess = replace(guess, unit=unit, gain=gain, sign=sign)
     with contextlib.suppress(UnitError):
         angle = math.degrees(parse_quantity(axis, "angle"))
-        return replace(guess, axis=Entry(angle, "file"), polarity=polarity, typed=True)
+        return replace(guess, axis=Entry(angle, "file"), polarity=sign or 1, typed=True)
     return guess
 
 

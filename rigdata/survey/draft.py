@@ -307,8 +307,9 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
         is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
         if key in wanted and (MARK in value or is_guess) and MARK not in wanted[key][0]:
             result, drafted = wanted[key]
-            if result != value or ("(guess)" in line and "(records)" in drafted):
-                changes.append(f"{place}: {key} {value} becomes {drafted.partition(' = ')[2]}")
+            if result != value:
+                changes.append(f"{place}: {key} {value} becomes {result}")
+            if result != value or "(records)" in drafted:
                 line = drafted
         lines.append(line)
     while lines and not lines[-1].strip():
