@@ -227,7 +227,7 @@ def _judged(
     shown = (*sides, (difference, difference - half, difference + half))
     for side, ends in zip(("a", "b", "difference"), shown, strict=True):
         columns |= zip((f"{name}_{side}{end}" for end in _ENDS), ends, strict=True)
-    return {**columns, f"{name.partition('_')[0]}_changed": verdict}
+    return columns | {f"{name.partition('_')[0]}_changed": verdict}
 
 
 def _pivots(a: Side, b: Side) -> pd.DataFrame:
@@ -279,7 +279,8 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
 
 def shown(row: Mapping[Any, Any], name: str, scale: float, side: str = "difference") -> str:
     """A difference, or one side's value, with its interval, for a table or a sentence."""
-    return with_interval(*(row[f"{name}_{side}{end}"] for end in _ENDS), scale)
+    value, low, high = (row[f"{name}_{side}{end}"] for end in _ENDS)
+    return with_interval(value, low, high, scale)
 
 
 def verdicts(frame: pd.DataFrame) -> list[str]:
