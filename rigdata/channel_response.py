@@ -30,13 +30,11 @@ class AnalogFilter:
 
     def at(self, frequency: FloatArray) -> ComplexArray:
         """Complex gain at `frequency` (n,) [Hz]."""
-        from scipy.signal import bessel, butter, freqs_zpk
+        from scipy.signal import freqs_zpk, iirfilter
 
+        family = "bessel_mag" if self.family == "bessel" else self.family
         corner = 2 * math.pi * self.corner
-        if self.family == "bessel":
-            zpk = bessel(self.order, corner, self.side, analog=True, output="zpk", norm="mag")
-        else:
-            zpk = butter(self.order, corner, self.side, analog=True, output="zpk")
+        zpk = iirfilter(self.order, corner, btype=self.side, analog=True, ftype=family, output="zpk")
         return np.asarray(freqs_zpk(*zpk, worN=2 * math.pi * np.asarray(frequency, dtype=float))[1])
 
 

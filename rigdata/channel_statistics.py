@@ -99,8 +99,8 @@ class ChannelStatistics:
 def _flat_share(readings: FloatArray, top: float, width: float) -> float:
     at_top = readings == top
     count = int(np.count_nonzero(at_top))
-    starts = np.flatnonzero(at_top & ~np.concatenate([[False], at_top[:-1]]))
-    if count < 20 or len(starts) < 3 or 2 * count < 3 * len(starts) or count < 0.005 * len(readings):
+    starts = np.count_nonzero(np.diff(at_top.astype(int), prepend=0) > 0)
+    if count < 20 or starts < 3 or 2 * count < 3 * starts or count < 0.005 * len(readings):
         return 0.0
     # At least the next level that occurs, however coarse the converter.
     below = min(top - width, float(np.max(readings[~at_top])))

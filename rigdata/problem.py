@@ -50,15 +50,12 @@ class Problem:
         for name in ("file", "place", "what", "cure"):
             text = getattr(self, name)
             if not text.isprintable():
-                object.__setattr__(self, name, "".join(c if c.isprintable() else _escaped(c) for c in text))
+                letters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+                object.__setattr__(self, name, "".join(letters))
 
     def __str__(self) -> str:
         where = f"{self.file}, {self.place}" if self.place else self.file
         return f"{where}: {self.what}. {self.cure}"
-
-
-def _escaped(character: str) -> str:
-    return character if character == "\n" else character.encode("unicode_escape").decode("ascii")
 
 
 class Condition(str):

@@ -11,8 +11,7 @@ from tpjb_ident.rounding import significant
 
 #: Pounds and inches in SI.
 _LBF, _INCH = 4.4482216152605, 0.0254
-#: Symbol and size of the unit in which a quantity is shown, by system; sizes in SI, of angles in degrees, of
-#: frequencies and speeds in Hz.
+#: Symbol and size (in SI, degrees, Hz) of the unit in which a quantity is shown, by system.
 SYSTEMS = {
     "si": {
         "load": ("kN", 1e3),

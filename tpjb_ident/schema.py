@@ -110,12 +110,16 @@ ENDINGS = {
     "_difference": "predicted - measured",
     "_ratio": "predicted / measured; empty where the measured interval holds zero",
     "_a": "of the first of two campaigns",
+    "_a_lo": "lower end of its 95 % interval",
+    "_a_hi": "its upper end",
     "_b": "of the second",
+    "_b_lo": "lower end of its 95 % interval",
+    "_b_hi": "its upper end",
     "_difference_lo": "lower end of the 95 % interval of second - first, without what both share",
     "_difference_hi": "its upper end",
 }
 _ALL = ("_lo", "_hi", "_se", "_se_systematic", "_random95", "_systematic95")
-_CHANGE = ("_a", "_b", "_difference", "_difference_lo", "_difference_hi")
+_CHANGE = tuple(f"_{side}{end}" for side in ("a", "b", "difference") for end in ("", "_lo", "_hi"))
 _AGAINST = ("_lo", "_hi", "_predicted", "_difference", "_ratio")
 
 
@@ -376,9 +380,7 @@ def markdown(table: str) -> str:
     """Rows of the documentation's table of one file: name, unit, meaning."""
     rows = ["| column | unit | meaning |", "|---|---|---|"]
     for column in TABLES[table]:
-        names = ", ".join(f"`{name}`" for name in (column.name.replace("{e}", "xx"), *column.endings))
         dots = " .. `" + column.name.replace("{e}", "yy") + "`" if "{e}" in column.name else ""
-        first, _, rest = names.partition(", ")
-        named = first + dots + (f", {rest}" if rest else "")
-        rows.append(f"| {named} | {column.unit} | {column.meaning} |")
+        names = [f"`{column.name.replace('{e}', 'xx')}`{dots}", *(f"`{ending}`" for ending in column.endings)]
+        rows.append(f"| {', '.join(names)} | {column.unit} | {column.meaning} |")
     return "\n".join(rows)

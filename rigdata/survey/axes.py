@@ -79,26 +79,28 @@ def fitted_frame(
     (residual, sense, angle), (mirrored, _, _) = sorted(fits)
     if residual > most or mirrored < _MIRROR * max(residual, 1.0):
         return None
-    text = f"{reason}, residual {residual:.1f} deg"
-    return Frame(pair, angle, sense, "records", text, residual / math.sqrt(len(readings)))
+    reason = f"{reason}, residual {residual:.1f} deg"
+    return Frame(pair, angle, sense, "records", reason, residual / math.sqrt(len(readings)))
 
 
-def with_axes(channels: dict[str, ChannelGuess], frame: Frame) -> None:
-    """Give two channels the axes of their frame: 0 to 180 deg, and the sign as a polarity."""
+def with_axes(channels: dict[str, ChannelGuess], frame: Frame, source: str = "") -> None:
+    """Give two channels the axes of their frame: 0 to 180 deg, and the sign as a polarity; guesses if `source` is."""
     for number, name in enumerate(frame.names):
         if channels[name].typed:
             continue
         angle = math.degrees(frame.angle) + (90.0 * frame.sense if number else 0.0)
         round_angle = _MOUNTED * round(angle / _MOUNTED)
-        reason = frame.reason
-        if frame.source == "records":
+        mark, reason = frame.source, frame.reason
+        if mark == "records":
             reason = f"{folded(angle):g} deg by {reason}"
+            if source == "guess":
+                mark, reason = source, f"{reason}, if the cells' axes hold"
         if abs(round_angle - angle) <= max(_NEAR, 2.0 * frame.error):
             angle = round_angle
         turned = angle % 360.0
         polarity = channels[name].sign or (-1 if turned >= 180.0 else 1)
         pointed = turned + (180.0 if polarity < 0 else 0.0)
-        axis = Entry(folded(pointed), frame.source, reason)
+        axis = Entry(folded(pointed), mark, reason)
         channels[name] = replace(channels[name], axis=axis, polarity=polarity)
 
 

@@ -19,7 +19,7 @@ _WORDS = (
     ("speed", r"speed|rpm|drehzahl|tach|keyph|vitesse|giri|^n\d*$|^k\d*$"),
     ("temperature", r"temp|^t\d+|thermo|^tc\d*"),
     ("acceleration", r"acc|beschl|^a\d*[a-z]?$|^a\d+[hvxy]$"),
-    ("force", r"force|load|kraft|last|forza|^f[xyhv]?\d*$|^l\d+[hvxy]?$|^lc\b|cell"),
+    ("force", r"force|load|kraft|last|forza|^f[xyhv]?\d*$|^l\d+[hvxy]?$|^lc(?![a-z])|cell"),
     ("pressure", r"press|druck|^p\d+$"),
     ("displacement", r"disp|prox|probe|weg|gap|sonde|^x\d*[ab]?$|^y\d*[ab]?$|^d[xy]?\d*$|^x\d+[a-d]$|^y\d+[a-d]$"),
 )
@@ -40,6 +40,8 @@ PAD = "(?:pad|shoe|segment|schuh|klotz|patin)"
 _HINTS = {
     0.0: r"(?:horiz|waa?ge?r)\w*$|(?:^[fdal]?|[\d_\-. ])[xh]$",
     90.0: r"(?:vert|senkr|lotr)\w*$|(?:^[fdal]?|[\d_\-. ])[yv]$",
+    45.0: r"[a-z _\-]45(?: ?deg)?$",
+    135.0: r"[a-z _\-]135(?: ?deg)?$",
 }
 
 
@@ -129,15 +131,14 @@ def as_described(guess: ChannelGuess, table: Mapping[str, Any]) -> ChannelGuess:
         guess = ChannelGuess(Entry(quantity, "file"), guess.unit)
     quantity = guess.quantity.value or ""
     unit = unit or guess.unit
-    polarity = -1 if table.get("polarity") == -1 else 1
     gain = math.nan
     with contextlib.suppress(UnitError, KeyError):
         gain = reading_gain(quantity, unit, *(table.get(key) for key in ("sensitivity", "full_scale", "excitation")))
-    sign = polarity if table.get("polarity") in (1, -1) else 0
+    sign = table["polarity"] if table.get("polarity") in (1, -1) else 0
     guess = replace(guess, unit=unit, gain=gain, sign=sign)
     with contextlib.suppress(UnitError):
         angle = math.degrees(parse_quantity(axis, "angle"))
-        return replace(guess, axis=Entry(angle, "file"), polarity=polarity, typed=True)
+        return replace(guess, axis=Entry(angle, "file"), polarity=sign or 1, typed=True)
     return guess
 
 

@@ -203,7 +203,7 @@ def column_names(text: str) -> tuple[str, ...]:
         names = tomllib.loads(text).get("csv", {}).get("names", ())
     except (tomllib.TOMLDecodeError, AttributeError):
         return ()
-    return tuple(str(n) for n in names) if isinstance(names, list) else ()
+    return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
 def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[float] = ()) -> tuple[str, list[str]]:
@@ -213,10 +213,15 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     manifest is never left with errors that it had not: then new records are added and nothing else.
     """
     described = _described_channels(text)
-    before, after = survey(exports, pivots=pivots), survey(exports, described, pivots)
+    former = _tables(survey(exports, pivots=pivots))
+    for block in _blocks(text):
+        for line in former.get((block.kind, block.name), ()):
+            if line.startswith("axis") and "(guess)" in line and line in block.lines:
+                del described[block.name]["axis"]
+    new_tables = _tables(survey(exports, described, pivots))
     for merges in (True, False):
         blocks = _blocks(text)
-        changes = _update(blocks, _tables(before) if merges else None, _tables(after))
+        changes = _update(blocks, former if merges else None, new_tables)
         new = "\n".join("\n".join(block.lines).rstrip() + "\n" for block in blocks if block.lines)
         if not merges or _faults(new) <= _faults(text):
             break
@@ -229,7 +234,7 @@ def _faults(text: str) -> int:
         parse_manifest(text)
     except RigDataError as error:
         count = sum(problem.severity == "error" for problem in error.problems)
-        return count - (1 if open_paths(tomllib.loads(text)) else 0)
+        return count - bool(open_paths(tomllib.loads(text)))
     return 0
 
 
@@ -300,9 +305,12 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
         key, value = _entry(line)
         present.add(key)
         is_guess = bool(_OWN.search(line)) and key in guessed and value == guessed[key][0]
-        if key in wanted and (MARK in value or is_guess) and wanted[key][0] != value and MARK not in wanted[key][0]:
-            changes.append(f"{place}: {key} {value} becomes {wanted[key][0]}")
-            line = wanted[key][1]
+        if key in wanted and (MARK in value or is_guess) and MARK not in wanted[key][0]:
+            result, drafted = wanted[key]
+            if result != value:
+                changes.append(f"{place}: {key} {value} becomes {result}")
+            if result != value or "(records)" in drafted:
+                line = drafted
         lines.append(line)
     while lines and not lines[-1].strip():
         lines.pop()

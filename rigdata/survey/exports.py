@@ -40,8 +40,7 @@ class Export:
     @property
     def rate(self) -> float:
         """Rate of the fastest channel [Hz]; NaN if the file knows no times."""
-        rates = [s.rate for s in self.series if s.rate > 0]
-        return max(rates, default=float("nan"))
+        return max((s.rate for s in self.series if s.rate > 0), default=float("nan"))
 
 
 def record_files(folder: Path) -> list[Path]:

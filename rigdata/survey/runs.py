@@ -73,7 +73,7 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
         load=load,
         load_text=text,
         direction=_stated(angle),
-        pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else Entry(),
+        pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else OPEN,
         speed=_speed(export, channels, stem),
         excitation=_stated_frequency(stem, lines),
     )
@@ -85,7 +85,7 @@ def of_quantity(export: Export, channels: Mapping[str, ChannelGuess], quantity: 
 
 
 def _stated(number: float) -> Entry:
-    return Entry(number, "file") if math.isfinite(number) else Entry()
+    return Entry(number, "file") if math.isfinite(number) else OPEN
 
 
 def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> Entry:
@@ -96,7 +96,7 @@ def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[Spe
         return Entry(movement, "records", f"{why} (its name says {named})")
     if movement and movement == (named or movement):
         return Entry(movement, "records", why)
-    return Entry(named, "guess", "the file's name") if named else Entry()
+    return Entry(named, "guess", "the file's name") if named else OPEN
 
 
 def _number_before(stem: str, unit: str) -> float:
@@ -117,7 +117,7 @@ def _load_of(stem: str) -> tuple[Entry, str]:
     bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.a-z])", stem, re.IGNORECASE)]
     newtons = next((n for n in bare if 100.0 <= n <= 200_000.0), math.nan)
     if math.isnan(newtons):
-        return Entry(), ""
+        return OPEN, ""
     return Entry(newtons, "guess", "a number in the file's name"), f"{newtons / 1e3:g} kN"
 
 
@@ -138,7 +138,7 @@ def _stated_frequency(stem: str, lines: tuple[SpectralPeak, ...]) -> Entry:
     numbers = re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)
     frequencies = [float(number.replace(",", ".")) for number in numbers]
     confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
-    return Entry(confirmed[0], "file") if len(confirmed) == 1 else Entry()
+    return Entry(confirmed[0], "file") if len(confirmed) == 1 else OPEN
 
 
 def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> tuple[str, str]:

@@ -24,7 +24,7 @@ from rigdata.survey.axes import (
     stated_frame,
     with_axes,
 )
-from rigdata.survey.channels import ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
+from rigdata.survey.channels import OPEN, ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
 from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
 
@@ -189,11 +189,11 @@ class _Folder:
                 self._frame_by_sweep(pair, cells),
             ]
             if proposals := [frame for frame in frames if frame is not None]:
-                with_axes(self.channels, min(proposals, key=lambda frame: frame.error))
+                with_axes(self.channels, min(proposals, key=lambda frame: frame.error), cells.source)
         for pair in pairs(self.channels, "acceleration"):
             frame = self._frame_by_excitation(pair, cells) or stated_frame(pair, self.channels)
             if frame is not None:
-                with_axes(self.channels, frame)
+                with_axes(self.channels, frame, cells.source)
 
     def _frame_by_sweep(self, pair: tuple[str, str], cells: Frame) -> Frame | None:
         """Frame of two probes by a small load that goes around: the shaft follows it from corner to corner."""
@@ -243,7 +243,7 @@ class _Folder:
             driven = run.excitation.number
             running.append([p.frequency for p in peaks if not abs(p.frequency - driven) <= NEAR * p.frequency])
         if len(running) < 2:
-            return Entry()
+            return OPEN
         frequencies = np.sort(np.concatenate(running))
         # the mains are in every record as well, and so may one excitation: the shaft shows twice its speed too
         order = sorted(set(frequencies.tolist()), key=lambda f: (is_mains(f), -_count(frequencies, 2 * f), f))
@@ -261,7 +261,7 @@ class _Folder:
             if min(once, twice) < least or mains:
                 return Entry(speed, "guess", text)
             return Entry(speed, "records", f"{text}, twice it in {twice}")
-        return Entry()
+        return OPEN
 
 
 def _count(frequencies: FloatArray, frequency: float) -> int:
@@ -289,12 +289,13 @@ def _around_middle(readings: FloatArray) -> FloatArray:
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
-    kilonewtons = f"{load / 1e3:.3g} kN"
-    if run.load.source == "file":
-        if abs(load - run.load.number) <= _CONTRADICTS * run.load.number:
-            return run
-        return replace(run, load=replace(run.load, source="guess", reason=f"the file's name; cells {kilonewtons}"))
-    return replace(run, load=Entry(load, "records", f"cells {kilonewtons}"), load_text="")
+    reason, off = f"cells {load / 1e3:.3g} kN", abs(load / run.load.number - 1.0)
+    if run.load.source == "file" and off <= _CONTRADICTS:
+        return run
+    if run.load.source == "file" or off <= _ONE_LOAD - 1.0:
+        source = "guess" if off > _CONTRADICTS else "records"
+        return replace(run, load=replace(run.load, source=source, reason=f"the file's name; {reason}"))
+    return replace(run, load=Entry(load, "records", reason), load_text="")
 
 
 def _frame_by_contacts(pair: tuple[str, str], places: FloatArray, directions: FloatArray) -> Frame | None:
@@ -319,7 +320,7 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
     if lines:
         beside = " beside the shaft's" if len(lines) < len(run.lines) else ""
         return replace(run, excitation=Entry(lines[0].frequency, "records", f"strongest line{beside}"))
-    return replace(run, excitation=Entry(None, "", "its only line is the shaft's") if run.lines else Entry())
+    return replace(run, excitation=Entry(None, "", "its only line is the shaft's") if run.lines else OPEN)
 
 
 def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:

@@ -70,7 +70,10 @@ def write_campaign(
     """Write a campaign in the `tpjb-rig/1` format."""
     target = Path(out)
     chosen = layout_named(layout)
-    _check_target(target)
+    if not target.parent.is_dir():
+        raise VirtualRigError(f"{target.parent} is not a folder; make it first")
+    if os.path.lexists(target):
+        raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
     _check_faults(rig, chosen)
     rig = replace(rig, truth=rig.truth.remembered())
     runs = rig.runs()
@@ -102,13 +105,6 @@ def _written_records(
             yield record, faults
         if progress is not None:
             progress(done, total, record.run.id)
-
-
-def _check_target(target: Path) -> None:
-    if not target.parent.is_dir():
-        raise VirtualRigError(f"{target.parent} is not a folder; make it first")
-    if os.path.lexists(target):
-        raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
 
 
 def _check_faults(rig: VirtualRig, layout: Layout) -> None:

@@ -316,7 +316,9 @@ def _sides(truth: RigTruth) -> list[int]:
             before, after = pads[i - 1], pads[(i + 1) % len(pads)]
             if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
                 continue
-            reach = _corner(truth, before, after) @ directions(truth.pivot_angles[k])
+            reach = np.array([truth.clearance[before], truth.clearance[after]])
+            corner = np.linalg.solve(_normals(truth, [before, after]), reach)
+            reach = corner @ directions(truth.pivot_angles[k])
             if reach <= truth.clearance[k]:
                 pads.remove(k)
                 removed = True
@@ -325,11 +327,6 @@ def _sides(truth: RigTruth) -> list[int]:
     if np.max((np.roll(angles, -1) - angles) % (2 * np.pi)) >= np.pi - 1e-6:
         raise VirtualRigError("the pads leave half the circle open: the shaft would fall out of the bearing")
     return pads
-
-
-def _corner(truth: RigTruth, first: int, second: int) -> FloatArray:
-    reach = np.array([truth.clearance[first], truth.clearance[second]])
-    return np.asarray(np.linalg.solve(_normals(truth, [first, second]), reach), dtype=float)
 
 
 def _normals(truth: RigTruth, pads: list[int]) -> FloatArray:

@@ -170,7 +170,8 @@ def test_the_first_screen_says_what_how_good_and_how_sure(chromium, report, widt
             f".filter((e) => e.getBoundingClientRect().bottom <= {height}).map((e) => e.textContent.trim()).join('|')"
         )
     for words in ("22 Hz (1320 rpm)", "2.5 to 7.5 kN", "58 (42 dynamic", "0-peak", "The records are computed",
-                  "largest single deviation", "inside their interval", "tpjb init", "66.00 ±", "26 of 28"):  # fmt: skip
+                  "largest single deviation", "inside their interval", "tpjb init", "66.00\u00a0±",
+                  "26 of 28"):  # fmt: skip
         assert words in shown, words
 
 

@@ -76,6 +76,25 @@ def test_a_channel_that_was_given_its_quantity_gets_the_entries_that_it_lacks(fo
     assert "nothing to change" in tpjb("init", folder, "--update").stdout
 
 
+def test_axes_by_a_name_stay_guesses_until_they_are_confirmed(folder):
+    """LC_H is a hint, and what is concluded from such cells no better than it, also when a draft is carried on."""
+    record(folder / "d-5kN-25Hz.csv", ("Time", "Probe 45", "Probe 135", "LC_H [mV]", "LC_V [mV]"))
+    assert tpjb("init", folder).exit_code == 0
+    manifest = folder / "campaign.toml"
+    guesses = ('axis = "0 deg"   # (guess) its name', 'axis = "90 deg"   # (guess) its name', "if their axes hold")
+    text = manifest.read_text("utf-8")
+    assert all(guess in text for guess in guesses)
+    assert "its name hints at 45 deg" in text
+    assert "its name hints at 135 deg" in text
+    edit(manifest, ('sensitivity = "??"   # such as "1 mV/N"', 'sensitivity = "1 mV/N"   # "1 mV/N"'))
+    assert tpjb("init", folder, "--update").exit_code == 0
+    text = manifest.read_text("utf-8")
+    assert all(guess in text for guess in guesses)
+    edit(manifest, ("   # (guess) its name\nunit", "\nunit"), ('"90 deg"   # (guess) its name', '"90 deg"'))
+    result = tpjb("init", folder, "--update")
+    assert "if their axes hold" not in manifest.read_text("utf-8"), result.stdout
+
+
 def test_what_was_changed_by_hand_stays_and_new_records_become_runs(folder):
     record(folder / "dyn-5kN-25Hz.csv", ("Time", "X1", "X2", "FH [N]", "FV [N]"))
     tpjb("init", folder)

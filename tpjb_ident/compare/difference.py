@@ -39,6 +39,8 @@ _PIVOT_LOADS = 5
 #: Errors of instruments, which outlast an overhaul; what scatters with the runs or the films does not.
 _OF_INSTRUMENTS = ("calibration", "axis", "delay", "mass", "temperature")
 _LEVEL = 0.95
+#: Columns of a value and its interval.
+_ENDS = ("", "_lo", "_hi")
 #: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
 _FREEDOM = np.geomspace(1.0, 1e6, 400)
 
@@ -93,7 +95,6 @@ class Difference:
 
     a: Side
     b: Side
-    pairs: IntArray  #: (n, 2) rows of the sides' tables that met
     points: pd.DataFrame  #: difference.csv
     pivots: pd.DataFrame  #: pivot_difference.csv
     clearance: pd.DataFrame  #: clearance_difference.csv
@@ -119,7 +120,6 @@ def difference_of(a: Side, b: Side) -> Difference:
     return Difference(
         a,
         b,
-        pairs,
         _points(a, b, pairs, shared),
         _pivots(a, b),
         _clearance(a, b),
@@ -139,11 +139,6 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
     return before == after and a.campaign.housing_mass == b.campaign.housing_mass
 
 
-def _rotation(frame: pd.DataFrame) -> np.ndarray:
-    """Sense of turning of every row; a table that does not say means the usual one."""
-    return frame["rotation"].to_numpy(str) if "rotation" in frame else np.full(len(frame), ROTATIONS[0])
-
-
 def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
     rest = side.coefficients.drop(index=side.coefficients.index[used])
     return tuple(
@@ -156,7 +151,7 @@ def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
     left, right = (s.coefficients.iloc[pairs[:, k]].reset_index(drop=True) for k, s in enumerate((a, b)))
     columns: dict[str, Any] = {name: left[name] for name in POINT_COLUMNS}
-    columns["rotation"] = _rotation(left)
+    columns["rotation"] = left.get("rotation", ROTATIONS[0])  # a table that does not say means the usual one
     for name in ("static_load_measured_N", "quality"):
         if name in left and name in right:
             columns |= {f"{name}_a": left[name], f"{name}_b": right[name]}
@@ -170,9 +165,8 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
         parts = [_random_and_systematic(frame, name) for frame in (left, right)]
         kind = COEFFICIENT_COLUMNS[:4] if j < 4 else COEFFICIENT_COLUMNS[4:]
         direct = left[[kind[0], kind[3]]].abs().mean(axis=1).to_numpy()
-        values = [frame[name].to_numpy(float) for frame in (left, right)]
-        variance, freedom = _joint(parts, common)
-        judged = _judged(name, values, variance, freedom, _NO_CHANGE * direct, 8 * len(pairs))
+        sides = [[frame[name + end].to_numpy(float) for end in _ENDS] for frame in (left, right)]
+        judged = _judged(name, sides, _joint(parts, common), _NO_CHANGE * direct, 8 * len(pairs))
         judged[f"{name[:3]}_changed"][~usable] = "cannot tell"
         columns |= judged
     return pd.DataFrame(columns)
@@ -193,13 +187,8 @@ def _random_and_systematic(frame: pd.DataFrame, name: str) -> tuple[FloatArray, 
     error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
     with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
         quantile = frame[f"{name}_random95"].to_numpy(float) / error
-    return error**2, systematic**2, _freedom(quantile)
-
-
-def _freedom(quantile: FloatArray) -> FloatArray:
-    """Degrees of freedom of Student's t by its 95 % quantile."""
     table = stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL)
-    return np.asarray(np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM))
+    return error**2, systematic**2, np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM)
 
 
 def _joint(
@@ -216,31 +205,29 @@ def _joint(
 
 def _judged(
     name: str,
-    values: Sequence[FloatArray],
-    variance: FloatArray,
-    freedom: FloatArray,
+    sides: Sequence[Sequence[FloatArray]],
+    joint: tuple[FloatArray, FloatArray],
     none: FloatArray,
     number: int,
 ) -> dict[str, Any]:
-    """Columns of one quantity: both values, their difference with its interval, and whether it changed.
+    """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
+    `sides` hold value, lower and upper end (n,) each, `joint` the difference's variance and its degrees of freedom.
     Of `number` differences that are looked at together one in twenty is beyond its own interval by chance; "yes" holds
     for all of them at once (Bonferroni).
     """
-    difference = values[1] - values[0]
+    variance, freedom = joint
+    difference = sides[1][0] - sides[0][0]
     deviation = np.sqrt(variance)
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * deviation
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * deviation
     verdict = np.where(np.abs(difference) + half <= none, "no", "cannot tell")
     verdict = np.where(np.abs(difference) > sure, "yes", verdict)
-    return {
-        f"{name}_a": values[0],
-        f"{name}_b": values[1],
-        f"{name}_difference": difference,
-        f"{name}_difference_lo": difference - half,
-        f"{name}_difference_hi": difference + half,
-        f"{name.partition('_')[0]}_changed": verdict,
-    }
+    columns: dict[str, Any] = {}
+    shown = (*sides, (difference, difference - half, difference + half))
+    for side, ends in zip(("a", "b", "difference"), shown, strict=True):
+        columns |= zip((f"{name}_{side}{end}" for end in _ENDS), ends, strict=True)
+    return columns | {f"{name.partition('_')[0]}_changed": verdict}
 
 
 def _pivots(a: Side, b: Side) -> pd.DataFrame:
@@ -262,17 +249,15 @@ def _pivot(pad: float, curves: Sequence[pd.DataFrame], same: bool, number: int) 
     low = max(curve["force_N"].min() for curve in curves)
     high = min(curve["force_N"].max() for curve in curves)
     force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
-    values, variances, scales = [], [], []
+    sides, parts, scales = [], [], []
     for curve in curves:
-        at = [np.interp(force, curve["force_N"], curve[TANGENT + ending]) for ending in ("", "_lo", "_hi")]
-        values.append(at[0])
-        variances.append(((at[2] - at[1]) / (2 * 1.96)) ** 2)
+        at = [np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS]
         scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve and len(curve) else 0.0
+        sides.append(at)
         scales.append(scale * at[0])
+        parts.append((((at[2] - at[1]) / (2 * 1.96)) ** 2, scales[-1] ** 2, np.full_like(force, np.inf)))
     common = scales[0] * scales[1] if same else np.zeros_like(force)
-    parts = [(v, s**2, np.full_like(v, np.inf)) for v, s in zip(variances, scales, strict=True)]
-    variance, freedom = _joint(parts, common)
-    judged = _judged(TANGENT, values, variance, freedom, _NO_CHANGE * values[0], number)
+    judged = _judged(TANGENT, sides, _joint(parts, common), _NO_CHANGE * sides[0][0], number)
     return pd.DataFrame({"pad": pad, "force_N": force, **judged})
 
 
@@ -282,16 +267,19 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
         return pd.DataFrame()
     name = "clearance_m"
     joined = a.clearance.merge(b.clearance, on="pad", suffixes=("_a", "_b"))
-    values = [joined[f"{name}_{side}"].to_numpy(float) for side in "ab"]
-    variance = np.asarray(sum(joined[f"{name}_se_{side}"].to_numpy(float) ** 2 for side in "ab"))
-    freedom = np.full(len(joined), _FREEDOM[-1])
-    judged = _judged(name, values, variance, freedom, _NO_CHANGE * values[0], len(joined))
+    sides, variance = [], np.zeros(len(joined))
+    for side in "ab":
+        value, error = (joined[f"{name}{ending}_{side}"].to_numpy(float) for ending in ("", "_se"))
+        sides.append((value, value - 1.96 * error, value + 1.96 * error))
+        variance += error**2
+    joint = variance, np.full_like(variance, _FREEDOM[-1])
+    judged = _judged(name, sides, joint, _NO_CHANGE * sides[0][0], len(joined))
     return pd.DataFrame({"pad": joined["pad"], **judged})
 
 
-def shown_difference(row: Mapping[Any, Any], name: str, scale: float) -> str:
-    """A difference with its interval, for a table or a sentence."""
-    value, low, high = (row[f"{name}_difference{ending}"] for ending in ("", "_lo", "_hi"))
+def shown(row: Mapping[Any, Any], name: str, scale: float, side: str = "difference") -> str:
+    """A difference, or one side's value, with its interval, for a table or a sentence."""
+    value, low, high = (row[f"{name}_{side}{end}"] for end in _ENDS)
     return with_interval(value, low, high, scale)
 
 
@@ -330,7 +318,7 @@ def _largest_change(points: pd.DataFrame) -> str:
             if row[f"{name[:3]}_changed"] != "yes" or abs(share) <= best:
                 continue
             best = abs(share)
-            size = f"{shown_difference(row, name, kind.display_scale)} {kind.display_unit}"
+            size = f"{shown(row, name, kind.display_scale)} {kind.display_unit}"
             place = place_of(row["static_load_N"], row["excitation_Hz"])
             words = f"{name[:3]} at {place}: {percent(share)} of the mean direct coefficient ({size})"
     return words
@@ -351,7 +339,7 @@ def _sentences_beside(difference: Difference) -> tuple[str, ...]:
         for pad, rows in changed.groupby("pad"):
             row = rows.iloc[-1].to_dict()
             at = f" at {amount(row['force_N'], 'load', '.3g')}" if "force_N" in frame else ""
-            parts.append(f"pad #{pad:g} by {shown_difference(row, name, size(quantity))} {symbol(quantity)}{at}")
+            parts.append(f"pad #{pad:g} by {shown(row, name, size(quantity))} {symbol(quantity)}{at}")
         sentences.append(
             f"{words} changed: {'; '.join(parts)}." if parts else f"{words}: no pad changed beyond its interval."
         )

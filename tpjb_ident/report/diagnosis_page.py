@@ -180,10 +180,11 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
             panels.append(panel(name, title, residual_series(frame, over), _GROUP))
         except ValueError:  # nothing varies over it
             continue
+    title = "Gap by observable, held-out points where there are any (* fitted points)"
+    panels.append(panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP))
     if len(frame):
         panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
-    title = "Gap by observable, held-out points where there are any (* fitted points)"
-    return [*panels, panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP)]
+    return panels
 
 
 def _evidence_sections(verdict: Verdict) -> list[Section]:

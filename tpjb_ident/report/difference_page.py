@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, place_of, size, spinning, symbol
-from tpjb_ident.compare.difference import Difference, difference_sentences, shown_difference
+from tpjb_ident.compare.difference import Difference, difference_sentences, shown
 from tpjb_ident.condition_kinds import KINDS
 from tpjb_ident.conditions import Condition
 from tpjb_ident.report.drawing.colours import INK, LIGHT
@@ -21,7 +21,7 @@ from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, set_points
 from tpjb_ident.report.page import Page, Section, Table, write_page
-from tpjb_ident.rounding import significant, with_interval
+from tpjb_ident.rounding import significant
 from tpjb_ident.schema import DAMPING, ENTRIES, POINT_KEY, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = (
@@ -30,6 +30,7 @@ _TITLE = (
 _POINTS = "operating point: load in {}, excitation in Hz"
 #: How many times the widest interval a difference is at least where the scale is logarithmic outside.
 _BEYOND = 5.0
+_SIDES = ("a", "b", "difference")
 _MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
 
 
@@ -71,16 +72,12 @@ def _facts(difference: Difference) -> dict[str, str]:
 
 def _values_table(difference: Difference) -> Table:
     """K and C of both sides at the point in the middle, and what changed."""
-    number = len(difference.points) // 2
-    row = difference.points.iloc[number].to_dict()
-    sides = zip((difference.a, difference.b), difference.pairs[number], strict=True)
-    measured = [side.coefficients.iloc[index].to_dict() for side, index in sides]
+    row = difference.points.iloc[len(difference.points) // 2].to_dict()
     rows = []
     for kind, entry in itertools.product((STIFFNESS, DAMPING), ENTRIES):
         name, scale = kind.column(entry), kind.display_scale
-        cells = [with_interval(side[name], side[f"{name}_lo"], side[f"{name}_hi"], scale) for side in measured]
-        changed = row[f"{kind.symbol}{entry}_changed"]
-        rows.append([f"{kind.symbol}{entry}, {kind.display_unit}", *cells, shown_difference(row, name, scale), changed])
+        cells = [shown(row, name, scale, side) for side in _SIDES]
+        rows.append([f"{kind.symbol}{entry}, {kind.display_unit}", *cells, row[f"{kind.symbol}{entry}_changed"]])
     place = f"{place_of(row['static_load_N'], row['excitation_Hz'])}, shaft at "
     place += spinning(row["shaft_speed_Hz"], row["rotation"])
     columns = ["", "first", "second", "difference", "changed"]
@@ -105,12 +102,12 @@ def _sections(difference: Difference) -> list[Section]:
             for row in difference.pivots.to_dict("records")
         ]
         columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
-        table = Table("Tangent stiffness of the pivots, where both were measured", columns, rows)
+        table = Table("Tangent stiffness of the pivots, where both were measured; 95 %", columns, rows)
         sections.append(Section("Pivots", tables=[table]))
     if not difference.clearance.empty:
         rows = [_row(row, "clearance_m", "length") for row in difference.clearance.to_dict("records")]
         columns = ["pad", *_columns("length")]
-        table = Table("Assembled clearance at zero push load", columns, rows)
+        table = Table("Assembled clearance at zero push load, 95 %", columns, rows)
         sections.append(Section("Clearance", tables=[table]))
     return sections
 
@@ -120,9 +117,8 @@ def _columns(quantity: str) -> list[str]:
 
 
 def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[str]:
-    values = [significant(row[f"{name}_{side}"] * per(quantity)) for side in "ab"]
-    difference = shown_difference(row, name, size(quantity))
-    return [f"#{row['pad']:g}", *place, *values, difference, row[f"{name.partition('_')[0]}_changed"]]
+    cells = [shown(row, name, size(quantity), side) for side in _SIDES]
+    return [f"#{row['pad']:g}", *place, *cells, row[f"{name.partition('_')[0]}_changed"]]
 
 
 def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
@@ -131,7 +127,7 @@ def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
     for place, row in zip(point_labels(points), points.to_dict("records"), strict=True):
         cells = []
         for entry in ENTRIES:
-            cells.append(shown_difference(row, kind.column(entry), kind.display_scale))
+            cells.append(shown(row, kind.column(entry), kind.display_scale))
             if row[f"{kind.symbol}{entry}_changed"] == "yes":
                 cells[-1] += " *"
         flags = dict.fromkeys(

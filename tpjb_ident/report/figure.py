@@ -61,16 +61,10 @@ class Panel:
 
 
 def shape(svg: str) -> str:
-    """How a picture stands on a page: ``"wide"``, several panels side by side; ``"tall"``, on top of each other.
-
-    Or "".
-    """
+    """How a picture stands on a page: ``"wide"`` where half a page would make its text too small, or ""."""
     size = _SIZE.search(svg)
     assert size is not None
-    width, height = float(size[1]), float(size[2])
-    if width > 1.35 * height and width > 6.5 * 72.0:
-        return "wide"
-    return "tall" if height > 0.8 * width else ""
+    return "wide" if float(size[1]) > 6.5 * _POINTS_PER_INCH else ""
 
 
 #: Panels from which on a second process draws too, and how many processes do at most.

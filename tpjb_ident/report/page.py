@@ -22,6 +22,10 @@ from tpjb_ident.runtime.tables import printable, readable, write_text
 _NUMBER = re.compile(r"–|[-−+#(]*\d(?!.*[A-Za-z]{3}).*")
 
 
+#: Characters of a number with its interval; a cell that holds more must wrap on a phone.
+_LONG = 26
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of ready-made text cells."""
@@ -32,12 +36,12 @@ class Table:
 
     @property
     def text_columns(self) -> set[int]:
-        """Columns of words, which stand left: the first, and those of which most cells are no numbers."""
+        """Columns of words, which stand left and wrap: the first, and those of long cells or mostly no numbers."""
         words = {0}
         for index in range(len(self.columns)):
             cells = [row[index] for row in self.rows if row[index]]
             numbers = sum(bool(_NUMBER.fullmatch(cell)) for cell in cells)
-            if 2 * numbers < len(cells):
+            if 2 * numbers < len(cells) or max(map(len, cells), default=0) > _LONG:
                 words.add(index)
         return words
 

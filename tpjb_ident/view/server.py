@@ -138,9 +138,8 @@ def build(document: Any, session: Session) -> None:
         panels.append(TabPanel(child=records_tab(session.campaign), title="records"))
     if session.tables:
         panels.append(TabPanel(child=_tables_tab(session.tables), title="tables"))
-    narrow = (
-        ":host(.bk-above) { grid-template-columns: minmax(0, 1fr); }"  # else as wide as the widest tab, on a phone too
-    )
+    # else as wide as the widest tab, on a phone too
+    narrow = ":host(.bk-above) { grid-template-columns: minmax(0, 1fr); }"
     tabs = Tabs(tabs=panels, name="tabs", sizing_mode="stretch_width", stylesheets=[narrow])
     head = Div(text=f"<h1 style='font-size:1.3rem;margin:.3rem 0'>{html.escape(printable(session.name))}</h1>")
     document.add_root(column(head, tabs, sizing_mode="stretch_width"))
@@ -179,12 +178,13 @@ def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
 
     pick = Select(title="table", options=list(tables), value=next(iter(tables)), name="table", width=320)
     source = ColumnDataSource({})
-    grid = DataTable(source=source, columns=[], height=560, sizing_mode="stretch_width", reorderable=False, name="grid")
+    grid = DataTable(source=source, height=560, sizing_mode="stretch_width", autosize_mode="none", reorderable=False,
+                     name="grid")  # fmt: skip
 
     def update() -> None:
         frame = tables[pick.value].head(_MOST_ROWS)
-        source.data = {str(c): [_cell(v) for v in frame[c]] for c in frame.columns}
-        grid.columns = [TableColumn(field=str(c), title=printable(c)) for c in frame.columns]
+        source.data = {c: [_cell(v) for v in frame[c]] for c in frame}
+        grid.columns = [TableColumn(field=c, title=printable(c), width=7 * max(20, len(str(c)))) for c in frame]
 
     pick.on_change("value", lambda attr, old, new: update())
     update()

@@ -102,15 +102,15 @@ def _update(c: Command, folder: Path, bearing: str | None) -> str:
     same = text.split() == before.split()
     remainder = _open_summary(text) or "no place is open"
     count = "nothing to change" if same else f"{len(changes)} changes, the former one is {manifest.name}.bak"
+    if not same:
+        write_text(manifest.with_suffix(".toml.bak"), before)
+        write_text(manifest, text)
+        c.wrote(MANIFEST)
     c.print(f"{manifest}: {count}; {remainder}.")
     for problem in problems:
         c.warn(f"left out: {problem}")
     for change in changes:
         c.print(change)
-    if not same:
-        write_text(manifest.with_suffix(".toml.bak"), before)
-        write_text(manifest, text)
-        c.wrote(MANIFEST)
     return text
 
 
@@ -183,7 +183,8 @@ def _show_survey(c: Command, guesses: Survey, name: str) -> None:
     channels = []
     for channel, guess in guesses.channels.items():
         axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
-        channels.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, guess.axis.reason])
+        reason = " ".join([f"({guess.axis.source})" * bool(axis), guess.axis.reason])
+        channels.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, reason.strip()])
     c.show(f"{name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     runs = []
     for rate, run in zip(guesses.rates, guesses.runs[:MOST_RECORDS], strict=False):

@@ -56,17 +56,17 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
     if not place.exists():
         raise BadInputError(f"{source}: there is no such file or folder. Check the path.")
     campaign = c.open(source) if place.is_dir() or place.suffix.lower() in (*HDF5, ".toml") else None
-    if campaign is not None:
-        c.next("check", source)
-    else:
+    if campaign is None:
         c.next("init", source.parent)
-    if campaign is not None and run is None:
-        _show_campaign(c, campaign)
-        if picture:
-            raise BadInputError("--picture: of a campaign needs --run ID; the runs are listed above.")
-        return
-    if campaign is None and run is not None:
-        raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
+        if run is not None:
+            raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
+    else:
+        c.next("check", source)
+        if run is None:
+            _show_campaign(c, campaign)
+            if picture:
+                raise BadInputError("--picture: of a campaign needs --run ID; the runs are listed above.")
+            return
     with c.progress(f"looking at {source.name}"):
         if campaign is not None and run is not None:
             title, series, displayed = _run_series(campaign.run(run))

@@ -93,9 +93,10 @@ def _tables(c: Command, folder: Path) -> dict[str, Any]:
     from tpjb_ident.runtime.table_reader import read_table
 
     tables: dict[str, Any] = {}
-    for path in sorted(folder.glob("*.csv")):
-        if path.stem in TABLES:
-            tables[path.stem] = read_table(c.file(path))
+    for name in TABLES:
+        path = folder / f"{name}.csv"
+        if path.exists():
+            tables[name] = read_table(c.file(path))
     findings = folder / "check.json"
     if findings.exists():
         tables["problems"] = _problems(read_document(c.file(findings), "tpjb-check"))

@@ -25,7 +25,8 @@ _EXAMPLES = {
     "force": "2.5 kN, 5 kN",
     "speed": "22 Hz",
     "angle": "-90 deg",
-    "mass": "30 kg",
+    "stiffness": "4e8 N/m",
+    "temperature": "40 degC",
 }
 
 
@@ -38,7 +39,7 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
         )
     items = [item for item in re.split(r"[,;]", text) if item.strip()]
     if not items:
-        raise BadInputError(f'{option}: is empty. Write, for instance, {option} "{_example(dimension)}".')
+        raise BadInputError(f'{option}: is empty. Write, for instance, {option} "{_EXAMPLES[dimension]}".')
     values: list[float] = []
     unit = ""
     for item in reversed(items):
@@ -63,10 +64,6 @@ def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
         return parse_quantity(text, dimension)
     except UnitError as error:
         raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
-
-
-def _example(dimension: str) -> str:
-    return _EXAMPLES.get(dimension, "1 (with a unit)")
 
 
 def _item(item: str, unit: str, dimension: str, option: str) -> tuple[list[float], str]:
@@ -102,10 +99,10 @@ def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float,
     if match is None:
         raise BadInputError(
             f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. Write, for instance, "
-            f'{option} "{_example(dimension)}".'
+            f'{option} "{_EXAMPLES[dimension]}".'
         )
     unit = match[2] or unit
     try:
-        return parse_quantity(f"{match[1]} {unit}", dimension, option), unit
+        return parse_quantity(f"{match[1]} {unit}".strip(), dimension, option), unit
     except UnitError as error:
-        raise BadInputError(f'{error}. Write, for instance, {option} "{_example(dimension)}".') from error
+        raise BadInputError(f'{error}. Write, for instance, {option} "{_EXAMPLES[dimension]}".') from error

@@ -38,7 +38,7 @@ def gap(
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
     words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
-    figure, axes = new_picture("gap, sigma", "", title=title, height=0.3 * len(words) + 1.3)
+    figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
     bars = [(before, "orange", "////", "baseline"), (after, "blue", None, "with the effects found")]
