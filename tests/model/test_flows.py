@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 from model.effects import Effect
 from model.film.mesh import film_grid
 from model.film.oil_state import Running
-from model.film.resting import RestingFilm, resting_film
+from model.film.resting import resting_film
 from model.predict import predict
 from model.setup import Mesh
 from model.statics.pad_film import oil_constants
@@ -76,7 +76,7 @@ def test_a_resting_film_heats_and_shears_as_its_equation_says(rocker):
     grid = film_grid(-0.55, 0.55, 0.05, 0.07, (400, 4), True)
     cp, a = 130e-6, -25e-6
     running = Running(speed, oil_constants(oil), (oil.specific_heat / 0.8, oil.conductivity))
-    rest = RestingFilm(*resting_film(grid, (cp, a), running, 45.0))
+    rest = resting_film(grid, (cp, a), running, 45.0)
 
     def gap(angle: float) -> float:
         return cp - a * math.cos(angle)

@@ -22,7 +22,7 @@ FOLDER = Path(compilation.__file__).parent
 def test_list_of_kernels_is_complete():
     sources = {path.relative_to(FOLDER).as_posix(): path.read_text(encoding="utf-8") for path in FOLDER.rglob("*.py")}
     using = {name for name, text in sources.items() if "\n@compiled\n" in text or "\n@inner\n" in text}
-    assert using | {"compilation.py", "statics/compiled/constants.py"} == set(compilation.KERNELS)
+    assert using | {"compilation.py"} == set(compilation.KERNELS)
     assert not [name for name, text in sources.items() if "njit" in text and name != "compilation.py"]
 
 
