@@ -97,6 +97,24 @@ def test_a_resting_film_heats_and_shears_as_its_equation_says(rocker):
     assert rest.flow * oil.specific_heat * (rest.outlet - 45.0) == pytest.approx(0.8 * rest.power, rel=1e-3)
 
 
+@pytest.mark.parametrize(("preload", "direction"), [(0.1, -90.0), (0.03, -54.0), (-0.02, -90.0)])
+def test_idle_pads_of_isothermal_films_shear_oil_as_cold_as_it_enters(rocker, preload, direction):
+    pads = tuple(replace(p, assembled_clearance=(1.0 - preload) * p.pad_clearance) for p in rocker.pads)
+    bearing, turning = rocker.with_pads(pads), 2 * math.pi * 40
+    p = predict(bearing, 9000.0, math.radians(direction), turning, thermal="isothermal")
+    idle = [film for film in p.equilibrium.films if film.idle]
+    assert idle
+    surface, supply = turning * bearing.journal_radius, bearing.oil.supply_temperature
+    viscosity, density = float(bearing.oil.viscosity(supply)), float(bearing.oil.density(supply))
+    for film in idle:
+        gap = film.pad.pad_clearance - film.rigid_approach(p.equilibrium.position) * np.cos(film.grid.angle)
+        shear = viscosity * surface**2 * gap[0] / gap**2
+        power = np.trapezoid(np.where(gap > gap[0], shear, viscosity * surface**2 / gap), dx=film.grid.dx)
+        assert film.resting.power == pytest.approx(power * bearing.length, rel=1e-9)
+        assert film.resting.reynolds == pytest.approx(density * surface * gap.max() / viscosity, rel=1e-9)
+        assert film.resting.outlet == supply
+
+
 def test_power_loss_does_not_fall_when_pads_unload(rocker):
     # as the load grows the upper pads go idle, one film after the other; their oil is sheared on
     loads = np.linspace(6000.0, 18000.0, 13)
