@@ -43,7 +43,6 @@ KERNELS = (
     "statics/compiled/anderson.py",
     "statics/compiled/bending.py",
     "statics/compiled/case.py",
-    "statics/compiled/constants.py",
     "statics/compiled/elimination.py",
     "statics/compiled/heat.py",
     "statics/compiled/iteration.py",
@@ -66,6 +65,9 @@ _NO_PLACE = (
     "there is no folder to keep the model's machine code in, so every process compiles it again, which takes half a "
     "minute: set TPJB_CACHE to a folder that can be written"
 )
+#: Blocks of code: parts with fewer are optimised before they are taken in, else inner loops run 15 % slower. Larger
+#: ones consist of such parts, and to optimise them at every level again is what made compilation long.
+_SMALL_PART = 250
 #: Loops that become part of others and that numba does not know yet.
 _inner: list[Callable[..., Any]] = []
 
@@ -89,6 +91,11 @@ class _Kernel:
         """Numba's."""
         return _dispatcher(_compiler(), self._function)
 
+    @functools.cached_property
+    def part(self) -> Any:
+        """Numba's, for the loops that call this one."""
+        return _compiler().njit(**_part_options())(self._function)
+
 
 @functools.cache
 def _compiler() -> Any:
@@ -102,7 +109,7 @@ def _compiler() -> Any:
 
     @numba.extending.typeof_impl.register(_Kernel)
     def type_of(kernel: _Kernel, context: Any) -> Any:
-        return numba.typeof(kernel.dispatcher)
+        return numba.typeof(kernel.part)
 
     return numba
 
@@ -123,8 +130,6 @@ def _warn_once(message: str) -> None:
 
 #: Bytes of a digest.
 _DIGEST = 32
-#: What `_cache_type` relies on in numba.
-_LOADING = ("_load_overload", "_guard_against_spurious_io_errors")
 
 
 @functools.cache
@@ -188,7 +193,49 @@ def _digest(key: Any, code: bytes) -> bytes:
 def _register_inner_loops() -> None:
     numba = _compiler()
     while _inner:
-        numba.extending.register_jitable(**_OPTIONS)(_inner.pop())
+        numba.extending.register_jitable(**_part_options())(_inner.pop())
+
+
+@functools.cache
+def _part_options() -> dict[str, Any]:
+    """Of a loop that others take in: it is optimised and becomes machine code in them, once, not by itself before."""
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import CompilerBase, DefaultPassBuilder
+    from numba.core.compiler_machinery import register_pass
+    from numba.core.typed_passes import NativeLowering
+
+    class Part(JITCodeLibrary):  # type: ignore[misc]
+        @property
+        def codegen(self) -> Any:
+            return self
+
+        def set_env(self, *_: Any) -> None:
+            """No machine code, nothing to set."""
+
+        def _optimize_final_module(self) -> None:
+            blocks = sum(len(list(function.blocks)) for function in self._final_module.functions)
+            if blocks < _SMALL_PART:
+                super()._optimize_final_module()
+
+        def _finalize_final_module(self) -> None:
+            self._finalized = True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class PartLowering(NativeLowering):  # type: ignore[misc]
+        _name = "part_lowering"
+
+        def run_pass(self, state: Any) -> Any:
+            state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+            return super().run_pass(state)
+
+    class PartCompiler(CompilerBase):  # type: ignore[misc]
+        def define_pipelines(self) -> list[Any]:
+            passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+            passes.passes = [(PartLowering if p is NativeLowering else p, text) for p, text in passes.passes]
+            passes.finalize()
+            return [passes]
+
+    return {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": PartCompiler}
 
 
 def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
@@ -204,10 +251,7 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
         return _without_cache(numba, function)
     store._source_stamp = stamp()
     store.__class__ = _store_type()
-    if all(hasattr(dispatcher._cache, name) for name in _LOADING):  # a numba that loads otherwise: its own way
-        dispatcher._cache.__class__ = _cache_type()
-    else:
-        _register_inner_loops()
+    dispatcher._cache.__class__ = _cache_type()
     return dispatcher
 
 

@@ -42,8 +42,8 @@ class HoldNumbers(NamedTuple):
 
 
 @compiled
-def held_moment(hold: HoldNumbers, tilt: float, load: float) -> tuple[float, float, float, bool]:
-    """`TiltHold` at a tilt [rad] and pad load [N]."""
+def held_moment(hold: HoldNumbers, tilt: float, load: float) -> TiltHold:
+    """What holds at a tilt [rad] and pad load [N]."""
     stiffness, arm, slides = hold.flexure, 0.0, False
     if load > 0.0:
         stiffness += hold.roll * load
@@ -58,7 +58,7 @@ def held_moment(hold: HoldNumbers, tilt: float, load: float) -> tuple[float, flo
         stiffness += stick * np.sqrt(1.0 - share)
         # with the load the limit grows, and by a third of it the contact's stiffness
         arm += np.copysign(slip / load * (held - share * np.sqrt(1.0 - share)), tilt)
-    return moment, stiffness, arm, slides
+    return TiltHold(moment, stiffness, arm, slides)
 
 
 def hold_numbers(setup: Setup) -> HoldNumbers:
@@ -73,7 +73,7 @@ def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
     hold = hold_numbers(setup)
     if not any(hold):
         return TiltHold(0.0, 0.0, 0.0, False)
-    return TiltHold(*held_moment(hold, float(tilt), float(load)))
+    return held_moment(hold, float(tilt), float(load))
 
 
 def rolling_radius(pivot: Pivot) -> float:

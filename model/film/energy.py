@@ -46,7 +46,13 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
 @inner
 def between(sources: FloatArray) -> FloatArray:
     """What stations make, (m, nt + 1, nz + 1), as what is made between them, (m, nt, nz + 1)."""
-    return 0.5 * (sources[:, :-1] + sources[:, 1:])
+    count, rows, columns = sources.shape
+    made = np.empty((count, rows - 1, columns))
+    for m in range(count):
+        for i in range(rows - 1):
+            for j in range(columns):
+                made[m, i, j] = 0.5 * (sources[m, i, j] + sources[m, i + 1, j])
+    return made
 
 
 @compiled
@@ -140,17 +146,12 @@ def heat_step(
     return change, limited, force[0], force[1]
 
 
-@compiled
-def dissipation(grid: FilmGrid, work: FilmWork, speed: float) -> FloatArray:
-    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1)."""
-    out, less = np.empty(work.pressure.shape), np.empty(work.pressure.shape)
-    dissipate(grid, work, speed, out, less)
-    return out
-
-
 @inner
 def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
-    """Heat made per station [W], and how much less of it for every unit by which the viscosity falls, as a share."""
+    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1).
+
+    `less`: how much less of it for every unit by which the viscosity falls, as a share.
+    """
     h, mu = work.thickness, work.viscosity
     for i in range(h.shape[0]):
         for j in range(h.shape[1]):

@@ -116,10 +116,27 @@ def _substitution_of_four(known: int | None) -> Any:
     return substitute_four_bands
 
 
-#: Of the default mesh, half a film of 6 intervals, of the coarser one where many models are compared, of any other.
-_factorise_6, _substitute_6, _substitute_four_6 = _factoriser(6), _substitution(6), _substitution_of_four(6)
-_factorise_4, _substitute_4, _substitute_four_4 = _factoriser(4), _substitution(4), _substitution_of_four(4)
-_factorise, _substitute, _substitute_four = _factoriser(None), _substitution(None), _substitution_of_four(None)
+def _for_any_width(make: Any) -> Any:
+    """For the default mesh, half a film of 6 intervals, the coarser one where many models are compared, any other."""
+    six, four, other = make(6), make(4), make(None)
+
+    @inner
+    def substitute_any(band: FloatArray, x: FloatArray) -> None:
+        if band.shape[1] == 7:
+            six(band, x)
+        elif band.shape[1] == 5:
+            four(band, x)
+        else:
+            other(band, x)
+
+    return substitute_any
+
+
+_factorise_6, _factorise_4, _factorise = _factoriser(6), _factoriser(4), _factoriser(None)
+#: Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,).
+substitute = _for_any_width(_substitution)
+#: The same for the four derivatives side by side, `x` (n, 4): the inner loop fills a vector register.
+substitute_four = _for_any_width(_substitution_of_four)
 
 
 @inner
@@ -131,31 +148,6 @@ def factorise(band: FloatArray) -> None:
         _factorise_4(band)
     else:
         _factorise(band)
-
-
-@inner
-def substitute(band: FloatArray, x: FloatArray) -> None:
-    """Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,)."""
-    if band.shape[1] == 7:
-        _substitute_6(band, x)
-    elif band.shape[1] == 5:
-        _substitute_4(band, x)
-    else:
-        _substitute(band, x)
-
-
-@inner
-def substitute_four(band: FloatArray, x: FloatArray) -> None:
-    """`substitute` for the four derivatives side by side (n, 4): the inner loop fills a vector register.
-
-    `band` (n, width + 1), `x` (n, 4).
-    """
-    if band.shape[1] == 7:
-        _substitute_four_6(band, x)
-    elif band.shape[1] == 5:
-        _substitute_four_4(band, x)
-    else:
-        _substitute_four(band, x)
 
 
 @inner

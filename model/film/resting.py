@@ -31,10 +31,8 @@ class RestingFilm(NamedTuple):
 
 
 @compiled
-def resting_film(
-    grid: FilmGrid, wedge: tuple[float, float], running: Running, inlet: float
-) -> tuple[float, float, float, float]:
-    """Film of an idle pad for (Cp, a), as a `RestingFilm`; infinite heat capacity: as cold as its inlet."""
+def resting_film(grid: FilmGrid, wedge: tuple[float, float], running: Running, inlet: float) -> RestingFilm:
+    """Film of an idle pad for (Cp, a); infinite heat capacity: as cold as its inlet."""
     oil, speed = running.oil, running.speed
     density, entering = oil[2] * (1.0 + oil[3] * (40.0 - inlet)), oil[0] * np.exp(oil[1] * (40.0 - inlet))
     # the grid may hold one half
@@ -45,7 +43,7 @@ def resting_film(
     for i in range(len(grid.cos)):
         thickness = wedge[0] - wedge[1] * grid.cos[i]
         if not thickness > 0.0:
-            return math.nan, math.nan, math.nan, math.nan
+            return RestingFilm(math.nan, math.nan, math.nan, math.nan)
         heating = 2.0 * speed / (density * running.heat[0] * thickness**2)
         if i > 0:
             along += 0.5 * (heating + heating_before) * grid.dx
@@ -57,4 +55,4 @@ def resting_film(
         lighter = oil[2] * (1.0 + oil[3] * (40.0 - inlet - rise))
         reynolds = max(reynolds, lighter * speed * thickness / viscosity)
         heating_before, shear_before = heating, shear
-    return power, 0.5 * density * speed * leading * length, inlet + rise, reynolds
+    return RestingFilm(power, 0.5 * density * speed * leading * length, inlet + rise, reynolds)

@@ -24,7 +24,7 @@ from model.film.cross_film import CrossOperator
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
 from model.pad.bending import PadDeformation
 from model.setup import Setup
-from model.statics.compiled.constants import BOUNDLESS
+from model.statics.compiled.case import BOUNDLESS
 from model.statics.compiled.heat import balance_heat
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import outlet_temperature, through_flow

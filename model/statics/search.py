@@ -22,8 +22,7 @@ from model.setup import Setup
 from model.statics import conditions
 from model.statics.axial_tilt import aligned_tilt, axial_shape
 from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
-from model.statics.compiled.constants import HEATING_STEP
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL, Case
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
@@ -166,34 +165,26 @@ class Search:
                 axial[:] = [aligned_tilt(self.setup, f.pad.pivot_angle) for f in self.films]
             for film, tilt in zip(self.films, axial.tolist(), strict=True):
                 film.work.extra[:] += tilt * axial_shape(film.grid)
+        zeros: dict[str, Any] = {name: np.zeros(n) for name in ("tilt", "deflection", "passed", "least")}
+        zeros |= {name: np.zeros((n, 2)) for name in ("wedge", "force", "corrected", "felt", "moves")}
+        zeros |= {name: np.zeros((n, 2, 2)) for name in ("stiffness", "damping", "felt_stiffness")}
         return PadState(
+            **zeros,
             position=np.zeros(2),
-            tilt=np.zeros(n),
-            deflection=np.zeros(n),
             axial=axial,
             supplied=np.full(n, math.inf),
-            passed=np.zeros(n),
             idle=np.zeros(n, dtype=np.bool_),
             solved=np.zeros(n, dtype=np.bool_),
             rescues=np.zeros(n, dtype=np.int64),
             inlet=np.full(n, self.case.supply),
             resting=np.full((n, 4), math.nan),
-            wedge=np.zeros((n, 2)),
-            force=np.zeros((n, 2)),
-            corrected=np.zeros((n, 2)),
-            stiffness=np.zeros((n, 2, 2)),
-            damping=np.zeros((n, 2, 2)),
-            least=np.zeros(n),
             steps=np.zeros(n, dtype=np.int64),
             heating=np.full(n, math.inf),
             shift=shifts,
-            felt=np.zeros((n, 2)),
-            felt_stiffness=np.zeros((n, 2, 2)),
             bent=bent,
             mismatch=np.zeros_like(bent),
             amplitude=np.zeros((n, SHAPES, 3)),
             axial_step=np.zeros((n, 3)),
-            moves=np.zeros((n, 2)),
             faces=faces,
             warmth=warmth,
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),

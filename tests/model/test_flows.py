@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 from model.effects import Effect
 from model.film.mesh import film_grid
 from model.film.oil_state import Running
-from model.film.resting import RestingFilm, resting_film
+from model.film.resting import resting_film
 from model.predict import predict
 from model.setup import Mesh
 from model.statics.pad_film import oil_constants
@@ -76,7 +76,7 @@ def test_a_resting_film_heats_and_shears_as_its_equation_says(rocker):
     grid = film_grid(-0.55, 0.55, 0.05, 0.07, (400, 4), True)
     cp, a = 130e-6, -25e-6
     running = Running(speed, oil_constants(oil), (oil.specific_heat / 0.8, oil.conductivity))
-    rest = RestingFilm(*resting_film(grid, (cp, a), running, 45.0))
+    rest = resting_film(grid, (cp, a), running, 45.0)
 
     def gap(angle: float) -> float:
         return cp - a * math.cos(angle)
@@ -95,6 +95,24 @@ def test_a_resting_film_heats_and_shears_as_its_equation_says(rocker):
     assert rest.flow == pytest.approx(0.5 * oil.density(45.0) * speed * lead * 0.07, rel=1e-12)
     # the heat that stays is what the flow takes along
     assert rest.flow * oil.specific_heat * (rest.outlet - 45.0) == pytest.approx(0.8 * rest.power, rel=1e-3)
+
+
+@pytest.mark.parametrize(("preload", "direction"), [(0.1, -90.0), (0.03, -54.0), (-0.02, -90.0)])
+def test_idle_pads_of_isothermal_films_shear_oil_as_cold_as_it_enters(rocker, preload, direction):
+    pads = tuple(replace(p, assembled_clearance=(1.0 - preload) * p.pad_clearance) for p in rocker.pads)
+    bearing, turning = rocker.with_pads(pads), 2 * math.pi * 40
+    p = predict(bearing, 9000.0, math.radians(direction), turning, thermal="isothermal")
+    idle = [film for film in p.equilibrium.films if film.idle]
+    assert idle
+    surface, supply = turning * bearing.journal_radius, bearing.oil.supply_temperature
+    viscosity, density = float(bearing.oil.viscosity(supply)), float(bearing.oil.density(supply))
+    for film in idle:
+        gap = film.pad.pad_clearance - film.rigid_approach(p.equilibrium.position) * np.cos(film.grid.angle)
+        shear = viscosity * surface**2 * gap[0] / gap**2
+        power = np.trapezoid(np.where(gap > gap[0], shear, viscosity * surface**2 / gap), dx=film.grid.dx)
+        assert film.resting.power == pytest.approx(power * bearing.length, rel=1e-9)
+        assert film.resting.reynolds == pytest.approx(density * surface * gap.max() / viscosity, rel=1e-9)
+        assert film.resting.outlet == supply
 
 
 def test_power_loss_does_not_fall_when_pads_unload(rocker):

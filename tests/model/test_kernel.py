@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import model.film.energy
 import model.film.reynolds
 import model.statics.compiled.elimination
 from model import compilation
+from model.compilation import inner
 
 FOLDER = Path(compilation.__file__).parent
 
@@ -22,7 +24,7 @@ FOLDER = Path(compilation.__file__).parent
 def test_list_of_kernels_is_complete():
     sources = {path.relative_to(FOLDER).as_posix(): path.read_text(encoding="utf-8") for path in FOLDER.rglob("*.py")}
     using = {name for name, text in sources.items() if "\n@compiled\n" in text or "\n@inner\n" in text}
-    assert using | {"compilation.py", "statics/compiled/constants.py"} == set(compilation.KERNELS)
+    assert using | {"compilation.py"} == set(compilation.KERNELS)
     assert not [name for name, text in sources.items() if "njit" in text and name != "compilation.py"]
 
 
@@ -144,3 +146,21 @@ def test_one_variable_moves_the_machine_code_too(monkeypatch, tmp_path, chosen, 
         monkeypatch.setenv("NUMBA_CACHE_DIR", numbas)
     compilation._compiler.__wrapped__()
     assert (numba.config.CACHE_DIR or None) == (under and str(tmp_path / under))
+
+
+def _checked(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return math.sqrt(x)
+
+
+def _root(x):
+    return _checked(x)
+
+
+def test_an_error_in_a_part_comes_out_of_the_loop_that_took_it_in():
+    inner(_checked)
+    root = compilation._without_cache(numba, _root)
+    assert root(4.0) == 2.0
+    with pytest.raises(ValueError, match="below zero"):
+        root(-4.0)

@@ -1,10 +1,11 @@
 """What a wait was and is: two checkouts in turn, in one run, as a table.
 
-    python -m tests.studies.speed --before /path/of/an/older/checkout [--rounds 4] [--write]
+    python -m tests.studies.speed --before /path/of/an/older/checkout [--rounds 4] [--model-only] [--write]
 
 Both run the same code, each with its own interpreter if it has one (`.venv`), in turn, so that a quiet moment of the
 machine serves both. Times are processor times, the least of all rounds: points of the model within one process, and
-whole commands on the bundled demo in a process of their own.
+whole commands on the bundled demo in a process of their own. First compilation is that of one adiabatic point without
+machine code on the disk, once in each checkout.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from tests.studies.results import table, write_section
 HERE = Path(__file__).resolve().parents[2]
 #: Runs in either checkout; prints milliseconds by name as JSON.
 MODEL = """
-import json, math, time
+import itertools, json, math, resource, sys, time
+from dataclasses import replace
 import numpy as np
 from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
@@ -34,8 +36,20 @@ bearing = load_bearing("model/bearings/rocker.toml")
 down, speed, lines = -math.pi / 2, 138.23, 2 * math.pi * np.array([10.0, 20.0, 25.0, 40.0, 50.0])
 
 
-def setup_of(thermal="adiabatic", pivots="kirk"):
+def setup_of(thermal="adiabatic", pivots="kirk", bearing=bearing):
     return Setup(bearing, pivot_laws(pivots, bearing), thermal)
+
+
+def carrying_over():
+    predict_setup(setup_of().change(carryover=0.8), 5000.0, down, speed, lines)
+
+
+lengths = itertools.count(1)
+
+
+def new_geometry():
+    other = replace(bearing, length=bearing.length * (1.0 + 1e-3 * next(lengths)))
+    predict_setup(setup_of(bearing=other), 5000.0, down, speed, lines)
 
 
 def loads():
@@ -48,17 +62,22 @@ actions = {
     f"point, {thermal}, 5 frequencies": lambda t=thermal: predict_setup(setup_of(t), 5000.0, down, speed, lines)
     for thermal in ("isothermal", "adiabatic", "tehd", "thd")
 }
+actions["point, adiabatic, carry-over 0.8, 5 frequencies"] = carrying_over
+actions["first point of a new geometry, adiabatic"] = new_geometry
 actions["adiabatic, 6 loads x 5 frequencies x 3 pivots"] = loads
 actions["adiabatic, locus of 20 directions"] = lambda: locus(setup_of(), 5000.0, np.linspace(-3.0, 3.0, 20), speed)
+if "first" in sys.argv:
+    actions = {"point, adiabatic": actions["point, adiabatic, 5 frequencies"]}
 times = {}
 for name, action in actions.items():
     action()
     spent = []
-    for _ in range(5):
+    for _ in range(0 if "first" in sys.argv else 10):
         began = time.process_time()
         action()
         spent.append(time.process_time() - began)
-    times[name] = 1e3 * min(spent)
+    times[name] = 1e3 * min(spent, default=0.0)
+times["peak memory [MB]"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 print(json.dumps(times))
 """
 DEMO, ROCKER = "rigdata/samples/demo.h5", "model/bearings/rocker.toml"
@@ -71,10 +90,12 @@ COMMANDS = {
 }
 
 
-def run(checkout: Path, words: list[str]) -> tuple[str, float]:
-    """Output and processor time [ms] of Python in a checkout."""
+def run(checkout: Path, words: list[str], cache: str = "") -> tuple[str, float]:
+    """Output and processor time [ms] of Python in a checkout; `cache`: where its machine code is."""
     python = checkout / ".venv" / "bin" / "python"
     threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(checkout)}
+    if cache:
+        threads["NUMBA_CACHE_DIR"] = cache
     command = [str(python) if python.exists() else sys.executable, "-P", *words]
     before = os.times()
     done = subprocess.run(
@@ -87,9 +108,18 @@ def run(checkout: Path, words: list[str]) -> tuple[str, float]:
     return done.stdout, 1e3 * spent
 
 
-def measured(checkout: Path) -> dict[str, float]:
+def first_compilation(checkout: Path) -> dict[str, float]:
+    """Of one point, and of a process that loads what was compiled [ms]."""
+    with tempfile.TemporaryDirectory() as cache:
+        first, again = (run(checkout, ["-c", MODEL, "first"], cache)[1] for _ in range(2))
+    return {"first compilation, one adiabatic point": first, "the same process with machine code on the disk": again}
+
+
+def measured(checkout: Path, model_only: bool) -> dict[str, float]:
     """One round in one checkout [ms]."""
     times: dict[str, float] = json.loads(run(checkout, ["-c", MODEL])[0])
+    if model_only:
+        return times
     with tempfile.TemporaryDirectory() as out:
         for name, words in COMMANDS.items():
             folder = [] if name == "--help" else ["--out", f"{out}/{name}"]
@@ -101,20 +131,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--before", type=Path, required=True, help="an older checkout")
     parser.add_argument("--rounds", type=int, default=4)
+    parser.add_argument("--model-only", action="store_true", help="leave out the commands")
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     checkouts = (asked.before.resolve(), HERE)
     for checkout in checkouts:
-        measured(checkout)  # compiled once, if it was not
-    rounds = [[measured(checkout) for checkout in checkouts] for _ in range(asked.rounds)]
+        measured(checkout, asked.model_only)  # compiled once, if it was not
+    firsts = [first_compilation(checkout) for checkout in checkouts]
+    rounds = [[measured(checkout, asked.model_only) for checkout in checkouts] for _ in range(asked.rounds)]
     rows = []
-    for name in rounds[0][0]:
-        before, after = (min(both[side][name] for both in rounds) for side in (0, 1))
+    for name in (*firsts[0], *rounds[0][0]):
+        sides = [firsts] if name in firsts[0] else rounds
+        before, after = (min(both[side][name] for both in sides) for side in (0, 1))
         rows.append((name, f"{before:.1f}", f"{after:.1f}", f"{after / before:.2f}"))
     text = table(("what", "before [ms]", "after [ms]", "after / before"), rows)
     print(text)
     if asked.write:
-        write_section("speed", f"python -m tests.studies.speed --before CHECKOUT --rounds {asked.rounds} --write", text)
+        only = " --model-only" if asked.model_only else ""
+        command = f"python -m tests.studies.speed --before CHECKOUT --rounds {asked.rounds}{only} --write"
+        write_section("speed", command, text)
 
 
 if __name__ == "__main__":

@@ -83,11 +83,15 @@ _RIGID = BodyStack(
 
 
 @inner
-def bend_pads(shapes: Shapes, bodies: BodyStack, pads: PadStack, works: FilmWork, state: PadState, case: Case) -> float:
+def bend_pads(
+    bodies: BodyStack | None, shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case
+) -> float:
     """Close the loop of pressure, deformation and tilt along the shaft for every pad that carries.
 
     Returns the largest change asked for, as a share of the thinnest film.
     """
+    if bodies is None or state.bent.size == 0:
+        return 0.0
     grids, count = shapes.grids, len(state.tilt)
     asked = np.zeros((count, state.bent[0].size))
     if len(bodies.which) > 0:
@@ -250,11 +254,13 @@ def _axial_moment(
 
 
 @inner
-def change_shape(state: PadState, bodies: BodyStack, case: Case, m: int, da: float, db: float) -> float:
+def change_shape(bodies: BodyStack | None, state: PadState, case: Case, m: int, da: float, db: float) -> float:
     """Add to the change of a pad's deformation, `PadState.mismatch`, what belongs to a move of its film.
 
     Returns the change of its tilt along the shaft [rad].
     """
+    if bodies is None:
+        return 0.0
     out = state.mismatch[m]
     if len(bodies.which) > 0:
         shapes = bodies.shapes[bodies.which[m]]

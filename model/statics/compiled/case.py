@@ -13,6 +13,14 @@ from rigdata.arrays import FloatArray
 #: `Case.thermal`: films as cold as their inlets, each for itself, all with pads, journal and grooves, and the same
 #: with temperatures across the films, which a step in Python finds.
 ISOTHERMAL, ALONE, COUPLED, ACROSS = range(4)
+#: Largest change of a film temperature in one step [K]: a turbine oil (0.034 1/K) loses 40 % of its viscosity.
+HEATING_STEP = 15.0
+#: Weight of a temperature change against a share of the load [K]: film temperatures count as settled when one more step
+#: would change them by this times `Setup.accuracy`, 3e-5 K as a rule. That is 1e-6 of the viscosity, and of that the
+#: step leaves a tenth.
+HEAT_PER_FORCE = 300.0
+#: Kelvins beyond which a film is no film: squares would overflow.
+BOUNDLESS = 1e30
 
 
 class Case(NamedTuple):

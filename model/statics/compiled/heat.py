@@ -27,8 +27,7 @@ from model.film.energy import between, dissipate, heat_step, march
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.film.slopes import pressure_change
-from model.statics.compiled.case import Case, rigid_approach
-from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP
+from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, rigid_approach
 from model.statics.compiled.elimination import solve
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
 from rigdata.arrays import BoolArray, FloatArray, IntArray
@@ -75,9 +74,9 @@ def rest_films(grids: GridStack, pads: PadStack, state: PadState, case: Case) ->
     for m in range(len(state.tilt)):
         if state.idle[m]:
             wedge = (pads.clearance[m], rigid_approach(pads, state, m))
-            power, flow, outlet, reynolds = resting_film(grid_of(grids, m), wedge, case.running, state.inlet[m])
-            state.resting[m, 0], state.resting[m, 1] = power, flow
-            state.resting[m, 2], state.resting[m, 3] = outlet, reynolds
+            found = resting_film(grid_of(grids, m), wedge, case.running, state.inlet[m])
+            for k in range(4):
+                state.resting[m, k] = found[k]
 
 
 @inner

@@ -16,26 +16,32 @@ from model.compilation import compiled, inner
 from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
 from model.statics.compiled.bending import Shapes
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
-from model.statics.compiled.constants import (
-    ACROSS_ACCURACY,
-    BOUNDLESS,
-    HEAT_PER_FORCE,
-    MAX_ITERATIONS,
-    MICROMETRE,
-    NEAR,
-    NEAR_HEAT,
-    PATIENCE,
-    PROGRESS,
-    RELAXATION,
-    SLOW,
-    SLOW_ACROSS,
-)
+from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Case
 from model.statics.compiled.heat import Conduction, exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
 from model.statics.compiled.stack import BACKFLOW, GROWN, GridStack, PadStack, PadState
 from model.statics.compiled.step import grow_and_bend, move, newton, solve_pressures
 from rigdata.arrays import FloatArray
+
+_MAX_ITERATIONS = 80
+#: Below this residual, and this change of temperature [K], the iteration is accelerated and the temperature no longer
+#: relaxed.
+_NEAR, _NEAR_HEAT = 0.3, 25.0
+#: Steps that leave more than this share of what was left are accelerated; the others need no help.
+_SLOW = 0.4
+#: The same where temperatures across films, pads, journal and clearances settle together: Fillon's bearing takes 8 to
+#: 11 steps, 9 to 14 with 0.4.
+_SLOW_ACROSS = 0.12
+#: A residual that has not fallen by this factor for so many steps has the steps halved.
+_PROGRESS, _PATIENCE = 0.7, 12
+#: Unit of lengths in the state vector [m]: a micrometre weighs as much as a kelvin.
+_MICROMETRE = 1e-6
+#: Share of a change of temperature that is made far from the equilibrium: a much hotter film carries less and heats
+#: less, and undamped the two would swing.
+_RELAXATION = 0.6
+#: With temperatures across the films it ends at so many times `Setup.accuracy`: less than 1e-3 K asked for in the last
+#: step. That leaves 2e-5 K and 6e-7 of K and C (rocker; two steps fewer), where a mesh twice as fine moves 0.1 K.
+_ACROSS_ACCURACY = 30.0
 
 #: How an iteration ends, or what it asks Python for: viscosities, temperatures for the pressures, the pivots' laws,
 #: whether pads are stable whose frozen film does not say so.
@@ -60,7 +66,7 @@ def fresh_memory(size: int, warm: bool) -> Memory:
     """Of an iteration that has not begun, over a state of a size; a warm one does not relax its first step."""
     trail = np.zeros(TRAIL)
     trail[[RESIDUAL, HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
-    trail[RELAXED] = 1.0 if warm else RELAXATION
+    trail[RELAXED] = 1.0 if warm else _RELAXATION
     images = np.empty((2 * DEPTH + 3, size))
     return Memory(trail, images[: DEPTH + 1], images[DEPTH + 1 : -1], images[-1])
 
@@ -70,10 +76,10 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
     """Iterate from where the arrays stand until the end, or until Python is asked for a step."""
     trail = memory.trail
     across, sharp = case.thermal == ACROSS, False
-    accuracy = case.accuracy * (ACROSS_ACCURACY if across else 1.0)
+    accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
-            if trail[ITERATION] >= MAX_ITERATIONS:
+            if trail[ITERATION] >= _MAX_ITERATIONS:
                 return NOT_CONVERGED
             trail[ITERATION] += 1
             trail[_STAGE] = _PRESSURE
@@ -139,7 +145,7 @@ def _begin(pads: PadStack, state: PadState, case: Case, memory: Memory) -> None:
     trail = memory.trail
     state.figures[BACKFLOW] = 0.0
     trail[_STAGE], trail[HEAT] = _HEATING, 0.0
-    slow = SLOW_ACROSS if case.thermal == ACROSS else SLOW
+    slow = _SLOW_ACROSS if case.thermal == ACROSS else _SLOW
     mixes = case.thermal != ISOTHERMAL or state.bent.size > 0
     trail[_KEPT] = 1.0 if trail[_LEFT] > slow * trail[_BEST_LEFT] and mixes else 0.0
     if trail[_KEPT] > 0.0:
@@ -161,15 +167,15 @@ def _go_on(
     residual, heat = trail[RESIDUAL], trail[HEAT]
     trail[_BEST_LEFT] = min(trail[_BEST_LEFT], trail[_LEFT])
     trail[_LEFT] = max(residual, heat / HEAT_PER_FORCE)
-    near = residual < NEAR and heat < NEAR_HEAT
+    near = residual < _NEAR and heat < _NEAR_HEAT
     # a film with temperatures across knows that it makes less heat when it is hotter: it does not swing
-    trail[RELAXED] = 1.0 if near or across else RELAXATION
-    trail[_STALLED] = 0.0 if residual < PROGRESS * trail[_BEST] else trail[_STALLED] + 1.0
+    trail[RELAXED] = 1.0 if near or across else _RELAXATION
+    trail[_STALLED] = 0.0 if residual < _PROGRESS * trail[_BEST] else trail[_STALLED] + 1.0
     trail[_BEST] = min(trail[_BEST], residual)
-    damping = 0.5 if trail[_STALLED] > PATIENCE else 1.0
+    damping = 0.5 if trail[_STALLED] > _PATIENCE else 1.0
     whole = move(shapes, pads, works, state, case, shift, damping)
     # steps that were cut short, or still far off, say nothing of the iteration's slow modes
-    slow = SLOW_ACROSS if across else SLOW
+    slow = _SLOW_ACROSS if across else _SLOW
     if trail[_KEPT] > 0.0 and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
         count = _remember(memory)
         _write_vector(pads, state, case, memory.images[count - 1])
@@ -218,12 +224,12 @@ def vector_size(state: PadState, case: Case) -> int:
 @inner
 def _write_vector(pads: PadStack, state: PadState, case: Case, out: FloatArray) -> None:
     """Journal, pads, temperatures and deformations as one vector, in micrometres and kelvins."""
-    out[0], out[1] = state.position[0] / MICROMETRE, state.position[1] / MICROMETRE
+    out[0], out[1] = state.position[0] / _MICROMETRE, state.position[1] / _MICROMETRE
     out[2] = state.figures[GROWN]
     at = 3
     for m in range(len(state.tilt)):
-        unit = pads.pivot_radius[m] / MICROMETRE
-        out[at], out[at + 1] = state.tilt[m] * unit, state.deflection[m] / MICROMETRE
+        unit = pads.pivot_radius[m] / _MICROMETRE
+        out[at], out[at + 1] = state.tilt[m] * unit, state.deflection[m] / _MICROMETRE
         out[at + 2] = state.axial[m] * unit
         at += 3
         for q in range(state.warmth.shape[1]):
@@ -236,7 +242,7 @@ def _write_vector(pads: PadStack, state: PadState, case: Case, out: FloatArray) 
                     at += 1
         for i in range(state.bent.shape[1]):
             for j in range(state.bent.shape[2]):
-                out[at] = state.bent[m, i, j] / MICROMETRE
+                out[at] = state.bent[m, i, j] / _MICROMETRE
                 at += 1
 
 
@@ -245,14 +251,14 @@ def _read_vector(
     shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, vector: FloatArray
 ) -> None:
     """Undo `_write_vector`."""
-    state.position[0], state.position[1] = vector[0] * MICROMETRE, vector[1] * MICROMETRE
+    state.position[0], state.position[1] = vector[0] * _MICROMETRE, vector[1] * _MICROMETRE
     closing = case.closing * (vector[2] - state.figures[GROWN])
     state.figures[GROWN] = vector[2]
     at = 3
     for m in range(len(state.tilt)):
-        unit = MICROMETRE / pads.pivot_radius[m]
+        unit = _MICROMETRE / pads.pivot_radius[m]
         pads.clearance[m] -= closing
-        state.tilt[m], state.deflection[m] = vector[at] * unit, vector[at + 1] * MICROMETRE
+        state.tilt[m], state.deflection[m] = vector[at] * unit, vector[at + 1] * _MICROMETRE
         more = vector[at + 2] * unit - state.axial[m]
         state.axial[m] += more
         at += 3
@@ -269,7 +275,7 @@ def _read_vector(
         cos, z = shapes.grids.cos[m], shapes.grids.z[m]
         for i in range(state.bent.shape[1]):
             for j in range(state.bent.shape[2]):
-                change = vector[at] * MICROMETRE - state.bent[m, i, j]
+                change = vector[at] * _MICROMETRE - state.bent[m, i, j]
                 state.bent[m, i, j] += change
                 works.extra[m, i, j] += change + more * cos[i] * z[j]
                 at += 1

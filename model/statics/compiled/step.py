@@ -10,9 +10,8 @@ from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
-from model.statics.compiled.bending import BodyStack, Shapes, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, Case, along, rigid_approach
-from model.statics.compiled.constants import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, LONGEST_STEP, SHRINK
+from model.statics.compiled.bending import Shapes, bend_pads, change_shape
+from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, along, rigid_approach
 from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.laws import compliance, deflection
@@ -20,6 +19,12 @@ from model.statics.compiled.place import let_idle, rescue
 from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadStack, PadState, grid_of, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
+
+#: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
+#: Half and twice of it change nothing.
+_LONGEST_STEP = 0.3
+#: A film may shrink to this share of itself in one step.
+_SHRINK = 0.4
 
 
 @inner
@@ -74,24 +79,8 @@ def grow_and_bend(
             for j in range(2):
                 state.felt_stiffness[m, i, j] = state.stiffness[m, i, j]
     # a deformation counts like a temperature change of the same weight in the film's resistance
-    return max(change, HEAT_PER_FORCE * _bend(shapes.bodies, shapes, pads, works, state, case, change))
-
-
-@inner
-def _bend(
-    bodies: BodyStack | None,
-    shapes: Shapes,
-    pads: PadStack,
-    works: FilmWork,
-    state: PadState,
-    case: Case,
-    change: float,
-) -> float:
-    if bodies is None:
-        return 0.0
-    if not change < BOUNDLESS or state.bent.size == 0:
-        return 0.0
-    return bend_pads(shapes, bodies, pads, works, state, case)
+    share = bend_pads(shapes.bodies, shapes, pads, works, state, case) if change < BOUNDLESS else 0.0
+    return max(change, HEAT_PER_FORCE * share)
 
 
 @inner
@@ -136,7 +125,8 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
         radial, radius = state.felt[m, 0], pads.pivot_radius[m]
         rows.frame[k], rows.stiffness[k], rows.pivot_radius[k] = pads.frame[m], state.felt_stiffness[m], radius
         # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
-        rows.force[k] = state.felt[m] + closing * state.felt_stiffness[m, :, 0]
+        for i in range(2):
+            rows.force[k, i] = state.felt[m, i] + closing * state.felt_stiffness[m, i, 0]
         moment, stiffness, arm, _ = held_moment(case.hold, state.tilt[m], radial)
         rows.holding_force[k] = moment / radius
         rows.holding_slopes[k, 0], rows.holding_slopes[k, 1] = stiffness / radius, arm / radius
@@ -162,7 +152,7 @@ def move(
 ) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     grids = shapes.grids
-    scale = min(damping, LONGEST_STEP * np.min(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
+    scale = min(damping, _LONGEST_STEP * np.min(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
     extra, bending = np.empty((0, 0)), state.bent.size > 0
     closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
     for m in range(len(state.tilt)):
@@ -171,11 +161,11 @@ def move(
             da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
             db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pads.pivot_radius[m] * moves[0]
             if bending:
-                axial[m] = _follow(shapes.bodies, state, case, m, da, db)
+                axial[m] = change_shape(shapes.bodies, state, case, m, da, db)
                 extra = _extra(grid_of(grids, m), state, m, axial[m])
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
-            if worst * damping < SHRINK - 1.0:
-                scale = min(scale, (SHRINK - 1.0) / worst)
+            if worst * damping < _SHRINK - 1.0:
+                scale = min(scale, (_SHRINK - 1.0) / worst)
     state.position[0] += scale * shift[0]
     state.position[1] += scale * shift[1]
     state.figures[GROWN] += scale * state.figures[GROWING]
@@ -186,20 +176,14 @@ def move(
         state.tilt[m] = 0.0 if stops else state.tilt[m] + scale * state.moves[m, 0]
         state.deflection[m] += scale * state.moves[m, 1]
         if bending and state.solved[m]:
-            more = _extra(grid_of(grids, m), state, m, axial[m])
-            works.extra[m] += scale * more
-            state.bent[m] += scale * state.mismatch[m]
+            extra = _extra(grid_of(grids, m), state, m, axial[m])
+            for i in range(extra.shape[0]):
+                for j in range(extra.shape[1]):
+                    works.extra[m, i, j] += scale * extra[i, j]
+                    state.bent[m, i, j] += scale * state.mismatch[m, i, j]
             state.axial[m] += scale * axial[m]
     state.figures[GROWING] = 0.0
     return scale == 1.0
-
-
-@inner
-def _follow(bodies: BodyStack | None, state: PadState, case: Case, m: int, da: float, db: float) -> float:
-    """Change of a pad's tilt along the shaft [rad], see `change_shape`."""
-    if bodies is None:
-        return 0.0
-    return change_shape(state, bodies, case, m, da, db)
 
 
 @inner
