@@ -178,6 +178,17 @@ def test_a_hidden_effect_is_named_sized_and_closes_the_gap(setup, observations, 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("other", [Effect("channel_delay", delay=3e-4), Effect("probe_rotation", angle=0.06)])
+def test_two_effects_are_named_where_a_tolerance_first_did_the_work_of_one(setup, observations, other):
+    """Upper pads leave the shaft on the way, and the oil's own tolerance went as far as ten deviations."""
+    hidden = (Effect("oil_viscosity", factor=0.6), other)
+    skip = frozenset(known_effects()) - TRIED - {"probe_rotation", "pivot_offset_error", "clearance_error"}
+    verdict = diagnose(campaign(observations, setup, hidden, 7), setup, DiagnoseSettings(workers=1, skip=skip)).verdict
+    assert verdict.verdict == "named"
+    assert {e.name for e in verdict.effects} == {e.name for e in hidden}
+
+
+@pytest.mark.slow
 def test_nothing_hidden_is_consistent(setup, observations):
     verdict = diagnose(campaign(observations, setup, (), seed=3), setup, few()).verdict
     assert verdict.verdict == "consistent"

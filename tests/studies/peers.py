@@ -114,6 +114,8 @@ CASES = (
     Case("pads that differ, isothermal", pads=DIFFERENT),
     Case("pads that differ, isothermal", (80, 40), pads=DIFFERENT),
     Case("pads that differ, isothermal, clockwise", pads=DIFFERENT, rotation="clockwise"),
+    Case("pads that differ, isothermal, clockwise", (80, 40), pads=DIFFERENT, rotation="clockwise"),
+    Case("pads that differ, isothermal, clockwise", (160, 80), pads=DIFFERENT, rotation="clockwise"),
     Case("pads that differ, adiabatic", thermal="adiabatic", pads=DIFFERENT),
     Case("pads that differ, carry-over 0.8", thermal="adiabatic", pads=DIFFERENT, carry_over=0.8),
     Case("pads that differ, carry-over 0.8, clockwise", (40, 20), "adiabatic", 0.0, DIFFERENT, 0.8, "clockwise"),
