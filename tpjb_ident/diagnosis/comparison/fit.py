@@ -110,9 +110,10 @@ class Fit:
         return any(out[at].any() for at in unknowns.slices)
 
     def needs_more(self, settings: Deciding) -> bool:
-        """Whether it surely leaves a larger model error than right models do."""
-        wrong = self.problem.errors.scales > settings.right
-        return float(self.posterior.weights[wrong].sum()) >= settings.included
+        """Whether the data speak for a larger model error than right models leave: more than its prior does."""
+        errors = self.problem.errors
+        wrong = errors.scales > settings.right
+        return float(self.posterior.weights[wrong].sum()) > float(np.exp(errors.log_weights[wrong]).sum())
 
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
