@@ -152,7 +152,8 @@ class _Search:
         # steps that fail on derivatives from elsewhere say nothing: what they promise is asked
         if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
             fit = self._renewed(fit)
-        if not rough and fit.needs_more(self.settings) and self._near(fit, fit.posterior.promised, 0.0):
+        begun_fine = not (rough or proposal.coarse)
+        if begun_fine and fit.needs_more(self.settings) and self._near(fit, fit.posterior.promised, 0.0):
             fit = self._past_jumps(fit)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
