@@ -289,11 +289,12 @@ def _around_middle(readings: FloatArray) -> FloatArray:
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
-    reason, off = f"cells {load / 1e3:.3g} kN", abs(load / run.load.number - 1.0)
-    if run.load.source == "file" and off <= _CONTRADICTS:
+    reason, stated = f"cells {load / 1e3:.3g} kN", run.load.number
+    off = abs(load - stated)
+    if run.load.source == "file" and off <= _CONTRADICTS * stated:
         return run
-    if run.load.source == "file" or off <= _ONE_LOAD - 1.0:
-        source = "guess" if off > _CONTRADICTS else "records"
+    if run.load.source == "file" or off <= (_ONE_LOAD - 1.0) * stated:
+        source = "guess" if off > _CONTRADICTS * stated else "records"
         return replace(run, load=replace(run.load, source=source, reason=f"the file's name; {reason}"))
     return replace(run, load=Entry(load, "records", reason), load_text="")
 

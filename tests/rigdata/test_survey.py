@@ -266,6 +266,24 @@ def test_units_in_names_are_understood():
     assert run.speed.value == pytest.approx(22.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "load", "kept", "source", "reason"),
+    [
+        ("run_0kN_25Hz.csv", 20.0, 0.0, "guess", "the file's name; cells 0.02 kN"),
+        ("run_5kN_25Hz.csv", 5100.0, 5000.0, "file", ""),
+        ("run_5kN_25Hz.csv", 6000.0, 5000.0, "guess", "the file's name; cells 6 kN"),
+        ("run_08750_25Hz.csv", 8800.0, 8750.0, "records", "the file's name; cells 8.8 kN"),
+        ("run_25Hz.csv", 5000.0, 5000.0, "records", "cells 5 kN"),
+    ],
+)
+def test_a_load_by_a_file_s_name_is_held_against_the_cells(name, load, kept, source, reason):
+    time = np.arange(4000) / RATE
+    swing = 500.0 * np.sin(2 * np.pi * 25.0 * time)
+    (run,) = survey([Export(name, (Series("LC_H", "N", swing, time), Series("LC_V", "N", swing - load, time)))]).runs
+    assert run.load.value == pytest.approx(kept, rel=1e-3)
+    assert (run.load.source, run.load.reason) == (source, reason)
+
+
 def test_the_pad_of_a_thermometer_is_read_from_its_name():
     time = np.arange(100) / 10.0
     text = draft_manifest(survey([Export("a.csv", (Series("T3", "degC", 40.0 + 0 * time, time),))]), "x", None)
