@@ -130,6 +130,8 @@ def _warn_once(message: str) -> None:
 
 #: Bytes of a digest.
 _DIGEST = 32
+#: What `_cache_type` relies on in numba.
+_LOADING = ("_load_overload", "_guard_against_spurious_io_errors")
 
 
 @functools.cache
@@ -199,10 +201,13 @@ def _register_inner_loops() -> None:
 @functools.cache
 def _part_options() -> dict[str, Any]:
     """Of a loop that others take in: it is optimised and becomes machine code in them, once, not by itself before."""
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import CompilerBase, DefaultPassBuilder
-    from numba.core.compiler_machinery import register_pass
-    from numba.core.typed_passes import NativeLowering
+    try:
+        from numba.core.codegen import JITCodeLibrary
+        from numba.core.compiler import CompilerBase, DefaultPassBuilder
+        from numba.core.compiler_machinery import register_pass
+        from numba.core.typed_passes import NativeLowering
+    except ImportError:  # a numba that is built otherwise compiles them again and again: slower, and the same numbers
+        return _OPTIONS
 
     class Part(JITCodeLibrary):  # type: ignore[misc]
         @property
@@ -251,7 +256,10 @@ def _dispatcher(numba: Any, function: Callable[..., Any]) -> Any:
         return _without_cache(numba, function)
     store._source_stamp = stamp()
     store.__class__ = _store_type()
-    dispatcher._cache.__class__ = _cache_type()
+    if all(hasattr(dispatcher._cache, name) for name in _LOADING):  # a numba that loads otherwise: its own way
+        dispatcher._cache.__class__ = _cache_type()
+    else:
+        _register_inner_loops()
     return dispatcher
 
 

@@ -289,13 +289,14 @@ def _around_middle(readings: FloatArray) -> FloatArray:
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
-    reason, stated = f"cells {load / 1e3:.3g} kN", run.load.number
-    off = abs(load - stated)
-    if run.load.source == "file" and off <= _CONTRADICTS * stated:
+    reason, stated = f"cells {load / 1e3:.3g} kN", run.load
+    off = abs(load - stated.number)
+    agrees = off <= _CONTRADICTS * stated.number
+    if stated.source == "file" and agrees:
         return run
-    if run.load.source == "file" or off <= (_ONE_LOAD - 1.0) * stated:
-        source = "guess" if off > _CONTRADICTS * stated else "records"
-        return replace(run, load=replace(run.load, source=source, reason=f"the file's name; {reason}"))
+    if stated.source == "file" or off <= (_ONE_LOAD - 1.0) * stated.number:
+        source = "records" if agrees else "guess"
+        return replace(run, load=replace(stated, source=source, reason=f"the file's name; {reason}"))
     return replace(run, load=Entry(load, "records", reason), load_text="")
 
 

@@ -316,10 +316,9 @@ def _sides(truth: RigTruth) -> list[int]:
             before, after = pads[i - 1], pads[(i + 1) % len(pads)]
             if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
                 continue
-            reach = np.array([truth.clearance[before], truth.clearance[after]])
-            corner = np.linalg.solve(_normals(truth, [before, after]), reach)
-            reach = corner @ directions(truth.pivot_angles[k])
-            if reach <= truth.clearance[k]:
+            clearances = np.array([truth.clearance[before], truth.clearance[after]])
+            corner = np.linalg.solve(_normals(truth, [before, after]), clearances)
+            if corner @ directions(truth.pivot_angles[k]) <= truth.clearance[k]:
                 pads.remove(k)
                 removed = True
                 break

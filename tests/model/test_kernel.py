@@ -164,3 +164,9 @@ def test_an_error_in_a_part_comes_out_of_the_loop_that_took_it_in():
     assert root(4.0) == 2.0
     with pytest.raises(ValueError, match="below zero"):
         root(-4.0)
+
+
+def test_a_numba_that_is_built_otherwise_compiles_parts_its_own_way(monkeypatch):
+    assert "pipeline_class" in compilation._part_options()
+    monkeypatch.setitem(sys.modules, "numba.core.codegen", None)
+    assert compilation._part_options.__wrapped__() == compilation._OPTIONS

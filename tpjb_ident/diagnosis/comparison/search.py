@@ -25,8 +25,8 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
-#: Nats that put a coarse start before all others; nats that make another start worth a fit.
-_FIRST, _CLEAR = 1e6, 1.0
+#: Nats that put a coarse start before all others.
+_FIRST = 1e6
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class _Search:
     def _renewed(self, fit: Fit) -> Fit:
         """A fit with derivatives of its own, where these do not make it worse."""
         again = refined(self.run, fit)
-        return again if again.posterior.total > fit.posterior.total - 1.0 else fit
+        return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _past_jumps(self, fit: Fit) -> Fit:
         """A fit that leads and is surely wrong, begun coarsely where that makes it better."""
@@ -263,7 +263,7 @@ class _Search:
     def _offer(self, proposal: Proposal) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
-        better = fit is None or proposal.estimate > self._log_probability(fit) + _CLEAR
+        better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
         if better and (known is None or known.estimate < proposal.estimate):
             self.proposals[proposal.labels] = proposal
 

@@ -27,8 +27,9 @@ class Deciding:
     nothing: float = 0.05
     #: Names in a family of look-alikes: a longer list says nothing.
     family: int = 3
-    #: Scale of the model's error that right models reach. Its prior has 0.90 above; of 360 campaigns the right models
-    #: have 0.00 to 0.64 of their probability there, wrong ones 0.97 and more, and data that tell nothing 0.9.
+    #: Scale of the model's error that right models reach. Its prior has 0.90 above; right models have 0.00 to 0.64 of
+    #: their probability there (some 500 campaigns), data that tell nothing 0.9, and wrong models 0.97 and more, but
+    #: for those that fit as well as right ones.
     right: float = 0.2
     #: Held-out gap of the baseline below which nothing is compared: nothing off gives 0.07 to 0.13.
     quiet: float = 0.2
@@ -69,6 +70,8 @@ class Deciding:
     followed = 12
     #: Nats that a fit rises above its score at the most, and so may its rivals: derivatives from elsewhere miss that.
     mistaken = 25.0
+    #: Nats by which a fit is better than another of the same explanation.
+    better = 1.0
     #: Nats behind the leader within which a fit gets derivatives of its own.
     worth_derivatives = 15.0
     #: Scale of the likeliest single fault above which it is taken for wrong, and faults that begin with a coarse start.

@@ -39,13 +39,14 @@ def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judge
     sure = _sure(comparison, settings)
     model = _exactly(comparison, sure, settings) or comparison.best
     held = held_out_gap(run, model)
-    judgement = _of_model(comparison, model, held, settings)
+    judgement = _of_model(comparison, model, sure, held, settings)
     return replace(judgement, drift=drifts(model, settings.drifting)) if model.faults else judgement
 
 
-def _of_model(comparison: Comparison, model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
+def _of_model(
+    comparison: Comparison, model: Fit, sure: frozenset[str], held: HeldOut, settings: DiagnoseSettings
+) -> Judgement:
     """What is said of the model that counts: the one with exactly the sure names, or the most probable one."""
-    sure = _sure(comparison, settings)
     if model.needs_more(settings):
         reason = (
             f"the best explanation ({model.label}) leaves a model error of {model.posterior.scale:.2f} times the "
