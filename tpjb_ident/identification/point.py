@@ -13,7 +13,6 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, load_conditions
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, not_locked
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions
@@ -125,7 +124,8 @@ def _estimate(
     for name in RUN_TERMS:
         if name in solution.shares:
             budget[name] = solution.shares[name][p]
-    dof = _freedom(solved, p)
+    mine = solved.blocks.point == p
+    dof = solution.freedom(p, mine, 2 * float(np.median(solved.blocks.dof[mine])))
     if p in solved.mains:
         fit = solved.mains[p]
         budget["mains"] = fit.covariance
@@ -136,7 +136,7 @@ def _estimate(
     if p in solved.in_cells:
         common["mains on the cells"] = solved.in_cells[p]
     weights = window_weight * run_weight[_run_index(source, window_weight)]
-    omega = float(np.median(solved.blocks.omega[solved.blocks.point == p]))
+    omega = float(np.median(solved.blocks.omega[mine]))
     estimate = DynamicStiffness(
         solved.h[p],
         omega,
@@ -157,17 +157,6 @@ def _estimate(
 def _run_index(source: PointSource, window_weight: FloatArray) -> np.ndarray:
     index = source.data.run_index
     return index if len(index) == len(window_weight) else np.zeros(len(window_weight), dtype=int)
-
-
-def _freedom(solved: CampaignSolution, p: int) -> FloatArray:
-    """Degrees of freedom of the random part (8,): the records' noise and the runs' scatter, Welch and Satterthwaite."""
-    scatter = solved.solution.scatter
-    mine = solved.blocks.point == p
-    noise_dof = float(np.median(solved.blocks.dof[mine])) * 2
-    total = np.diag(solved.solution.records[p])
-    share = float(np.average(solved.solution.scatter_share[mine], weights=np.maximum(scatter.weights[mine], 1e-9)))
-    spare = scatter.own_spare[p] if scatter.own[p] else scatter.freedom
-    return mixed_dof(total, (1 - share) * total, noise_dof, np.full(8, max(spare, 1.0)))
 
 
 def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans) -> tuple[Condition, ...]:

@@ -12,19 +12,16 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.errors_in_variables import attenuation
-from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.sensors import alive
-from tpjb_ident.estimate.window_means import WindowMeans, window_means
+from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_means
 from tpjb_ident.phasors.shaft import shaft_order
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
-#: A run with less than this share of its windows accepted differs as a whole: its windows are judged among themselves.
-_ACCEPTED = 0.2
 #: Share of the windows of a run's best channel in which a channel has a phasor, at least, to count as recorded.
 _LEAST_WINDOWS = 0.4
 #: A window whose phasors are below this share of its run's loud ones (nine in ten are less loud) has no drive.
@@ -238,12 +235,7 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
         weights[table.valid] = 1.0
         return weights, none, ()
     fit = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)
-    good = fit.weights.copy()
-    size = np.bincount(table.direction, minlength=table.n_directions)
-    share = np.bincount(table.direction, weights=good > 0.2, minlength=table.n_directions) / size
-    # a run as a whole is no outlier of the windows: the scatter of runs, or the weight of its block, takes it
-    good[(share < _ACCEPTED)[table.direction]] = 1.0
-    weights[table.valid] = good
+    weights[table.valid] = within_directions(fit.weights, table.direction)
     # few windows have no robust start; their runs are judged beside those of the other points all the same
     conditions = tuple(c for c in fit.conditions if c != "no-robust-start")
     return weights, fit.coefficients * table.h_scale, conditions
