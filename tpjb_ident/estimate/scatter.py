@@ -117,7 +117,9 @@ class Scatter:
         spare = np.where(solvable[:, None], rows - _by_point(group, used[:, None] * fit.taken, points), 0.0)
         told = (spare > _LEAST_SPARE) & (information > 0)
         gain = np.where(told, information * spare / np.maximum(rows, 1.0), 1.0)
-        unusual = _unusual(np.sum(chi * told, axis=1), np.sum(spare * told, axis=1), told.any(axis=1), self.own)
+        unusual = _unusual(
+            np.sum(chi * told, axis=1), np.sum(spare * told, axis=1), np.asarray(told.any(axis=1)), self.own
+        )
         pooled, freedom = self._pooled(chi, spare, gain, told & ~unusual[:, None])
         # weights come to rest before a point's runs are said to differ more than the others'
         own = unusual if count >= _OWN_FROM else self.own

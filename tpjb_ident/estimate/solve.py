@@ -6,7 +6,7 @@ pulling H towards zero: there is no separate step of errors in variables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,7 +82,8 @@ class Solution:
             # stiffness and mass show in phase with the motion, damping ahead of it
             of_number = list(AHEAD if k // 4 == 1 else IN_PHASE)
             repeat = (1 - share[of_number].mean()) * total[k]
-            dof[k] = mixed_dof(total[k], repeat, noise_dof, self.scatter.freedom(group, of_number))
+            between = np.array(self.scatter.freedom(group, of_number))
+            dof[k] = mixed_dof(total[k], repeat, noise_dof, between)
         return dof
 
     def words(self) -> tuple[str, ...]:
@@ -105,13 +106,14 @@ class Solver:
         start: ComplexArray,
         to_set_point: bool = True,
         shape: Shape | None = None,
+        held: Mapping[str, Fitted] | None = None,
     ) -> None:
         self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
         self.shape = shape or Shape(np.arange(len(blocks.points)))
         self.group = self.shape.group[blocks.point]
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
-        self.shared = Table([term for term in self.terms if not term.points], 1)
+        self.shared = Table([term for term in self.terms if not term.points], 1, held=held)
         self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
@@ -192,7 +194,7 @@ class Solver:
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        given = np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers])
+        given = np.asarray(np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers]), dtype=float)
         parts = [_fit(rows, weight, given[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
@@ -208,6 +210,7 @@ class Solver:
             np.ones((n, m), complex),
             np.zeros((n, m + HOUSING_ROWS), complex),
             self.u[places],
+            self.rig.bare.at(blocks.omega),
             {term.name: self._value(term) for term in self.terms},
         )
         self._apply(blocks, state, additive=False)

@@ -94,14 +94,13 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     of_line = solved.data.line[solved.data.blocks.point]
     dof = solution.freedom(k, of_line == k, _noise_dof(solved, of_line == k))
     systematic = np.sum([np.zeros((8, 8)), *(share[k] for share in solution.shares.values())], axis=0)
-    rig = point.baseline.at(omega)
-    systematic = systematic + (0.0 if rig is None else rig[1])
     # a rectangle's standard deviation is half its width by the root of three
     own = systematic + np.diag(bracket**2) / 3
     none, condition = np.empty((0, 2)), float(solved.first.condition[k])
     best = DynamicStiffness(h, omega, solution.records[k], dof, point.method, none, condition=condition, systematic=own)
     table = {point.method: best}
-    others = dict(classic.h)
+    rig = solved.first.rig.bare.at(np.array([omega]))[0]
+    others = {name: value - rig for name, value in classic.h.items()}
     if len(solved.solutions) > 1 and bracket.any():
         others |= {"h1": solved.solutions[0].h[k], "h2": solved.solutions[1].h[k]}
     for name, value in others.items():
@@ -210,9 +209,6 @@ def _estimate(
     h, bracket = solved.between([s.part_h[q] for s in solved.solutions])
     shared = {name: share[q] for name, share in solution.shares.items() if np.any(share[q])}
     own = {"random": solution.records[q]} | {name: shared.pop(name) for name in RUN_TERMS if name in shared}
-    rig = point.baseline.at(part.omega)
-    if rig is not None:
-        shared["baseline"] = rig[1]
     if bracket.any():
         shared["no instrument"] = np.diag(bracket**2) / 3
     of_part = _part_of_block(solved) == q

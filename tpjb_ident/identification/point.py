@@ -15,6 +15,7 @@ from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.runs.baseline import DryTest
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions
 from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
 from tpjb_ident.dynamic.runs.point_source import PointSource
@@ -60,6 +61,7 @@ class PointTask:
     means: MeansTask
     temperatures: dict[str, dict[int, float]]
     checked: Verdicts
+    dry: DryTest
 
 
 def point_share(solved: CampaignSolution, source: PointSource, p: int) -> PointShare:
@@ -181,11 +183,10 @@ def finished_point(task: PointTask, source: PointSource, share: PointShare) -> P
     figures = point_figures(_without_shaft_remarks(corrected, share), settings, by_method, share.mains_in_cells)
     bent = change_conditions(share.film, share.amplitude_left, best, figures.amplitude, settings.clearance)
     checks = check_conditions(task.checked, [run.run for run in recorded.runs])
-    missing = source.baseline.missing(recorded)
+    missing = task.dry.missing(recorded.omega)
     conditions = merged(share.conditions, missing, bent, checks)
-    budget = share.budget | source.baseline.spread(recorded)
     figures = replace(figures, conditions=merged(figures.conditions, conditions))
-    return _result(task, recorded, by_method, figures, replace(share, budget=budget))
+    return _result(task, recorded, by_method, figures, share)
 
 
 def _without_shaft_remarks(data: PointData, share: PointShare) -> PointData:

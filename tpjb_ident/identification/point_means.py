@@ -120,8 +120,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
 def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
-    What is known of a channel is taken off: the drift of its gain with the run's temperature, in the cells the rig
-    without its bearing.
+    The drift of a channel's gain with the run's temperature is taken off as far as it is known.
     """
     rows: list[ComplexArray] = []
     described: list[list[Channel | None]] = []
@@ -142,9 +141,6 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
         described.append(channels)
     z = _without_dead(np.concatenate(rows), task)
     alive = np.array([np.isfinite(z[data.run_index == g]).any(axis=0) for g in range(len(data.runs))])
-    if data.rig is not None:
-        cells = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "force"]
-        z[:, cells] -= data.D @ data.rig.T @ task.along[cells].T
     living = []
     for g, run_channels in enumerate(described):
         living.append(tuple(c if alive[g, j] else None for j, c in enumerate(run_channels)))
