@@ -24,6 +24,8 @@ COMPONENTS = 4
 IN_PHASE, AHEAD = (0, 1), (2, 3)
 #: Which act across the spring force, or the damping force.
 ACROSS = (1, 3)
+#: A scatter across the force is at most so many times its size: where stiffness and mass cancel there is none along.
+_LARGEST = 10.0
 #: A component has at least this share of the mean scatter: keeps rows of computed records solvable.
 _LEAST = 0.02
 
@@ -54,7 +56,7 @@ class ForceScatter:
         """
         force = np.einsum("nij,nj->ni", h, motion)
         usual = np.linalg.norm(h, axis=(1, 2)) * np.linalg.norm(motion, axis=1) / np.sqrt(2)
-        across = usual / np.maximum(np.linalg.norm(force, axis=1), 1e-300)
+        across = np.minimum(usual / np.maximum(np.linalg.norm(force, axis=1), 1e-300), _LARGEST)
         size = np.where(np.isin(np.arange(COMPONENTS), ACROSS), across[:, None], 1.0)
         phase = np.exp(0.5j * np.angle(np.sum(motion**2, axis=1)))[:, None]
         spring, damper = (_directions(part) for part in ((force / phase).real, (force / phase).imag))

@@ -6,7 +6,7 @@ pulling H towards zero: there is no separate step of errors in variables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -106,14 +106,13 @@ class Solver:
         start: ComplexArray,
         to_set_point: bool = True,
         shape: Shape | None = None,
-        held: Mapping[str, Fitted] | None = None,
     ) -> None:
         self.rig, self.blocks, self.to_set_point = rig, blocks, to_set_point
         self.shape = shape or Shape(np.arange(len(blocks.points)))
         self.group = self.shape.group[blocks.point]
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
-        self.shared = Table([term for term in self.terms if not term.points], 1, held=held)
+        self.shared = Table([term for term in self.terms if not term.points], 1, held=self.shape.held)
         self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film

@@ -116,11 +116,10 @@ class _Task:
 
     def solved(self, start: ComplexArray, shape: Shape) -> Solution:
         """One solve from a start (P, 2, 2), NaN where points take no part."""
-        held = None
         if self.kept is not None:
-            scatter, held = self.kept.scatter, self.kept.fitted
-            shape = replace(shape, scatter=scatter.kept(shape.groups, scatter.weights))
-        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape, held).run()
+            scatter = self.kept.scatter
+            shape = replace(shape, scatter=scatter.kept(shape.groups, scatter.weights), held=self.kept.fitted)
+        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
 
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
