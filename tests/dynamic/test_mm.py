@@ -135,9 +135,9 @@ def test_one_start_that_fits_exactly_is_the_answer():
     pairs = np.array([[0, k] for k in range(1, 12)] + [[20, 30]])
     for order in (pairs, pairs[::-1]):
         seeds = least_trimmed._first_fits(regression, order)
-        found, exact = least_trimmed._concentrated(regression, seeds, 0.5)
+        found, exact = least_trimmed._concentrated(regression, seeds, 0.5, 1.0)
         assert exact
-        np.testing.assert_allclose(found, H, atol=1e-9)
+        np.testing.assert_allclose(regression.fit(found), H, atol=1e-9)
 
 
 def test_windows_that_fit_exactly_but_are_few_do_not_win():
@@ -193,3 +193,17 @@ def test_starts_are_pairs_of_windows_that_differ_in_direction_and_cores_the_near
     distance = np.random.default_rng(2).random((20, 300))
     nearest = least_trimmed._nearest(distance, 150)
     np.testing.assert_array_equal(nearest, np.argsort(np.argsort(distance)) < 150)
+
+
+@pytest.mark.parametrize(("noise", "between"), [(0.0, 0.0), (0.02, 0.0), (0.01, 0.02)])
+def test_windows_of_a_direction_that_few_runs_have_are_no_outliers(noise, between):
+    """Twelve runs along one line, two along another: without those two, H is fitted to what runs differ by."""
+    label = np.repeat(np.arange(14), 20)
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        along = np.array([[1.0, 0.1j], [0.2, 0.8 - 0.3j]])[(label >= 12).astype(int)]
+        X = along + 0.05 * complex_normal(rng, 14, 2)[label]
+        Y = X @ H.T + between * complex_normal(rng, 14, 2)[label] + noise * complex_normal(rng, 280, 2)
+        fit = mm_fit(X, Y, label)
+        np.testing.assert_allclose(fit.coefficients, H, atol=max(noise + 2 * between, 1e-9))
+        assert (fit.weights[label >= 12] > 0.3).mean() > 0.9

@@ -53,17 +53,16 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
     B, scatter = start.coefficients, start.scatter
     constant = efficiency_constant(2 * q)
     steps, change = 0, np.inf
-    distance = distance2(regression.terms(B), scatter)
+    weights = bisquare_weight(np.sqrt(distance2(regression.terms(B), scatter)), constant)
     while change > tolerance and steps < _MAX_ITERATIONS:
         steps += 1
-        B_new = regression.fit(bisquare_weight(np.sqrt(distance), constant))
-        distance = distance2(regression.terms(B_new), scatter)
+        B_new = regression.fit(weights)
+        weights = bisquare_weight(np.sqrt(distance2(regression.terms(B_new), scatter)), constant)
         change = float(np.abs(B_new - B).max() / np.abs(B).max())
         B = B_new
     conditions: tuple[Condition, ...] = ()
     if steps == _MAX_ITERATIONS:
         conditions = (Condition("iteration-limit", f"MM regression not settled after {steps} steps"),)
-    weights = bisquare_weight(np.sqrt(distance), constant)
     return RobustFit(B, scatter, weights, steps, conditions)
 
 
