@@ -136,6 +136,8 @@ class Scatter:
         self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """Variances that all points share (4,), by moments, and their degrees of freedom."""
+        if not told.any():
+            return np.maximum(self.pooled, self.usual), np.zeros(COMPONENTS)
         freedom, excess, weight = (np.sum(values * told, axis=0) for values in (spare, chi - spare, gain))
         moment = np.maximum(0.0, self.pooled + excess / np.maximum(weight, 1e-300))
         moment = _alike(moment, freedom)

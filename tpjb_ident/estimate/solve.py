@@ -227,6 +227,9 @@ class Solver:
         """Equations of blocks without their motion, real and of unit variance; the state's motion is renewed."""
         rig = self.rig
         N = covariance(rig, blocks, state, scatter.mean(axis=1), self.housing_noise)
+        # of the same motion as N, which holds their mean
+        motion, sizes = state.u[:, :2], scatter_patterns(blocks, state, np.ones(len(blocks)))
+        forces = film_force_rows(rig, blocks, state, np.stack(sizes, axis=2))
         for term in self.random:
             effects = term.random_effects(blocks, state)
             if effects is not None:
@@ -240,12 +243,11 @@ class Solver:
         white = np.linalg.solve(L, z[:, :, None])
         state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
-        forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
         own = [term.columns(blocks, state) for term in self.own.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]
         columns = np.concatenate([film, 1j * film, *own, *shared], axis=2)
-        patterns = Q2 @ np.linalg.solve(L, film_force_rows(rig, blocks, state, forces))
-        components = ForceScatter.of(patterns, state.u[:, :2], state.at_run(blocks), scatter)
+        patterns = Q2 @ np.linalg.solve(L, forces)
+        components = ForceScatter.of(patterns, motion, state.at_run(blocks), scatter)
         projected = components.white(_real(Q2 @ np.linalg.solve(L, columns)))
         r = components.white(_real(Q2 @ white))[:, :, 0]
         J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
