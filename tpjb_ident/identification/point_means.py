@@ -37,7 +37,6 @@ class PointMeans:
     start: ComplexArray  #: (2, 2), N/m: NaN where the windows give none
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
-    mean_load: FloatArray  #: (g, 2), N
     load_error: FloatArray  #: (g,), N: standard error of the mean load's size
     condition: float
     attenuation: FloatArray = field(repr=False)  #: (2,)
@@ -67,7 +66,7 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     present = np.array([[channel is not None for channel in run] for run in channels])
     D, F = vectors(z, data, task)
     table = phasor_table(D, F, data.run_index)
-    loads, errors = _loads(data)
+    errors = _load_errors(data)
     weights, start, status = _robust_start(table)
     means = window_means(z, data.run_index, time, [s.device for s in task.sensors], weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
@@ -76,7 +75,7 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     residual = _residual_density(data, task)
     usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
     more = (status, shaft, conditions)
-    return PointMeans(start, means, channels, loads, errors, condition, attenuation, residual, usable, *more)
+    return PointMeans(start, means, channels, errors, condition, attenuation, residual, usable, *more)
 
 
 def _residual_density(data: PointData, task: MeansTask) -> tuple[ComplexArray, float]:
@@ -237,15 +236,13 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
     return weights, fit.coefficients * table.h_scale, conditions
 
 
-def _loads(data: PointData) -> tuple[FloatArray, FloatArray]:
-    """Mean cell force of every run (g, 2), and the standard error of its size (g,) [N]."""
-    means, errors = [], []
+def _load_errors(data: PointData) -> FloatArray:
+    """Standard error of the size of every run's mean cell force, (g,) [N]."""
+    errors = []
     for run in data.runs:
         rows = run.cell_force.mean[np.isfinite(run.cell_force.mean).all(axis=1)]
-        means.append(rows.mean(axis=0) if len(rows) else np.full(2, np.nan))
-        spread = np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows)) if len(rows) > 1 else 0.0
-        errors.append(float(spread))
-    return np.array(means), np.array(errors)
+        errors.append(float(np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows))) if len(rows) > 1 else 0.0)
+    return np.array(errors)
 
 
 def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
