@@ -1,4 +1,4 @@
-"""Documentation: every link leads somewhere, every code block runs, every command line is one."""
+"""Documentation: every link leads somewhere, every code block runs, every command line is one; the README's are run."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import tpjb
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 #: Blocks that describe files of a user, so they are checked for being Python and are not run.
 NEEDS_FILES_OF_YOUR_OWN = ("rocker-A",)
 LANGUAGES = {"python", "toml", "sh", "text", "json", "math"}
+#: Commands of the README that others run (the demo from the wheel, the recovery tests).
+RUN_ELSEWHERE = ("compare", "diagnose", "plan", "view")
 
 
 def blocks():
@@ -115,8 +119,6 @@ def test_python_runs_as_it_stands(language, text, desk):
 
 @pytest.mark.parametrize(("language", "text"), of("sh"))
 def test_command_lines_have_commands_and_options_that_exist(language, text):
-    from tests.command_line import tpjb
-
     for line in text.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["tpjb"] and len(words) > 1:
@@ -127,20 +129,22 @@ def test_command_lines_have_commands_and_options_that_exist(language, text):
                     assert word in shown.stdout, line
 
 
+def test_the_readme_s_two_commands_name_what_exists():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for command in ("tpjb_ident demo", "tests"):
+        assert f"`python3 {command}`" in readme
+        assert f"`py {command}`" in readme
+        assert (ROOT / command.split()[0] / "__main__.py").exists()
+
+
 @pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path):
-    for module in ("mkdocstrings", "latex2mathml"):
-        pytest.importorskip(module, reason="the extra docs is not installed")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
-    pages = list((tmp_path / "site").rglob("*.html"))
-    assert len(pages) >= 12
-    for page in pages:
-        if page.name == "404.html":  # its links are those of a server's root
-            continue
-        html = page.read_text(encoding="utf-8")
-        for target in re.findall(r'href="([^"#:]+\.html)', html):
-            assert (page.parent / target).resolve().exists(), (page.name, target)
+def test_every_command_line_of_the_readme_runs(desk, monkeypatch):
+    monkeypatch.chdir(desk)
+    texts = [p.values[1] for p in of("sh") if p.id.startswith("README.md")]
+    lines = [line for text in texts for line in text.splitlines() if line.startswith("tpjb ")]
+    assert len(lines) >= 9
+    for line in lines:
+        words = shlex.split(line, comments=True)[1:]
+        if words[0] not in RUN_ELSEWHERE:
+            done = tpjb(*words)
+            assert done.exit_code == 0, f"{line}\n{done.output}"
