@@ -194,7 +194,7 @@ COMPARE = ("--pivots", "rigid, kirk, measured", "--thermal", "isothermal")
 @pytest.fixture(scope="module")
 def compared(small_campaign, tmp_path_factory):
     out = tmp_path_factory.mktemp("compare") / "out"
-    return tpjb("compare", small_campaign, *COMPARE, "--out", out), out
+    return tpjb("compare", small_campaign, *COMPARE, "--out", out, cores=2), out
 
 
 @pytest.mark.slow
@@ -218,7 +218,7 @@ def test_compare_writes_the_same_where_the_background_job_is_lost(compared, smal
         return {f.relative_to(folder): f.read_bytes() for f in files}
 
     monkeypatch.setattr(executors, "_received_value", lambda receiver: None)
-    result = tpjb("compare", small_campaign, *COMPARE, "--out", tmp_path / "lost")
+    result = tpjb("compare", small_campaign, *COMPARE, "--out", tmp_path / "lost", cores=2)
     assert result.exit_code == 0, result.output
     assert written(tmp_path / "lost") == written(compared[1])
 
