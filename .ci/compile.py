@@ -24,7 +24,9 @@ CASES = (
 
 def predicted(case: tuple[str, dict[str, object]]) -> None:
     """Predict the rocker bearing with one kind of film."""
-    from model import Options, load_bearing, predict
+    from model.bearing_file import load_bearing
+    from model.options import Options
+    from model.predict import predict
 
     thermal, options = case
     bearing = load_bearing(ROOT / "model" / "bearings" / "rocker.toml")
