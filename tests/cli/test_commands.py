@@ -250,6 +250,7 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
     assert tpjb("check", tmp_path / "o" / "campaign.h5", "--out", tmp_path / "c").exit_code == 0  # no cell at its limit
 
 
+@pytest.mark.slow
 def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
     arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
     for name in "ab":

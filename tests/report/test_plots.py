@@ -110,6 +110,7 @@ def test_axes_have_units(name):
             }, text  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_legends_do_not_cover_their_panels_nor_each_other(name):
     figure = picture(name)[0]
