@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import tpjb_ident as ti
+from tests.command_line import tpjb
 from tpjb_ident.rounding import with_interval
 
 pytest.importorskip("bokeh", reason="the extra view is not installed")
@@ -177,9 +178,9 @@ def test_the_browser_is_led_by_a_file_that_only_this_user_reads():
     assert not path.exists()
 
 
-def test_a_folder_of_results_shows_its_tables(chromium, tmp_path):
+def test_a_folder_of_results_shows_its_tables(chromium, small_campaign, tmp_path):
     out = tmp_path / "found"
-    subprocess.run([sys.executable, "-m", "tpjb_ident", "locus", str(DEMO), "--out", str(out), "-q"], check=True)
+    assert tpjb("locus", small_campaign, "--out", out, "-q").exit_code == 0
     with viewing(out) as (address, _), chromium() as tab:
         tab.open(address)
         tab.until(IDLE, 60)

@@ -95,6 +95,7 @@ def test_short_channels_are_not_spread_over_a_long_clock():
     assert arranged([clock, *slow], {}, None, "x.tdms", None).nbytes == 8 * (2 * 1000 + 2 * 10_000 + 2)
 
 
+@pytest.mark.slow
 def test_different_times_without_end_are_refused():
     series = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 1.05**i])) for i in range(1002)]
     with pytest.raises(RigDataError, match="more than 1000 different times"):
