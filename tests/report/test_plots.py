@@ -145,6 +145,7 @@ def test_a_spectrum_reads_the_amplitude_of_a_line(cells_every):
         assert line.get_ydata()[at] == pytest.approx(true, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_no_global_style(name):
     assert picture(name)[2]
