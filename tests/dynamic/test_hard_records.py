@@ -173,6 +173,7 @@ def filled(values, times, held, step=0.0, missing=0):
     return written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "drive", "held"),
     [(200.0, 25.0, True), (250.0, 25.0, True), (400.0, 45.0, True), (500.0, 45.0, True), (150.0, 25.0, False),

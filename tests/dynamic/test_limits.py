@@ -118,6 +118,7 @@ def test_a_gain_that_all_frequencies_share_is_in_the_interval_as_it_is_in_theirs
     np.testing.assert_allclose(np.diag(single.systematic)[:4], (0.01 * K.ravel()) ** 2 / 4, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_intervals_over_frequency_hold_the_truth():
     rng = np.random.default_rng(11)
     dof, draws, inside = 16.0, 400, 0

@@ -231,6 +231,7 @@ def without_blocks(meta):
     meta["conditions"] = [["one"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [without_mark, of_another_kind, with_a_mark_that_is_none, without_blocks])
 def test_an_entry_that_somebody_has_changed_is_done_again(path, whole, counted, tmp_path, damage):
     campaign, store = load_campaign(path), RunStore(tmp_path / "kept")
