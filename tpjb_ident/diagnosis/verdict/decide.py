@@ -20,7 +20,7 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import contradictions, gap, gap_by_observable, localise, noise_floor
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
 from tpjb_ident.diagnosis.verdict.behaviour import behaviours
-from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
+from tpjb_ident.diagnosis.verdict.held_out import Touched, free_gap, free_prediction
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
@@ -114,6 +114,7 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
             "within_tolerances": remaining,
             "closed": 1.0 - judgement.held.remaining(heldout_after) if effects else math.nan,
             "noise_floor": noise_floor(observations, held),
+            **(_touched(judgement.held.touched[0]) if effects and judgement.held.touched else {}),
         },
         remainder=Remainder(
             remaining, min(judgement.held.remaining(remaining), 1.0),
@@ -126,6 +127,13 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         beforehand=contradictions(observations, problem.base),
     )  # fmt: skip
     return Decision(verdict, model, after)
+
+
+def _touched(deciding: Touched) -> dict[str, float]:
+    """The gap along what the effect moves that shrinks it least, and whether unseen points tell it."""
+    return {
+        "touched_before": deciding.before, "touched_after": deciding.after, "touched_unseen": float(deciding.is_unseen),
+    }  # fmt: skip
 
 
 def _exact(forward: Forward, problem: Problem, effects: tuple[FoundEffect, ...]) -> FloatArray | None:
