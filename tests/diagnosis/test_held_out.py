@@ -52,6 +52,5 @@ def test_a_gap_that_grows_out_of_the_noise_is_no_gap_closed():
 )
 def test_each_effect_halves_the_gap_along_what_it_moves(after, along, shrunk):
     held = held_out(2.0)
-    held.fit.faults = [SimpleNamespace(is_term=False)] * max(len(along), 1)
     touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
     assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk(DiagnoseSettings()) == shrunk

@@ -108,9 +108,9 @@ class Deciding:
     same = 0.1
     #: Size at which a plan asks what an effect would be mistaken for [standard deviations].
     seen = 6.0
-    #: Separation from which one test is enough: with 5 the wrong explanation's chi-square exceeds the right one's by
-    #: `margin`, from which it counts as wrong, in 95 of 100 cases.
-    enough, margin = 5.0, 9.0
+    #: Separation from which one test is enough: with 5 the wrong explanation's chi-square exceeds the right one's by 9,
+    #: from which it counts as wrong, in 95 of 100 cases.
+    enough = 5.0
     #: Other explanations that a confirming test is chosen against.
     impostors = 2
 

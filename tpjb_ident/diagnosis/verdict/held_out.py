@@ -25,7 +25,7 @@ class Touched:
     label: str
     before: float  #: without it, all other faults there
     after: float
-    is_unseen: bool  #: on points left out of the fit; over all of them where these do not hear the fault
+    unseen: bool  #: on points left out of the fit; over all of them where these do not hear the fault
 
     @property
     def remaining(self) -> float:
@@ -40,7 +40,7 @@ class HeldOut:
     fit: Fit
     #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
     stated: FloatArray | None = field(repr=False)
-    touched: tuple[Touched, ...] = ()  #: by fault, the one with the largest remainder first
+    touched: tuple[Touched, ...] = ()  #: by fault, the largest remainder first; none where one has no equilibrium
 
     @property
     def as_stated(self) -> float:
@@ -61,11 +61,16 @@ class HeldOut:
         """Share of the baseline's squared gap above noise that a gap leaves; none where it leaves noise alone."""
         return _share(after, self.before, noise_floor(self.fit.problem.observations, self.fit.problem.held))
 
+    @property
+    def along_effects(self) -> dict[str, float]:
+        """The gap along what the fault moves that closes it least."""
+        first = vars(self.touched[0]) if self.touched else {}
+        return {f"touched_{name}": float(value) for name, value in first.items() if name != "label"}
+
     def is_shrunk(self, settings: Deciding) -> bool:
         """Whether every fault halves the gap along what it moves, and the gap over everything does not grow."""
         halved = all(one.remaining <= settings.halved**2 for one in self.touched)
-        complete = 0 < len(self.touched) == sum(not fault.is_term for fault in self.fit.faults)
-        return complete and halved and self.as_stated <= self.before
+        return bool(self.touched) and halved and self.as_stated <= self.before
 
 
 def _share(after: float, before: float, floor: float) -> float:
@@ -81,10 +86,8 @@ def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     whole, *partial = run(prediction, [_alone(fit, theta, chosen) for chosen in (faults, *without)])
     if whole is None:
         return HeldOut(fit, None)
-    touched = [
-        _touched(fit, fault, whole, part) for fault, part in zip(faults, partial, strict=True) if part is not None
-    ]
-    touched.sort(key=lambda one: -one.remaining)
+    moved = [] if any(part is None for part in partial) else zip(faults, partial, strict=True)
+    touched = sorted((_touched(fit, *pair, whole) for pair in moved), key=lambda one: -one.remaining)
     return HeldOut(fit, whole * fit.problem.sigma, tuple(touched))
 
 
@@ -98,23 +101,22 @@ def _alone(fit: Fit, theta: FloatArray, faults: Sequence[Fault]) -> tuple[tuple[
     return unknowns.faults, alone
 
 
-def _touched(fit: Fit, fault: Fault, whole: FloatArray, without: FloatArray) -> Touched:
+def _touched(fit: Fit, fault: Fault, without: FloatArray, whole: FloatArray) -> Touched:
     """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated."""
-    held = fit.problem.held
-    touched = _projected(fit, whole, without, held)
-    is_heard = touched[0] - touched[1] >= Deciding.visible
-    before, after = touched if is_heard else _projected(fit, whole, without, np.ones_like(held))
-    return Touched(fault.label, abs(before), abs(after), is_heard and not held.all())
+    held, stated = fit.problem.held, fit.point.jacobian[:, fit.unknowns.tolerances]
+    for rows in (held, np.ones_like(held)):
+        moved = (whole - without)[rows]
+        weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
+        size = math.sqrt(max(float(weights @ moved), 1e-300))
+        if size >= Deciding.visible:
+            break
+    after = float(weights @ (fit.problem.measured - whole)[rows]) / size
+    return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())
 
 
-def _projected(fit: Fit, whole: FloatArray, without: FloatArray, rows: BoolArray) -> tuple[float, float]:
-    problem, tolerances = fit.problem, fit.point.jacobian[:, fit.unknowns.tolerances][rows]
-    total = problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + tolerances @ tolerances.T
-    moved = (whole - without)[rows]
-    weights = np.linalg.solve(total, moved)
-    size = math.sqrt(max(float(weights @ moved), 1e-300))
-    after = float(weights @ (problem.measured - whole)[rows]) / size
-    return after + size, after
+def _covariance(fit: Fit, rows: BoolArray, columns: FloatArray) -> FloatArray:
+    """Of some elements at the likeliest scale, with numbers of unit variance behind `columns`."""
+    return np.asarray(fit.problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + columns @ columns.T)
 
 
 def free_gap(fit: Fit) -> float:
@@ -138,6 +140,5 @@ def _from_others(fit: Fit) -> FloatArray:
     rows = ~held if not held.all() else held
     linear, width = fit.linear, fit.unknowns.width
     columns = (linear.jacobian * width)[rows]
-    total = fit.problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + columns @ columns.T
     residual = (linear.residual + linear.jacobian @ linear.theta)[rows]
-    return np.asarray(width * (columns.T @ np.linalg.solve(total, residual)))
+    return np.asarray(width * (columns.T @ np.linalg.solve(_covariance(fit, rows, columns), residual)))

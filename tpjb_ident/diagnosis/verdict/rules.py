@@ -36,7 +36,7 @@ def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judge
     held = held_out_gap(run, nothing)
     if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
         return _without_effects(held, settings)
-    sure = _sure(comparison, settings)
+    sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
     model = _exactly(comparison, sure, settings) or comparison.best
     held = held_out_gap(run, model)
     judgement = _of_model(comparison, model, sure, held, settings)
@@ -70,10 +70,6 @@ def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
         "of the library explains it"
     )
     return Judgement("unexplained", held, (reason,))
-
-
-def _sure(comparison: Comparison, settings: DiagnoseSettings) -> frozenset[str]:
-    return frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
 
 
 def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> Fit | None:
@@ -122,7 +118,7 @@ def _shrunk(held: HeldOut) -> str:
     if not held.touched:
         return whole
     one = held.touched[0]
-    where = "on points left out of the fit" if one.is_unseen else "over all points (those left out do not show it)"
+    where = "on points left out of the fit" if one.unseen else "over all points (those left out do not show it)"
     return (
         f"along what {one.label} does the gap goes from {one.before:.2f} to {one.after:.2f} standard deviations of all "
         f"else that may be off, {where}; over everything {whole}"
