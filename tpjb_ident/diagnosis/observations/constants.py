@@ -33,7 +33,7 @@ class Deciding:
     right: float = 0.2
     #: Held-out gap of the baseline below which nothing is compared: nothing off gives 0.07 to 0.13.
     quiet: float = 0.2
-    #: Held-out gap above noise as stated, after over before, that a name takes; right names reach 0 to 0.41.
+    #: Gap above noise along what an effect moves, after over before, that its name takes; right ones reach 0 to 0.45.
     halved: float = 0.5
     #: Squared held-out gap above noise with tolerances free, after over before: effects explain the larger part.
     rest: float = 0.2
