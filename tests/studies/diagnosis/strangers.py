@@ -297,6 +297,8 @@ def clean(one: Stranger, place: int, deviations: float, settings: DiagnoseSettin
     fault = next(fault for fault in problem.faults if fault.label == nuisance.effect)
     size = np.zeros(len(problem.nuisances))
     size[place] = deviations * float(rng.choice([-1.0, 1.0]))
+    if not fault.low[0] <= size[place] <= fault.high[0]:  # no effect says that: a film of more heat than it makes
+        size[place] *= -1.0
     truth = Effect(fault.name, **fault.values(size[[place]]))
     value = measured(one.bench, [], size, 0.0)
     observations = replace(problem.observations, value=value + noise(problem.observations, value, rng))
