@@ -177,7 +177,8 @@ def main() -> None:
     head = ["hidden", "verdict", "what is said", "alike", "held-out gap", "right", "processor seconds"]
     text = table(head, lines) + f"\n\nRight: {sum(line[5] == 'yes' for line in lines)} of {len(lines)}."
     if asked.write:
-        write_section("tables-ross", "python -m tests.studies.diagnosis.peer_tables --python INTERPRETER_WITH_ROSS --write", text)
+        command = "python -m tests.studies.diagnosis.peer_tables --python INTERPRETER_WITH_ROSS --write"
+        write_section("tables-ross", command, text)
 
 
 if __name__ == "__main__":
