@@ -102,10 +102,14 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         pad = max(doubtful, key=lambda m: float(above[m]))
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
-        trial.load_pads(np.arange(len(trial.films)) == pad)
+        trial.state.tried[pad] = True
+        trial.load_pads(trial.state.tried)
         other = trial.run()
         fewer = sum(f.idle for f in other.films) < sum(f.idle for f in result.films)
         refused.add(pad)
+        if trial.state.idle[pad] and above[pad] < 0.0 and near == _NEAR:
+            # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
+            refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
         if other.converged and not other.films[pad].idle and (fewer or not _left_above(trial, other, near)):
             search, result, above = trial, other, trial.margins()
     return _named(search, result, near, held)
