@@ -174,7 +174,6 @@ class Search:
             supplied=np.full(n, math.inf),
             idle=np.zeros(n, dtype=np.bool_),
             solved=np.zeros(n, dtype=np.bool_),
-            tried=np.zeros(n, dtype=np.bool_),
             rescues=np.zeros(n, dtype=np.int64),
             inlet=np.full(n, self.case.supply),
             resting=np.full((n, 4), math.nan),

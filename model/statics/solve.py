@@ -102,8 +102,8 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         pad = max(doubtful, key=lambda m: float(above[m]))
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
-        trial.state.tried[pad] = True
-        trial.load_pads(trial.state.tried)
+        trial.case = trial.case._replace(tried=pad)
+        trial.load_pads(np.arange(len(trial.films)) == pad)
         other = trial.run()
         fewer = sum(f.idle for f in other.films) < sum(f.idle for f in result.films)
         refused.add(pad)

@@ -11,6 +11,7 @@ from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes
+from model.interpolation import largest
 from model.pad.bending import PadDeformation
 from model.statics.compiled.case import Case
 from model.statics.compiled.elimination import solve
@@ -102,7 +103,7 @@ def bend_pads(
             change = asked[m] - state.bent[m].reshape(-1)
             film = (grid_of(grids, m), work_of(works, m))
             tilted = _close_loop(film, pads, state, bodies, case, m, change)
-            share = max(share, max(np.max(np.abs(change)), tilted) / state.least[m])
+            share = max(share, max(largest(change), tilted) / state.least[m])
     return share
 
 
@@ -211,7 +212,7 @@ def _close_loop(
     if not case.axial:
         return 0.0
     state.axial_step[m] = right[bending]
-    return abs(right[bending, 0]) * np.max(np.abs(shapes[:, :, bending]))
+    return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
 
 
 @inner

@@ -27,6 +27,7 @@ from model.film.energy import between, dissipate, heat_step, march
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.film.slopes import pressure_change
+from model.interpolation import largest
 from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, rigid_approach
 from model.statics.compiled.elimination import solve
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
@@ -116,11 +117,11 @@ def exchange_heat(
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
-        largest = np.max(np.abs(asked))
-        works.temperature[m] += relaxation * min(1.0, HEATING_STEP / max(largest, 1e-30)) * asked
-        state.heating[m] = largest
-        if not change >= largest:
-            change = largest
+        hotter = largest(asked.reshape(-1))
+        works.temperature[m] += relaxation * min(1.0, HEATING_STEP / max(hotter, 1e-30)) * asked
+        state.heating[m] = hotter
+        if not change >= hotter:
+            change = hotter
         more = pressure_change(
             grid_of(grids, m), work_of(works, m), case.running.speed, case.running.oil, state.shift[m]
         )
@@ -158,7 +159,7 @@ def _answer(
         sources[0] -= _into_pad(grid, bodies, bodies.which[m], work.temperature.reshape(-1) - case.supply)
     backflow = march(grid, work, case.running, loss, fields, between(sources))
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], backflow)
-    if conducts and np.max(np.abs(fields)) < BOUNDLESS:
+    if conducts and largest(fields.reshape(-1)) < BOUNDLESS:
         _conduct(grid, work, bodies, state, case, (m, loss), fields)
 
 

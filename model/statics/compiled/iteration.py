@@ -79,7 +79,7 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
-            if trail[ITERATION] >= _MAX_ITERATIONS or (np.any(state.tried) and np.all(state.idle[state.tried])):
+            if trail[ITERATION] >= _MAX_ITERATIONS or (case.tried >= 0 and state.idle[case.tried]):
                 return NOT_CONVERGED
             trail[ITERATION] += 1
             trail[_STAGE] = _PRESSURE

@@ -56,7 +56,6 @@ class PadState(NamedTuple):
     passed: FloatArray
     idle: BoolArray  #: (n,) of bool: Carries nothing; has a pressure.
     solved: BoolArray
-    tried: BoolArray  #: (n,) of bool: What a search asks is whether one of these pads carries.
     rescues: IntArray  #: (n,) of int: How often the pad was put back on its loaded attitude.
     inlet: FloatArray  #: (n,): Of the oil that enters [degC].
     resting: FloatArray  #: (n, 4): Films of idle pads, see `model.film.resting.RestingFilm`.

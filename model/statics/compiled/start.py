@@ -15,7 +15,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.attitudes import BETWEEN
-from model.interpolation import row_below
+from model.interpolation import least, row_below
 from model.statics.compiled.laws import deflection
 from model.statics.compiled.stack import PadStack
 from rigdata.arrays import BoolArray, FloatArray, IntArray
@@ -173,7 +173,7 @@ def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatA
             stiff = max(stiff, pads.attitudes[m, 3, last] / pads.clearance[m])
     if math.isinf(room):
         return False
-    room = max(room, 0.05 * np.min(pads.clearance))
+    room = max(room, 0.05 * least(pads.clearance))
     size = math.hypot(load[0], load[1])
     if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
         position[0], position[1] = 0.4 * room * load[0] / size, 0.4 * room * load[1] / size
