@@ -40,13 +40,13 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
             return warm
         search = Search(setup, load, speed)
     search.stand()
-    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
     result = _settled(search, search.run())
-    if not result.converged and near:  # they may find no rest where they carry
+    if not result.converged:
         search = Search(setup, load, speed)
         search.stand()
+        near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
         search.let_idle(near)
-        other = _settled(search, search.run())
+        other = _settled(search, search.run()) if near else result  # they may find no rest where they carry
         result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and warm is not None and warm.converged:
         return warm

@@ -131,24 +131,27 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: Floa
 
 @inner
 def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
-    """Product of a matrix with some rows of `given`, four at a time for every row of the matrix that is read."""
+    """Product of a matrix with some rows of `given`, five at a time for every row of the matrix that is read."""
     some = len(rows)
-    for start in range(0, some, 4):
+    for start in range(0, some, 5):
         one, two = given[rows[start]], given[rows[min(start + 1, some - 1)]]
         three, four = given[rows[min(start + 2, some - 1)]], given[rows[min(start + 3, some - 1)]]
+        five = given[rows[min(start + 4, some - 1)]]
         for i in range(matrix.shape[0]):
             row = matrix[i]
-            a = b = c = d = 0.0
+            a = b = c = d = e = 0.0
             for q in range(len(row)):
                 value = np.float64(row[q])
                 a += value * one[q]
                 b += value * two[q]
                 c += value * three[q]
                 d += value * four[q]
+                e += value * five[q]
             out[rows[start], i] = a
             out[rows[min(start + 1, some - 1)], i] = b
             out[rows[min(start + 2, some - 1)], i] = c
             out[rows[min(start + 3, some - 1)], i] = d
+            out[rows[min(start + 4, some - 1)], i] = e
 
 
 @inner
