@@ -107,6 +107,25 @@ def test_warm_start_does_not_change_the_answer(rocker):
     np.testing.assert_allclose(warm.position, cold.position, atol=1e-12)
 
 
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+def test_a_neighbour_in_other_oil_does_not_change_the_answer(rocker, thermal):
+    oil = rocker.oil
+    hot = replace(rocker, oil=replace(oil, supply_temperature=oil.supply_temperature + 10.0))
+    cold = predict(rocker, 5000.0, DOWN, SPEED, thermal=thermal)
+    alone = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal)
+    assert alone.kyy > 1.05 * cold.kyy
+    warm = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal, start=cold)
+    np.testing.assert_allclose(warm.k, alone.k, atol=1e-6 * alone.kyy)
+
+
+def test_a_neighbour_moved_as_the_curves_are_is_nearer(rocker):
+    # 1.5 times the load: as far as a search from nothing, or nearer, by one iteration and more where pads bend
+    for thermal, saved in (("isothermal", 0), ("adiabatic", 0), ("tehd", 1)):
+        start = predict(rocker, 4000.0, DOWN, SPEED, thermal=thermal)
+        steps = [predict(rocker, 5000.0, DOWN, SPEED, thermal=thermal, start=s).equilibrium for s in (None, start)]
+        assert steps[1].iterations <= steps[0].iterations - saved, thermal
+
+
 def test_upper_pads_unload_and_are_listed(rocker):
     p = predict(rocker, 8750.0, DOWN, SPEED, pivots=4e8)
     assert p.idle_pads == (3, 4)
