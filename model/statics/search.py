@@ -137,10 +137,11 @@ class Search:
         numbers = [(f.preload_distance, f.pivot_radius, f.pad.pad_clearance) for f in films]
         preload, radius, clearance = np.array(numbers, dtype=float).T.copy()
         angles = [f.pad.pivot_angle % (2.0 * math.pi) for f in films]
+        flattest = np.array([-math.inf if f.pad.leading_edge_pressure else 0.0 for f in films])
         laws, curves = encoded(self.setup.pivots)
         return PadStack(
             frame, preload, radius, clearance, np.argsort(angles, kind="stable"), laws, curves,
-            np.zeros((count, 4, _ROWS)), np.zeros(count, dtype=np.int64),
+            np.zeros((count, 4, _ROWS)), flattest, np.zeros(count, dtype=np.int64),
         )  # fmt: skip
 
     def _state(self, shifts: FloatArray) -> PadState:

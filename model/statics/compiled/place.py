@@ -80,10 +80,10 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int, k: FloatArray
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
     with what holds the tilt back added to the film's moment. What counts is the film whose heat follows: the branch
     that comes back from the fold is unstable by it, and near a fold the frozen one calls unstable what is not. An
-    unloaded film leaves a load that is not told from none.
+    unloaded film leaves a wedge that opens, or a load that is not told from none.
     """
     none = case.accuracy * math.hypot(case.load[0], case.load[1])
-    if case.hold.slip == 0.0 and state.force[m, 0] <= none:
+    if case.hold.slip == 0.0 and (state.wedge[m, 1] <= pads.flattest[m] or state.force[m, 0] <= none):
         return False
     load, radius = state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))

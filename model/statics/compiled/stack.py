@@ -39,6 +39,7 @@ class PadStack(NamedTuple):
     laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
     curves: FloatArray  #: (n, 5, m): Measured ones.
     attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
+    flattest: FloatArray  #: (n,): Wedges b up to here are none of a pad that is stable in tilt [m].
     rows: IntArray  #: (n,) of int: How many of the r there are; 0 where they were not asked for.
 
 
