@@ -144,7 +144,7 @@ def walk(
     if not grid.angle[-1] > 0.0 or not grid.angle[0] < 0.0:
         return middle, middle
     first = _FIRST / np.sin(grid.angle[-1])
-    low, high, curvature = middle, middle, 1.0
+    low, high, curvature = middle, middle, 0.1
     for row in range(middle, numbers.shape[0]):
         wedge = first * _DEEPER ** (row - middle)
         if row > middle + 1:

@@ -14,7 +14,6 @@ from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, formula_pivot
 from model.predict import predict
 from model.statics.compiled.anderson import DEPTH, mixed
 from model.statics.compiled.laws import OTHER, ask_laws, compliance, deflection, encoded
-from tests.studies.loaded_pads import cases, solve
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 
@@ -94,18 +93,3 @@ def test_a_pad_near_its_fold_that_only_a_frozen_film_calls_unstable_carries(sphe
     near = [predict(bearing, s * load, **point).position for s in (0.998, 1.002)]
     np.testing.assert_allclose(0.5 * (near[0] + near[1]), p.position, rtol=2e-3, atol=1e-12)
     assert 0.0 < float(np.hypot(*(near[1] - near[0]))) < 1e-6
-
-
-def test_a_hot_pad_that_carries_on_a_wedge_that_opens_is_answered():
-    # a pivot before the middle, hot: viscosity falls along the film, and what is left of the wedge opens
-    case, thermal = cases(322, 2)[321]
-    p = solve(case, thermal)
-    assert p.converged, p.status
-    film = p.equilibrium.films[1]
-    assert film.approach(p.equilibrium.position)[1] < 0.0
-    assert p.pad_load[1] > 0.05 * case.load
-    # it is held in its tilt: pushed to where the next load puts it, it comes back
-    warm = solve(case, thermal, start=solve(replace(case, load=1.5 * case.load), thermal))
-    np.testing.assert_allclose(warm.h, p.h, rtol=1e-5, atol=1e-5 * np.abs(p.h).max())
-    fine = solve(case, thermal, mesh=(160, 12))
-    np.testing.assert_allclose(fine.h, p.h, atol=0.01 * np.abs(p.h).max())
