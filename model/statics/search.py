@@ -298,7 +298,9 @@ class Search:
         if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
             return False
         self.stand()
-        shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(self.begun, start.begun, strict=True)))
+        # pads that friction holds stay where they are held
+        moved = self.begun if not self.setup.friction else start.begun
+        shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 state.passed[m] = through_flow(other)[1]
