@@ -16,8 +16,8 @@ from rigdata.problem import Condition
 class Begun(NamedTuple):
     """Where the curves of its pads put a bearing: neighbours differ by nearly what they differ in here."""
 
-    position: FloatArray  #: (2,): As of the equilibrium; of pads that carry nothing there NaN.
-    tilt: FloatArray  #: (n,)
+    position: FloatArray  #: (2,): NaN where some pad has no curve.
+    tilt: FloatArray  #: (n,): As of the equilibrium; of pads that carry nothing there NaN.
     deflection: FloatArray  #: (n,)
     temperature: FloatArray  #: (n, nt + 1, nz + 1)
 

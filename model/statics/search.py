@@ -229,6 +229,8 @@ class Search:
         self.begun = Begun(*(values.copy() for values in begun))
         for values in self.begun[1:]:
             values[~loaded] = math.nan
+        if np.any(pads.rows < 2):  # the place is of none that carries without a curve
+            self.begun.position[:] = math.nan
 
     def idle_by_curves(self) -> int:
         """How many pads carry nothing where the curves carry the load."""
@@ -298,13 +300,14 @@ class Search:
         if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
             return False
         self.stand()
-        # pads that friction holds stay where they are held
-        moved = self.begun if not self.setup.friction else start.begun
+        # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
+        known = not np.isnan(self.begun.position - start.begun.position).any()
+        moved = self.begun if known and not self.setup.friction else start.begun
         shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 state.passed[m] = through_flow(other)[1]
-            if self.pads.rows[m] >= 2 and state.idle[m] != other.idle == math.isnan(start.begun.tilt[m]):
+            if known and state.idle[m] != other.idle == math.isnan(start.begun.tilt[m]):
                 continue  # the neighbour's pad does as its curve says: so does this one
             state.idle[m] = other.idle
             state.tilt[m], state.deflection[m] = other.tilt + shift.tilt[m], other.deflection + shift.deflection[m]
