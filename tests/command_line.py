@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 from typing import Any
+from unittest import mock
 
 import typer.testing
 
 from tpjb_ident.cli.app import app
+from tpjb_ident.runtime import executors
 
 # typer builds all commands anew for every call, which takes longer than most calls that are tested; where a version has
 # no such function, tests only take longer
@@ -15,6 +17,11 @@ if (builder := getattr(typer.testing, "_get_command", None)) is not None:
     typer.testing._get_command = functools.cache(builder)
 
 
-def tpjb(*words: Any, app: typer.Typer = app) -> Any:
-    """Run `tpjb words`, or another program of commands; its output, in long lines, exit code and exception."""
-    return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])
+def tpjb(*words: Any, app: typer.Typer = app, cores: int = 1) -> Any:
+    """Run `tpjb words`, or another program of commands; its output, in long lines, exit code and exception.
+
+    One core, unless more are asked for: a job beside the command would load everything once more, and the other core is
+    busy with other tests.
+    """
+    with mock.patch.object(executors, "cores", return_value=cores):
+        return typer.testing.CliRunner(env={"COLUMNS": "400"}).invoke(app, [str(word) for word in words])

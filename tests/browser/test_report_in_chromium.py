@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.command_line import tpjb
 
 pytestmark = pytest.mark.slow
 
@@ -52,10 +53,8 @@ OVERFLOW = """
 def report(tmp_path_factory):
     """Report of `tpjb demo`."""
     out = tmp_path_factory.mktemp("report") / "demo"
-    done = subprocess.run(
-        [sys.executable, "-m", "tpjb_ident", "demo", "--quiet", "--out", str(out)], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
+    done = tpjb("demo", "--quiet", "--out", out)
+    assert done.exit_code == 0, done.output
     return out / "report.html"
 
 

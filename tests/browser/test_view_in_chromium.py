@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import tpjb_ident as ti
+from tests.command_line import tpjb
 from tpjb_ident.rounding import with_interval
 
 pytest.importorskip("bokeh", reason="the extra view is not installed")
@@ -37,7 +38,7 @@ DEEP = """(function find(root) {
 def viewing(*arguments):
     """Run the command and give its address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tpjb_ident", "view", *map(str, arguments), "--no-browser", "--seconds", "240"],
+        [sys.executable, "-m", "tpjb_ident", "view", *map(str, arguments), "--no-browser", "--seconds", "600"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
@@ -51,12 +52,20 @@ def viewing(*arguments):
         process.communicate(timeout=30)
 
 
+@pytest.fixture(scope="module")
+def view_of_demo():
+    """Address and port of one server for all tests that look at the demo: every tab is a session of its own."""
+    with viewing(DEMO) as found:
+        yield found
+
+
 def model(name: str, what: str) -> str:
     return f"Bokeh.documents[0].get_model_by_name('{name}').{what}"
 
 
-def test_a_campaign_can_be_browsed_and_the_model_moved(chromium):
-    with viewing(DEMO) as (address, _), chromium() as tab:
+def test_a_campaign_can_be_browsed_and_the_model_moved(chromium, view_of_demo):
+    address, _ = view_of_demo
+    with chromium() as tab:
         tab.size(1280)
         tab.open(address)
         tab.until(IDLE, 90)
@@ -121,40 +130,40 @@ def socket_to(address: str, **options: object):
     )
 
 
-def test_it_answers_this_machine_its_own_page_and_nobody_else():
+def test_it_answers_this_machine_its_own_page_and_nobody_else(view_of_demo):
     websocket = pytest.importorskip("websocket")
-    with viewing(DEMO) as (address, port):
-        path = "/" + address.split("/", 3)[3]
-        assert status(port, path) == 200
-        assert status(port, path, Host=f"localhost:{port}") == 200
-        # another user of this machine, who does not know the path
-        for guess in ("/", "/ws", "/static/js/bokeh.min.js", "/autoload.js", f"{path[:-2]}/", f"/x{path}"):
-            assert status(port, guess) == 404, guess
-        # a page elsewhere whose name has been pointed at this machine
-        for host in (f"rebound.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", f"127.0.0.1.nip.io:{port}", ""):
-            assert status(port, path, Host=host) in (400, 403), host
-        # a script without a page, a page elsewhere, a rebound page that names itself
-        own = f"http://127.0.0.1:{port}"
-        for options in (
-            {"suppress_origin": True},
-            {"origin": "http://example.invalid"},
-            {"origin": "null"},
-            {"origin": f"https://127.0.0.1:{port}"},
-            {"origin": own, "host": f"rebound.example:{port}"},
-        ):
-            with pytest.raises(websocket.WebSocketBadStatusException, match="403"):
-                socket_to(address, **options)
-        with pytest.raises(websocket.WebSocketBadStatusException, match="404"):
-            socket_to(f"{own}/", origin=own)
+    address, port = view_of_demo
+    path = "/" + address.split("/", 3)[3]
+    assert status(port, path) == 200
+    assert status(port, path, Host=f"localhost:{port}") == 200
+    # another user of this machine, who does not know the path
+    for guess in ("/", "/ws", "/static/js/bokeh.min.js", "/autoload.js", f"{path[:-2]}/", f"/x{path}"):
+        assert status(port, guess) == 404, guess
+    # a page elsewhere whose name has been pointed at this machine
+    for host in (f"rebound.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", f"127.0.0.1.nip.io:{port}", ""):
+        assert status(port, path, Host=host) in (400, 403), host
+    # a script without a page, a page elsewhere, a rebound page that names itself
+    own = f"http://127.0.0.1:{port}"
+    for options in (
+        {"suppress_origin": True},
+        {"origin": "http://example.invalid"},
+        {"origin": "null"},
+        {"origin": f"https://127.0.0.1:{port}"},
+        {"origin": own, "host": f"rebound.example:{port}"},
+    ):
+        with pytest.raises(websocket.WebSocketBadStatusException, match="403"):
+            socket_to(address, **options)
+    with pytest.raises(websocket.WebSocketBadStatusException, match="404"):
+        socket_to(f"{own}/", origin=own)
 
 
-def test_it_listens_on_loopback_only():
-    with viewing(DEMO) as (_, port):
-        with socket.create_connection(("127.0.0.1", port), timeout=10):
-            pass
-        # 127.0.0.2 is this machine too: a server that listens on every address would answer there
-        with pytest.raises(OSError), socket.create_connection(("127.0.0.2", port), timeout=10):
-            pass
+def test_it_listens_on_loopback_only(view_of_demo):
+    _, port = view_of_demo
+    with socket.create_connection(("127.0.0.1", port), timeout=10):
+        pass
+    # 127.0.0.2 is this machine too: a server that listens on every address would answer there
+    with pytest.raises(OSError), socket.create_connection(("127.0.0.2", port), timeout=10):
+        pass
 
 
 def test_the_browser_is_led_by_a_file_that_only_this_user_reads():
@@ -169,9 +178,9 @@ def test_the_browser_is_led_by_a_file_that_only_this_user_reads():
     assert not path.exists()
 
 
-def test_a_folder_of_results_shows_its_tables(chromium, tmp_path):
+def test_a_folder_of_results_shows_its_tables(chromium, small_campaign, tmp_path):
     out = tmp_path / "found"
-    subprocess.run([sys.executable, "-m", "tpjb_ident", "locus", str(DEMO), "--out", str(out), "-q"], check=True)
+    assert tpjb("locus", small_campaign, "--out", out, "-q").exit_code == 0
     with viewing(out) as (address, _), chromium() as tab:
         tab.open(address)
         tab.until(IDLE, 60)

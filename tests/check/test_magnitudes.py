@@ -49,6 +49,7 @@ def test_rigs_of_every_size_pass():
         assert [*_probes(sizes), *_film(sizes), *_housing(sizes)] == [], sizes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "acceleration", "severity"), [(3000, 0.05, "warning"), (3000, 0.5, "error")])
 def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(mass, acceleration, severity):
     run = load_campaign(DEMO).of_kind("dynamic")[0]
@@ -58,6 +59,7 @@ def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(
     assert [finding[1] for finding in _weight([replace(rig, static=0.0)], mass, 5000.0)] == ["warning"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "key", "severity"),
     [

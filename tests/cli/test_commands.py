@@ -188,12 +188,18 @@ def test_predict_takes_an_effects_file(rocker_file, tmp_path):
     assert b == pytest.approx(a / 1.25, rel=1e-9)
 
 
+COMPARE = ("--pivots", "rigid, kirk, measured", "--thermal", "isothermal")
+
+
+@pytest.fixture(scope="module")
+def compared(small_campaign, tmp_path_factory):
+    out = tmp_path_factory.mktemp("compare") / "out"
+    return tpjb("compare", small_campaign, *COMPARE, "--out", out, cores=2), out
+
+
 @pytest.mark.slow
-def test_compare_writes_a_report(small_campaign, tmp_path):
-    out = tmp_path / "out"
-    result = tpjb(
-        "compare", small_campaign, "--pivots", "rigid, kirk, measured", "--thermal", "isothermal", "--out", out
-    )
+def test_compare_writes_a_report(compared):
+    result, out = compared
     assert result.exit_code == 0, result.output
     frame = pd.read_csv(out / "comparison.csv")
     assert frame.groupby("pivots").size().to_dict() == {"kirk": 2, "rigid": 2}
@@ -206,18 +212,15 @@ def test_compare_writes_a_report(small_campaign, tmp_path):
 
 
 @pytest.mark.slow
-def test_compare_writes_the_same_where_the_background_job_is_lost(small_campaign, tmp_path, monkeypatch):
-    def written(name):
-        result = tpjb("compare", small_campaign, "--thermal", "isothermal", "--out", tmp_path / name)
-        assert result.exit_code == 0, result.output
-        files = sorted(
-            f for f in (tmp_path / name).rglob("*") if f.is_file() and f.name not in ("run.json", "report.html")
-        )
-        return {f.relative_to(tmp_path / name): f.read_bytes() for f in files}
+def test_compare_writes_the_same_where_the_background_job_is_lost(compared, small_campaign, tmp_path, monkeypatch):
+    def written(folder):
+        files = sorted(f for f in folder.rglob("*") if f.is_file() and f.name not in ("run.json", "report.html"))
+        return {f.relative_to(folder): f.read_bytes() for f in files}
 
-    both = written("both")
     monkeypatch.setattr(executors, "_received_value", lambda receiver: None)
-    assert written("lost") == both
+    result = tpjb("compare", small_campaign, *COMPARE, "--out", tmp_path / "lost", cores=2)
+    assert result.exit_code == 0, result.output
+    assert written(tmp_path / "lost") == written(compared[1])
 
 
 @pytest.mark.parametrize("form", ["ross", "csv", "mat"])
@@ -247,6 +250,7 @@ def test_simulate_tests_every_pad_at_the_speed_and_load_asked_for(rocker_file, t
     assert tpjb("check", tmp_path / "o" / "campaign.h5", "--out", tmp_path / "c").exit_code == 0  # no cell at its limit
 
 
+@pytest.mark.slow
 def test_simulate_is_repeatable_and_readable(rocker_file, tmp_path):
     arguments = ("simulate", rocker_file, "--plan", "short", "--load", "3 kN", "--thermal", "isothermal", "--seed", "5")
     for name in "ab":

@@ -201,7 +201,10 @@ def test_init_of_nothing(tmp_path):
 
 @pytest.mark.slow
 def test_show_lists_runs_and_channels(small_campaign):
-    (line,) = (line for line in tpjb("show", small_campaign).stdout.splitlines() if "d-02500-25-01" in line)
+    lines = tpjb("show", small_campaign).stdout.strip().splitlines()
+    assert "runs" in lines[0]
+    assert lines[-1] == f"Next: tpjb check {small_campaign}"
+    (line,) = (line for line in lines[:-1] if "d-02500-25-01" in line)
     assert line.split()[-2:] == ["-", "counter-clockwise"]
     shown = tpjb("show", small_campaign, "--run", "d-02500-25-01").stdout
     assert "X1A" in shown

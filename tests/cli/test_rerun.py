@@ -40,6 +40,7 @@ def plain(result) -> str:
     return " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_the_same_comes_out_again_and_nothing_is_written_beside_it(results, tmp_path):
     before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
     result = tpjb("rerun", results / "run.json", "--out", tmp_path / "again")
@@ -51,6 +52,7 @@ def test_the_same_comes_out_again_and_nothing_is_written_beside_it(results, tmp_
     assert {path: path.read_bytes() for path in results.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.slow
 def test_a_number_that_does_not_come_out_again_is_named_with_its_place(results):
     path = results / "clearance.csv"
     head, first, *others = path.read_text(encoding="utf-8").splitlines()
@@ -65,6 +67,7 @@ def test_a_number_that_does_not_come_out_again_is_named_with_its_place(results):
     assert tpjb("rerun", results, "--tolerance", "0.01").exit_code == 0
 
 
+@pytest.mark.slow
 def test_an_input_that_is_gone_or_changed_is_named(results):
     campaign = results.parent / "campaign.h5"
     with campaign.open("ab") as file:
@@ -76,6 +79,7 @@ def test_an_input_that_is_gone_or_changed_is_named(results):
     assert (result.exit_code, "is missing" in plain(result)) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_record_of_the_first_version_is_repeated_by_its_settings(results):
     def to_first(record):
         record["schema"] = "tpjb-run/1"
@@ -86,6 +90,7 @@ def test_a_record_of_the_first_version_is_repeated_by_its_settings(results):
     assert tpjb("rerun", results).exit_code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "exit_code", "message"),
     [

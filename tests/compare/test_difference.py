@@ -82,6 +82,7 @@ def test_sentences_name_the_largest_change_and_points_without_a_partner():
     assert more[-1].startswith("Without a partner: a: 5 kN at -90°, shaft at 22 Hz (1320 rpm), 25 Hz; b: 6 kN")
 
 
+@pytest.mark.slow
 def test_one_in_twenty_of_many_equal_points_is_no_change():
     rng = np.random.default_rng(5)
     seen = 0

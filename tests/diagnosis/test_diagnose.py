@@ -189,6 +189,19 @@ def test_two_effects_are_named_where_a_tolerance_first_did_the_work_of_one(setup
 
 
 @pytest.mark.slow
+def test_one_thermometer_is_named_where_workshop_scatter_is_most_of_the_gap(setup, observations):
+    workshop = [Effect("pad_offset", pad=pad, radial_offset=size) for pad, size in ((1, 4e-6), (3, -4e-6), (4, 3e-6))]
+    hidden = Effect("thermometer_offset", pad=2, offset=3.5)
+    skip = frozenset(known_effects()) - TRIED - {"thermometer_offset"}
+    hurt = campaign(observations, setup, (*workshop, hidden), seed=5)
+    verdict = diagnose(hurt, setup, DiagnoseSettings(workers=1, skip=skip)).verdict
+    assert (verdict.verdict, [e.label for e in verdict.effects]) == ("named", ["thermometer_offset pad 2"])
+    assert verdict.gap["heldout_after"] > 0.5 * verdict.gap["heldout_before"]
+    assert verdict.gap["touched_after"] < 0.3 * verdict.gap["touched_before"]
+    assert verdict.gap["touched_unseen"] == 1.0
+
+
+@pytest.mark.slow
 def test_nothing_hidden_is_consistent(setup, observations):
     verdict = diagnose(campaign(observations, setup, (), seed=3), setup, few()).verdict
     assert verdict.verdict == "consistent"

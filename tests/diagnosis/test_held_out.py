@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.observations.observe import Element, Layout, Observations
-from tpjb_ident.diagnosis.verdict.held_out import HeldOut
+from tpjb_ident.diagnosis.verdict.held_out import HeldOut, Touched
 
 
 def held_out(before):
@@ -37,3 +38,19 @@ def test_what_is_left_of_a_gap_is_counted_above_noise(before, after, share):
 
 def test_a_gap_that_grows_out_of_the_noise_is_no_gap_closed():
     assert held_out(0.2).remaining(0.5) > 1e3
+
+
+@pytest.mark.parametrize(
+    ("after", "along", "shrunk"),
+    [
+        (2.0, ((8.0, 0.5),), True),  # one thermometer: the gap over everything stays
+        (2.1, ((8.0, 0.5),), False),  # a name does not let the gap over everything grow
+        (1.0, ((8.0, 0.5), (4.0, 3.0)), False),  # each name halves its own
+        (1.0, ((3.0, 1.8),), False),
+        (1.0, (), False),  # without it there is no equilibrium
+    ],
+)
+def test_each_effect_halves_the_gap_along_what_it_moves(after, along, shrunk):
+    held = held_out(2.0)
+    touched = sorted((Touched("x", *ends, True) for ends in along), key=lambda one: -one.remaining)
+    assert HeldOut(held.fit, np.full(2, after), tuple(touched)).is_shrunk(DiagnoseSettings()) == shrunk

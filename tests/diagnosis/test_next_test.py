@@ -12,7 +12,6 @@ from tpjb_ident.diagnosis.next_test import (
     Check,
     Design,
     Separation,
-    chance,
     designs,
     options_for,
     ranked,
@@ -83,11 +82,6 @@ def test_a_second_test_is_suggested_where_one_is_not_enough(expected, count, apa
     words = say(chosen, "a", "b")
     assert ("nothing on the list" in words) == (apart < 3.0)
     assert all(s.design.words in words for s in chosen)
-
-
-@pytest.mark.parametrize(("apart", "wanted"), [(0.0, 0.0), (3.0, 0.5), (5.0, 0.9452), (-1.0, 0.0)])
-def test_chance_is_that_of_a_normal_difference_of_chi_squares(apart, wanted):
-    assert chance(apart) == pytest.approx(wanted, abs=1e-4)
 
 
 def test_the_nearest_rival_counts_and_two_tests_may_be_chosen_for_what_each_tells():

@@ -8,10 +8,8 @@ import numpy as np
 
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans
 from tpjb_ident.dynamic.runs.point_data import PointData, gather
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import QUANTITIES, RunPhasors
@@ -83,25 +81,9 @@ def hermitian(rng, n):
 NOISE = 1e-3 * hermitian(np.random.default_rng(20), 4)
 
 
-def noisy_means(seed, noise, effect=0.0, g=8, count=None) -> Repeats:
-    """Means of g directions with noise of covariance `noise` on one window's (X, Y, Fx, Fy); directions may differ."""
-    rng = np.random.default_rng(seed)
-    count = np.full(g, 20.0) if count is None else count
-    D = complex_normal(rng, g, 2)
-    F = D @ H.T + effect * np.linalg.norm(D, axis=1)[:, None] * complex_normal(rng, g, 2)
-    z = np.concatenate([D, F], axis=1)
-    z = z + complex_normal(rng, g, 4) @ np.linalg.cholesky(noise).T / np.sqrt(count)[:, None]
-    return Repeats(DirectionMeans(z[:, :2], z[:, 2:], count), noise, float(count.sum() - g), np.ones(int(count.sum())))
-
-
 def windows(seed, g=6, n=40, noise=NOISE):
     """Windows in g directions, n each, with such noise."""
     rng = np.random.default_rng(seed)
     D = np.repeat(complex_normal(rng, g, 2), n, axis=0)
     z = np.concatenate([D, D @ H.T], axis=1) + complex_normal(rng, g * n, 4) @ np.linalg.cholesky(noise).T
     return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), n))
-
-
-def rejected(table, direction=3):
-    """Weights of a fit that did not hear one direction."""
-    return np.where(table.direction == direction, 0.0, 1.0)

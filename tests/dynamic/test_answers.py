@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.dynamic.phasor_cases import H, complex_normal
-from tpjb_ident.dynamic.estimators.errors_in_variables import aligned
 from tpjb_ident.dynamic.estimators.estimate import METHODS, estimate_dynamic_stiffness, estimate_table
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
 from tpjb_ident.dynamic.estimators.uncertainty import with_repeats
+from tpjb_ident.estimate.window_means import aligned
 
 OMEGA = 160.0
 

@@ -216,7 +216,7 @@ def test_thousands_of_windows_start_from_a_share_of_them():
     from tests.rigs.estimator_cases import H_TRUE, Case, draw
     from tests.rigs.estimator_cases import OMEGA as STUDY_OMEGA
 
-    sample = draw(Case("lev", 0.3, windows=300), 4, 0)
+    sample = draw(Case("lev", 0.3, windows=300), 4, 1)
     for method in ("mm-eiv", "iv"):
         reference = sample.command if method == "iv" else None
         tracemalloc.start()

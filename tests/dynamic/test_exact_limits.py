@@ -1,23 +1,15 @@
-"""Exact limits and published values of the estimators' parts: constants, errors in variables, covariance, RLM, MM."""
+"""Exact limits and published values of the estimators' parts: constants, covariance, RLM, MM."""
 
 from __future__ import annotations
-
-import dataclasses
 
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import H, complex_normal, noisy_means, windows
-from tpjb_ident.dynamic.estimators.errors_in_variables import Repeats, eiv_fit, repeats
+from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-from tpjb_ident.dynamic.estimators.uncertainty import (
-    DirectionMeans,
-    direction_effect,
-    information,
-    mixed_dof,
-)
+from tpjb_ident.dynamic.estimators.uncertainty import information
 from tpjb_ident.estimate.robust_constants import (
     bisquare_weight,
     efficiency_constant,
@@ -25,6 +17,7 @@ from tpjb_ident.estimate.robust_constants import (
     trimming_limits,
     trimming_weight,
 )
+from tpjb_ident.estimate.scatter import mixed_dof
 
 
 def test_bisquare_constant_is_the_published_one():
@@ -60,49 +53,6 @@ def test_trimming_weight_is_symmetric_about_the_middle():
     assert weight[2] + weight[4] == pytest.approx(1.0)
 
 
-def test_without_noise_on_displacements_errors_in_variables_are_least_squares():
-    noise = np.diag([1e-14, 1e-14, 1e-2, 1e-2]).astype(complex)
-    given = noisy_means(2, noise)
-    plain = np.linalg.lstsq(given.means.D, given.means.F, rcond=None)[0].T
-    np.testing.assert_allclose(eiv_fit(given).h, plain, rtol=0, atol=1e-9)
-
-
-def test_exchanging_cause_and_effect_inverts_h():
-    mix = complex_normal(np.random.default_rng(4), 4, 4)
-    noise = 1e-3 * (mix @ mix.conj().T + np.eye(4))
-    given = noisy_means(5, noise)
-    back = [2, 3, 0, 1]
-    turned = dataclasses.replace(
-        given,
-        means=DirectionMeans(given.means.F, given.means.D, given.means.count),
-        noise=noise[np.ix_(back, back)],
-    )
-    np.testing.assert_allclose(eiv_fit(turned).h, np.linalg.inv(eiv_fit(given).h), rtol=0, atol=1e-10)
-
-
-def test_attenuation_is_noise_over_noise_and_signal():
-    """Unit signal in both directions, noise power p on one window: a regression loses p / (1 + p) of it."""
-    D = np.array([[1, 0], [0, 1], [1, 0], [0, 1]], dtype=complex) * np.sqrt(2)
-    power, count = 0.25, 1e9
-    noise = np.diag([power, power, power, power]).astype(complex)
-    given = Repeats(DirectionMeans(D, D @ H.T, np.full(4, count)), noise, 4 * count, np.ones(4))
-    np.testing.assert_allclose(eiv_fit(given).attenuation, power / (1 + power), rtol=1e-6)
-
-
-def test_pooled_noise_of_repeats_is_that_of_the_draws():
-    noise = 1e-3 * np.array([[1, 0.4, 0, 0], [0.4, 1, 0, 0], [0, 0, 2, 0.5j], [0, 0, -0.5j, 1]], dtype=complex)
-    table = windows(7, n=300, noise=noise)
-    state = repeats(table, np.ones(len(table)))
-    assert state is not None
-    size = np.sqrt(np.diag(state.noise).real)
-    relative = np.sqrt(np.diag(noise).real)
-    np.testing.assert_allclose(state.noise / np.outer(size, size), noise / np.outer(relative, relative), atol=0.06)
-    assert state.spare == pytest.approx(state.weights.sum() - 6, rel=1e-9)
-    assert state.wandering == 0
-    mean = np.array([table.D[table.direction == d].mean(axis=0) for d in range(6)])
-    np.testing.assert_allclose(state.means.D, mean, atol=5e-3 * np.abs(mean).max())
-
-
 def test_information_is_a_sum_of_kronecker_products():
     rng = np.random.default_rng(10)
     D, star, inverse = complex_normal(rng, 3, 2), complex_normal(rng, 3, 2), complex_normal(rng, 3, 2, 2)
@@ -117,17 +67,6 @@ def test_degrees_of_freedom_in_the_limits():
     np.testing.assert_allclose(mixed_dof(2 * one, one, 4.0, between), 8.0)
     np.testing.assert_allclose(mixed_dof(0 * one, 0 * one, 30.0, between), 30.0)
     np.testing.assert_allclose(mixed_dof(one, one, 0.2, between), 1.0)
-
-
-def test_direction_effect_is_nothing_without_cause_and_unknown_without_a_spare_direction():
-    rng = np.random.default_rng(11)
-    D, noise = complex_normal(rng, 40, 2), 1e-4 * np.eye(2, dtype=complex)
-    means = DirectionMeans(D, D @ H.T, np.full(40, 10.0))
-    T, chi = direction_effect(0 * D, means, noise)
-    assert chi == 0.0
-    assert not T.any()
-    two = DirectionMeans(D[:2], D[:2], np.full(2, 10.0))
-    assert np.isnan(direction_effect(0 * D[:2], two, noise)[1])
 
 
 def test_either_complex_argument_is_refused_by_rlm():

@@ -173,6 +173,7 @@ def filled(values, times, held, step=0.0, missing=0):
     return written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "drive", "held"),
     [(200.0, 25.0, True), (250.0, 25.0, True), (400.0, 45.0, True), (500.0, 45.0, True), (150.0, 25.0, False),
@@ -198,6 +199,20 @@ def test_plain_channels_are_not_filled():
         for name in ("FX", "FY"):
             data[name] = np.round(data[name] / step) * step if step else data[name]
         assert "slower-channels" not in phasors_of(data).conditions
+
+
+@pytest.mark.parametrize("level", [1.0, 0.01])
+@pytest.mark.parametrize("line", [22.0, 50.0])
+def test_orders_of_shaft_and_mains_are_no_images(line, level):
+    """Sizes of scratches and of a rectifier go as 1 / order: five and seven stand as images of a rate of six would."""
+    data = record(level=level)
+    for name in ("DX", "DY", "FX", "FY"):
+        for k in (1, 2, 3, 5, 7):
+            size = (2.0 if k == 1 and line == 22.0 else 3.0) * TURNING[name[0]] / k
+            data[name] = data[name] + size * np.cos(2 * np.pi * k * line * TIME + k + (name[1] == "Y"))
+    result = phasors_of(data)
+    assert "slower-channels" not in result.conditions
+    assert level < 1.0 or error(result) < 0.01  # what windows take of lines four times above the drive, no filling
 
 
 @pytest.mark.parametrize(("begin", "end"), [(1.3, 4.0), (0.0, 2.45), (0.9, 3.3)])

@@ -16,7 +16,8 @@ from tests.dynamic import phasor_cases
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.instruments.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
 from tpjb_ident.dynamic.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
-from tpjb_ident.dynamic.runs.baseline import Baseline
+from tpjb_ident.dynamic.runs.baseline import DryTest
+from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
 from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
 
@@ -117,6 +118,7 @@ def test_a_gain_that_all_frequencies_share_is_in_the_interval_as_it_is_in_theirs
     np.testing.assert_allclose(np.diag(single.systematic)[:4], (0.01 * K.ravel()) ** 2 / 4, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_intervals_over_frequency_hold_the_truth():
     rng = np.random.default_rng(11)
     dof, draws, inside = 16.0, 400, 0
@@ -373,8 +375,14 @@ def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():
 
 def test_baseline_runs_without_an_answer_are_named_where_no_other_baseline_reaches():
     failed = Condition("baseline-missing", "the baseline runs at 15 Hz give no answer: two directions are needed")
-    low, high = estimate(OMEGAS[1]), estimate(OMEGAS[2])
-    at = [SimpleNamespace(omega=float(omega)) for omega in OMEGAS]
-    assert [Baseline((), (failed,)).missing(point) for point in at] == [(failed,)] * len(at)
-    assert [bool(Baseline((low, high), (failed,)).missing(point)) for point in at] == [True, False, False, True]
-    assert Baseline().missing(at[0]) == ()
+    known = RigStiffness(OMEGAS[1:3], np.zeros((2, 2, 2), complex), np.zeros((2, 8, 8)))
+    assert [DryTest(conditions=(failed,)).missing(omega) for omega in OMEGAS] == [(failed,)] * len(OMEGAS)
+    assert [bool(DryTest(known, (failed,)).missing(omega)) for omega in OMEGAS] == [True, False, False, True]
+    assert DryTest().missing(OMEGAS[0]) == ()
+
+
+def test_the_bare_rig_is_linear_between_its_frequencies_and_nothing_beyond():
+    h = np.array([np.eye(2), 3 * np.eye(2)]) * (1e7 + 1e6j)
+    known = RigStiffness(np.array([100.0, 200.0]), h, np.zeros((2, 8, 8)))
+    np.testing.assert_allclose(known.at(np.array([100.0, 150.0, 201.0])), h[[0, 0, 1]] * [[[1.0]], [[2.0]], [[1.0]]])
+    np.testing.assert_array_equal(known.at(np.array([97.0, 205.0])), 0.0)

@@ -30,7 +30,7 @@ def taken(point, r, J_h, J_t):
 
 
 def shared(to_prior, precision, always=False):
-    return Prior(to_prior, precision, np.broadcast_to(always, to_prior.shape))
+    return Prior(to_prior, precision, np.broadcast_to(always, to_prior.shape), np.zeros(to_prior.shape, dtype=bool))
 
 
 def dense(point, r, J_h, J_t, to_prior, precision):
@@ -105,7 +105,8 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
     rng = np.random.default_rng(12)
     J_own, distance = rng.standard_normal((BLOCKS, ROWS, OWN)), rng.standard_normal((POINTS, OWN))
     J_own[:, :, list(weak)] *= 1e-3
-    own = Prior(distance, rng.uniform(0.2, 2.0, (POINTS, OWN)), np.zeros((POINTS, OWN), dtype=bool))
+    never = np.zeros((POINTS, OWN), dtype=bool)
+    own = Prior(distance, rng.uniform(0.2, 2.0, (POINTS, OWN)), never, never)
     sums = Sums.empty(POINTS, PARAMETERS, NUMBERS + OWN)
     sums.add(point, r, np.concatenate([J_h, J_own], axis=2), J_t)
     found = step(sums, shared(to_prior, precision), own)

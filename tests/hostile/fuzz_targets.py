@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.foreign_files import write_mdf, write_tdms, write_uff
+
 ROOT = Path(__file__).resolve().parents[2]
 CSV_MANIFEST = """\
 schema = "tpjb-rig/1"
@@ -228,12 +230,7 @@ def _write_foreign(path: Path) -> None:
             for name, column in (("time", time), ("s/X1A", values)):
                 file.create_dataset(name, data=column[None, :])
     elif path.suffix == ".mf4":
-        from asammdf import MDF, Signal
-
-        with MDF(version="4.10") as file:
-            file.append([Signal(samples=values[:20], timestamps=time[:20], name="X1A", unit="um")])
-            file.append([Signal(samples=values[:5], timestamps=time[:5], name="T1", unit="degC")])
-            file.save(path, overwrite=True)
+        write_mdf(path, [(time[:20], {"X1A": ("um", values[:20])}), (time[:5], {"T1": ("degC", values[:5])})])
     elif path.suffix == ".asc":
         rows = [f"{i / 10:.1f}\t{i * 0.5:.3f}\t" + (f"{i:.1f}\t{20.0 + i:.2f}" if i < 4 else "\t") for i in range(12)]
         head = ["Time  1 - fast [s]\tX1A [um]\tTime  2 - slow [s]\tT1 [degC]"]
@@ -243,38 +240,9 @@ def _write_foreign(path: Path) -> None:
 
         pd.DataFrame({"time": time, "X1A": values}).to_parquet(path)
     elif path.suffix == ".tdms":
-        from nptdms import ChannelObject, TdmsWriter
-
-        with TdmsWriter(str(path)) as writer:
-            writer.write_segment([ChannelObject("g", "X1A", values, properties={"wf_increment": 0.01})])
+        write_tdms(path, [("g", "X1A", values, {"wf_increment": 0.01})])
     else:
-        import pyuff
-
-        pyuff.UFF(str(path)).write_sets(_uff_set(time, values), mode="overwrite")
-
-
-def _uff_set(time: np.ndarray, values: np.ndarray) -> dict[str, object]:
-    import pyuff
-
-    return pyuff.prepare_58(
-        binary=0,
-        id1="X1A",
-        func_type=1,
-        rsp_node=1,
-        rsp_dir=1,
-        ref_node=1,
-        ref_dir=1,
-        data=values,
-        x=time,
-        abscissa_inc=0.01,
-        abscissa_min=0.0,
-        abscissa_spec_data_type=17,
-        abscissa_axis_units_lab="s",
-        ordinate_spec_data_type=0,
-        ordinate_axis_units_lab="NONE",
-        orddenom_spec_data_type=0,
-        z_axis_spec_data_type=0,
-    )
+        write_uff(path, {"X1A": (0.01, values)})
 
 
 def _coefficient_tables() -> tuple[bytes, ...]:

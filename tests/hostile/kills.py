@@ -11,7 +11,6 @@ have their SHA-256; does a rerun end with the same exit code and bit-identical t
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import mmap
@@ -27,6 +26,8 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+from tests.studies.results import study_parser, table, typed, write_section
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = ("identify", "pivot", "locus")
@@ -260,11 +261,8 @@ def run(kills: int, seed: int, commands: tuple[str, ...]) -> tuple[Counter[str],
 def tell(section: str, outcomes: Counter[str], wrong: Counter[str]) -> None:
     """Print both, write them where a section is named, and end the program, with 1 where anything is wrong."""
     if section:
-        from tests.studies.results import table, write_section
-
         rows = [(text, count) for counts in (outcomes, wrong) for text, count in sorted(counts.items())]
-        command = f"python -m tests.hostile.{section.replace('-', '_')} {' '.join(sys.argv[1:])}"
-        write_section(section, command, table(("outcome", "trials"), rows))
+        write_section(section, typed(), table(("outcome", "trials"), rows))
     for title, counts in (("outcomes", outcomes), ("WRONG", wrong)):
         print(f"{title}:")
         for text, count in sorted(counts.items()):
@@ -273,11 +271,10 @@ def tell(section: str, outcomes: Counter[str], wrong: Counter[str]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--commands", nargs="+", choices=(*COMMANDS, *_LONG), default=COMMANDS)
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     tell("kills" if given.write else "", *run(given.kills, given.seed, tuple(given.commands)))
 

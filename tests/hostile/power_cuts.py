@@ -11,7 +11,6 @@ end the new results must be there whole. Some of the copies are given the comman
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import shutil
@@ -36,6 +35,7 @@ from tests.hostile.kills import (
     tell,
     wait,
 )
+from tests.studies.results import study_parser
 
 #: Seconds after which ext4 writes its journal unasked: longer than a command takes.
 COMMIT = 300
@@ -125,12 +125,11 @@ def run(trials: int, seed: int, commands: tuple[str, ...], reruns: int) -> tuple
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--trials", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     parser.add_argument("--reruns", type=int, default=3, help="cuts per trial that are given the command once more")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     if "TPJB_IN_NAMESPACE" not in os.environ:  # mounts that nobody else sees, and that go with this process
         words = ["unshare", "-m", sys.executable, "-m", "tests.hostile.power_cuts", *sys.argv[1:]]

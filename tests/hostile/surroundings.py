@@ -12,7 +12,6 @@ traceback.
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
 import shutil
@@ -29,6 +28,7 @@ from pathlib import Path
 from tests.hostile.kills import ROOT, tables, tell, write_small_campaign
 from tests.runtime.test_cluster import Cluster, wait_for
 from tests.studies.load import make
+from tests.studies.results import study_parser
 from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.runtime.differences import compared
 
@@ -234,12 +234,11 @@ _PARTS: dict[str, Callable[[Study], None]] = {"workers": _lose_workers, "cache":
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("parts", nargs="*", choices=_PARTS, default=list(_PARTS))
     parser.add_argument("--trials", type=int, default=4, help="of each loss or damage")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--compiled", type=Path, help="a TPJB_CACHE of this checkout, which saves minutes")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         study = Study(Path(scratch), given.trials, random.Random(given.seed), given.compiled)

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ import pytest
 from model.pad import store
 from tests.command_line import tpjb
 from tpjb_ident.watch.landing import NewFiles
-
-DEMO = Path(__file__).parents[2] / "rigdata" / "samples" / "demo.h5"
 
 
 @pytest.fixture
@@ -57,14 +54,14 @@ def test_a_file_that_is_being_written_is_left_alone_whatever_the_clock_says(tmp_
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("jumping")
-def test_a_command_under_a_clock_that_jumps_gives_the_same_and_may_be_verified(tmp_path):
-    shutil.copy(DEMO, tmp_path / "demo.h5")
+def test_a_command_under_a_clock_that_jumps_gives_the_same_and_may_be_verified(small_campaign, tmp_path):
+    path = shutil.copy(small_campaign, tmp_path / "campaign.h5")
     tables = []
     for name, year in (("a", 1971), ("b", 2100)):
-        os.utime(tmp_path / "demo.h5", (365.25 * 86400 * (year - 1970),) * 2)
+        os.utime(path, (365.25 * 86400 * (year - 1970),) * 2)
         out = tmp_path / name
-        assert tpjb("locus", tmp_path / "demo.h5", "--out", out).exit_code == 0
-        assert tpjb("locus", tmp_path / "demo.h5", "--out", out).exit_code == 0  # over results of another time
+        assert tpjb("locus", path, "--out", out).exit_code == 0
+        assert tpjb("locus", path, "--out", out).exit_code == 0  # over results of another time
         assert tpjb("verify", out).exit_code == 0
         assert list(json.loads((out / "run.json").read_text(encoding="utf-8"))["commands"]) == ["locus"]
         tables.append((out / "locus.csv").read_bytes())

@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "rigdata" / "samples" / "demo.h5"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
 @pytest.mark.parametrize("words", [("locus",), ("show",), ("check",), ("identify", "--method", "ols")])
 def test_names_that_are_not_utf_8_are_names(small_campaign, tmp_path, words):

@@ -31,6 +31,7 @@ def test_the_amplitude_is_held_against_the_clearance_of_the_campaigns_bearing():
     assert settings_that_reach(lambda identify: identify(campaign, stated)).clearance == 60e-6
 
 
+@pytest.mark.slow
 def test_the_method_is_an_argument_of_its_own():
     assert "method" in inspect.signature(ti.identify).parameters
     with pytest.raises(ValueError, match=r"mm-eiv"):

@@ -22,6 +22,7 @@ def bearing(request) -> Bearing:
     return load_bearing(f"model/bearings/{request.param}.toml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [2500.0, 8750.0])
 def test_deformation_is_what_pressure_and_heat_ask_for(bearing, load):
     p = predict(bearing, load, speed=SPEED, thermal="tehd")

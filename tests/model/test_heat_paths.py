@@ -54,6 +54,7 @@ def test_the_pad_s_face_is_hotter_than_the_film_by_the_parabola(rocker):
     np.testing.assert_array_equal(run(rocker).face_temperature[0], run(rocker).temperature[0])
 
 
+@pytest.mark.slow
 def test_heat_that_pads_take_is_what_their_solid_says(rocker):
     cooled = changed_pads(rocker, back_convection=3000.0)
     p = run(cooled, Options(conduction=True), thermal="tehd")

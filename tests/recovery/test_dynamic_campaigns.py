@@ -1,14 +1,11 @@
 """Whole campaigns: share of true coefficients inside the 95 % interval, and how far off the direct ones are.
 
-The virtual rig's truths are drawn here, with seeds; the sample campaigns' truths come with them.
+The virtual rig's truths are drawn here, with seeds; the sample campaigns are in `test_golden.py`.
 """
 
 from __future__ import annotations
 
-import json
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +16,6 @@ from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.terms.mains_angles import MainsEquations
 
-SHARED = Path(__file__).parents[2].parent / "shared"
 DIRECT = [0, 3, 4, 7]
 
 
@@ -76,32 +72,3 @@ def test_angles_of_a_known_disturbance_are_found_among_many_minima():
         naive = np.linalg.lstsq(disturbed, force, rcond=None)[0].T
         plain.append(np.linalg.norm(naive - h) / np.linalg.norm(h))
     assert np.median(close) < 0.25 * np.median(plain)
-
-
-@pytest.mark.slow
-@pytest.mark.samples
-@pytest.mark.parametrize("name", ["rocker-baseline", "rocker-measured-pivots", "spherical-baseline"])
-def test_sample_campaigns(name: str):
-    samples = SHARED / "samples"
-    path = samples / name if (samples / name).is_dir() else samples / f"{name}.h5"
-    if not path.exists():
-        pytest.skip("the sample campaigns are not beside this checkout")
-    true = json.loads((samples / "truth" / f"{name}.json").read_text(encoding="utf-8"))["points"]
-    truths = {(p["static_load_N"], p["excitation_Hz"]): p for p in true}
-    campaign = load_campaign(path)
-    began = time.process_time()
-    result = identify(campaign)
-    assert time.process_time() - began < 20  # 2-4 s on an idle core; a busy one that shares its units takes twice that
-    assert len(result.points) == len(truths)
-    total, random = [], []
-    for p in result.points:
-        t = truths[(p.point.static_load, p.point.excitation_hz)]
-        truth = np.concatenate([np.ravel(t["K"]), p.point.excitation * np.ravel(t["C"])])
-        error = np.abs(p.stiffness.vector[DIRECT] / truth[DIRECT] - 1)
-        mains = p.point.excitation_hz == 50
-        assert error.max() < (0.03 if mains else 0.01)
-        assert ("mains on excitation line" in p.quality) == mains
-        total.append(np.abs(p.stiffness.vector - truth) <= p.stiffness.half_width(0.95))
-        random.append(np.abs(p.stiffness.vector - truth) <= p.stiffness.half_width(0.95, systematic=False))
-    assert np.mean(total) >= 0.95
-    assert np.mean(random) >= 0.88

@@ -110,6 +110,7 @@ def test_axes_have_units(name):
             }, text  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_legends_do_not_cover_their_panels_nor_each_other(name):
     figure = picture(name)[0]
@@ -144,6 +145,7 @@ def test_a_spectrum_reads_the_amplitude_of_a_line(cells_every):
         assert line.get_ydata()[at] == pytest.approx(true, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_no_global_style(name):
     assert picture(name)[2]

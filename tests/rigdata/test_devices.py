@@ -13,6 +13,7 @@ import pytest
 from scipy.io import savemat
 
 from rigdata import RigDataError, Run, load_campaign
+from tests.foreign_files import write_mdf, write_tdms
 from tests.manifests import PROBES, SET_POINT, manifest
 
 RATE, SLOW, SECONDS = 1000.0, 250.0, 2.0
@@ -298,23 +299,15 @@ def test_channels_of_one_quantity_at_two_rates_make_no_vector(tmp_path):
         run.read_device(run.devices[1], ["L1V"])
 
 
-def write_mdf(path: Path) -> None:
-    asammdf = pytest.importorskip("asammdf")
-    with asammdf.MDF(version="4.10") as file:
-        file.append([asammdf.Signal(X, T, name="X1A", unit="um"), asammdf.Signal(Y, T, name="X1B", unit="um")])
-        file.append([asammdf.Signal(F, T2, name="L1H", unit="N"), asammdf.Signal(-F, T2, name="L1V", unit="N")])
-        file.save(path, overwrite=True)
+def write_groups_mdf(path: Path) -> None:
+    write_mdf(path, [(T, {"X1A": ("um", X), "X1B": ("um", Y)}), (T2, {"L1H": ("N", F), "L1V": ("N", -F)})])
 
 
-def write_tdms(path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
+def write_groups_tdms(path: Path) -> None:
     fast = {"wf_increment": 1 / RATE, "wf_start_offset": 0.0}
     slow = {"wf_increment": 1 / SLOW, "wf_start_offset": 0.0005}
     columns = {"X1A": (X, fast), "X1B": (Y, fast), "L1H": (F, slow), "L1V": (-F, slow)}
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([
-            nptdms.ChannelObject("log", name, values, properties=wave) for name, (values, wave) in columns.items()
-        ])  # fmt: skip
+    write_tdms(path, [("log", name, values, wave) for name, (values, wave) in columns.items()])
 
 
 def write_lvm(path: Path) -> None:
@@ -330,11 +323,13 @@ def write_lvm(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "write", [pytest.param(write_mdf, marks=pytest.mark.slow), write_tdms, write_lvm], ids=["mf4", "tdms", "lvm"]
-)
+    ("file", "write"),
+    [pytest.param("r.mf4", write_groups_mdf, marks=pytest.mark.slow), ("r.tdms", write_groups_tdms),
+     ("r.lvm", write_lvm)],
+    ids=["mf4", "tdms", "lvm"],
+)  # fmt: skip
 @pytest.mark.parametrize("clock", [{}, {"clock": "B"}])
-def test_groups_and_waves_of_two_rates(tmp_path, write, clock):
-    file = f"r.{write.__name__.removeprefix('write_').replace('mdf', 'mf4')}"
+def test_groups_and_waves_of_two_rates(tmp_path, file, write, clock):
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         write(tmp_path / file)

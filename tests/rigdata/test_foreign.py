@@ -17,6 +17,7 @@ from rigdata.readers import series
 from rigdata.readers.base import FORMATS
 from rigdata.readers.file_reader import FileReader, ReadingCache, read_series
 from rigdata.readers.series import Series, arranged, equidistant, is_time, seconds, with_unique_names
+from tests.foreign_files import write_mdf, write_tdms, write_uff
 from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
 
@@ -34,39 +35,18 @@ CHANNELS = {
 }
 
 
-def write_tdms(path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    fast = {"wf_increment": 1 / RATE, "wf_start_offset": 0.0, "unit_string": "V"}
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([
-            nptdms.ChannelObject("fast", "X1A", X, properties=fast),
-            nptdms.ChannelObject("fast", "L1H", F, properties={**fast, "unit_string": "kN"}),
-            nptdms.ChannelObject("slow", "T1", T, properties={"wf_increment": 100 / RATE, "wf_start_offset": 0.0}),
-            nptdms.ChannelObject("slow", "remark", ["a text"]),
-        ])  # fmt: skip
+def write_loggers_tdms(path: Path) -> None:
+    fast, slow = ({"wf_increment": step, "wf_start_offset": 0.0} for step in (1 / RATE, 100 / RATE))
+    channels = [("fast", "X1A", X, {**fast, "unit_string": "V"}), ("fast", "L1H", F, {**fast, "unit_string": "kN"})]
+    write_tdms(path, [*channels, ("slow", "T1", T, slow), ("slow", "remark", ["a text"], {})])
 
 
-def write_uff(path: Path) -> None:
-    pyuff = pytest.importorskip("pyuff")
-    file = pyuff.UFF(str(path))
-    for name, values, step in (("X1A", X, 1 / RATE), ("L1H", F, 1 / RATE), ("T1", T, 100 / RATE)):
-        file.write_sets(
-            pyuff.prepare_58(
-                binary=0, id1=name, func_type=1, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1, data=values,
-                x=step * np.arange(len(values)), abscissa_inc=step, abscissa_min=0.0, abscissa_spec_data_type=17,
-                abscissa_axis_units_lab="s", ordinate_spec_data_type=0, ordinate_axis_units_lab="NONE",
-                orddenom_spec_data_type=0, z_axis_spec_data_type=0,
-            ),
-            mode="add",
-        )  # fmt: skip
+def write_loggers_uff(path: Path) -> None:
+    write_uff(path, {"X1A": (1 / RATE, X), "L1H": (1 / RATE, F), "T1": (100 / RATE, T)})
 
 
-def write_mf4(path: Path) -> None:
-    asammdf = pytest.importorskip("asammdf", reason="asammdf is heavy; install the extra mdf to run this")
-    with asammdf.MDF(version="4.10") as file:
-        file.append([asammdf.Signal(X, TIME, name="X1A", unit="V"), asammdf.Signal(F, TIME, name="L1H", unit="kN")])
-        file.append([asammdf.Signal(T, SLOW, name="T1", unit="degC")])
-        file.save(path, overwrite=True)
+def write_loggers_mdf(path: Path) -> None:
+    write_mdf(path, [(TIME, {"X1A": ("V", X), "L1H": ("kN", F)}), (SLOW, {"T1": ("degC", T)})])
 
 
 ALL = {"t": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T)}
@@ -102,9 +82,9 @@ def write_catman(path: Path) -> None:
 
 
 WRITERS = {
-    "one.tdms": write_tdms,
-    "one.unv": write_uff,
-    "one.mf4": write_mf4,
+    "one.tdms": write_loggers_tdms,
+    "one.unv": write_loggers_uff,
+    "one.mf4": write_loggers_mdf,
     "one.mat": write_mat5,
     "new.mat": write_mat73,
     "one.parquet": write_parquet,

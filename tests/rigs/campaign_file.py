@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import h5py
@@ -11,8 +11,8 @@ import numpy as np
 from tests.rigs.field_rig import CHANNELS, Plan, Rig, record
 
 BEARING = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
-_UNITS = {"displacement": "um", "force": "N", "acceleration": "m/s^2"}
-_SCALE = {"displacement": 1e6, "force": 1.0, "acceleration": 1.0}
+#: What the manifest states, and how many of it make one of SI.
+UNITS = {"displacement": ("um", 1e6), "force": ("N", 1.0), "acceleration": ("m/s^2", 1.0)}
 
 
 def write_campaign(
@@ -20,14 +20,19 @@ def write_campaign(
 ) -> None:
     """Write one HDF5 file; `extra` holds more keys per table of the manifest (a channel's name, "housing", ...)."""
     rng = np.random.default_rng(seed)
+    records = ((plan.id, record(rig, plan, rng)) for plan in plans)
+    write_records(path, manifest_text(rig, plans, extra or {}), rig.rate, records)
+
+
+def write_records(path: Path, manifest: str, rate: float, records: Iterable[tuple[str, dict[str, np.ndarray]]]) -> None:
+    """Store runs by their names, channels in the units of the manifest, beside the rocker's bearing file."""
     with h5py.File(path, "w") as file:
-        file.attrs["manifest"] = manifest_text(rig, plans, extra or {})
-        file.attrs["bearing"] = BEARING.read_text(encoding="utf-8")
-        for plan in plans:
-            group = file.create_group(f"runs/{plan.id}")
-            group.attrs["sample_rate_hz"] = rig.rate
-            for name, values in record(rig, plan, rng).items():
-                group.create_dataset(name, data=values * (_SCALE[CHANNELS[name][0]] if name in CHANNELS else 1.0))
+        file.attrs["manifest"], file.attrs["bearing"] = manifest, BEARING.read_text(encoding="utf-8")
+        for run, channels in records:
+            group = file.create_group(f"runs/{run}")
+            group.attrs["sample_rate_hz"] = rate
+            for name, values in channels.items():
+                group.create_dataset(name, data=values * (UNITS[CHANNELS[name][0]][1] if name in CHANNELS else 1.0))
 
 
 def manifest_text(rig: Rig, plans: Sequence[Plan], extra: Mapping[str, Mapping[str, str]]) -> str:
@@ -42,7 +47,7 @@ def manifest_text(rig: Rig, plans: Sequence[Plan], extra: Mapping[str, Mapping[s
     for name in rig.channels:
         quantity, axis = CHANNELS[name]
         lines += [f"[channels.{name}]", f'quantity = "{quantity}"', f'axis = "{axis} deg"']
-        lines += [f'unit = "{_UNITS[quantity]}"']
+        lines += [f'unit = "{UNITS[quantity][0]}"']
         if "uncertainty" not in extra.get(name, {}):
             lines += ['uncertainty = "0 %"']
         lines += more(name)

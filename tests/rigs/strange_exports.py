@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.foreign_files import write_tdms
+
 PADS = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 CLEARANCES = np.array([80e-6, 82e-6, 79e-6, 81e-6, 80e-6])
 CENTRE = np.array([12e-6, -7e-6])  #: of the bearing, from the probes' zero [m]
@@ -206,17 +208,14 @@ def _times_of_day(path: Path, time: np.ndarray, fast: Table, other: Table) -> No
 
 def _tdms(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """Two devices: probes of one, everything else of another at half the rate; units as properties."""
-    import nptdms
-
     units = {"Gap": "um", "Load": "N", "Acc": "m/s^2", "Oil": "degC", "Speed": "rpm"}
     step = float(time[1] - time[0])
     segment = []
     for group, table, every in (("PXI", fast, 1), ("Rack", other, 2)):
         for name, values in table.items():
             properties = {"wf_increment": step * every, "wf_start_offset": 0.0, "unit_string": units[name.split()[0]]}
-            segment.append(nptdms.ChannelObject(group, name, values[::every], properties=properties))
-    with nptdms.TdmsWriter(path.with_suffix(".tdms")) as writer:
-        writer.write_segment(segment)
+            segment.append((group, name, values[::every], properties))
+    write_tdms(path.with_suffix(".tdms"), segment)
 
 
 def _matlab(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import tpjb
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 #: Blocks that describe files of a user, so they are checked for being Python and are not run.
@@ -115,8 +117,6 @@ def test_python_runs_as_it_stands(language, text, desk):
 
 @pytest.mark.parametrize(("language", "text"), of("sh"))
 def test_command_lines_have_commands_and_options_that_exist(language, text):
-    from tests.command_line import tpjb
-
     for line in text.splitlines():
         words = shlex.split(line, comments=True)
         if words[:1] == ["tpjb"] and len(words) > 1:
@@ -127,20 +127,9 @@ def test_command_lines_have_commands_and_options_that_exist(language, text):
                     assert word in shown.stdout, line
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path):
-    for module in ("mkdocstrings", "latex2mathml"):
-        pytest.importorskip(module, reason="the extra docs is not installed")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
-    pages = list((tmp_path / "site").rglob("*.html"))
-    assert len(pages) >= 12
-    for page in pages:
-        if page.name == "404.html":  # its links are those of a server's root
-            continue
-        html = page.read_text(encoding="utf-8")
-        for target in re.findall(r'href="([^"#:]+\.html)', html):
-            assert (page.parent / target).resolve().exists(), (page.name, target)
+def test_the_readme_s_two_commands_name_what_exists():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for command in ("tpjb_ident demo", "tests"):
+        assert f"`python3 {command}`" in readme
+        assert f"`py {command}`" in readme
+        assert (ROOT / command.split()[0] / "__main__.py").exists()

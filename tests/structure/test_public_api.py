@@ -133,6 +133,7 @@ def test_what_cannot_be_taken_is_refused_in_our_own_words(call, says, tmp_path, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_open_campaign_is_checked_as_its_path_is(small_campaign):
     assert ti.check_campaign(ti.load_campaign(small_campaign)) == ti.check_campaign(small_campaign)
 

@@ -106,14 +106,30 @@ def test_the_tutorial_leads_to_a_report(tmp_path, monkeypatch):
     assert "</html>" in Path("report/report.html").read_text("utf-8")
 
 
-@pytest.mark.slow
-def test_the_site_shows_notebooks_pictures_and_equations(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built once; a warning ends it."""
     for module in ("mkdocstrings", "latex2mathml"):
         pytest.importorskip(module, reason="the extra docs is not installed")
-    site = tmp_path / "site"
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(site)]
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]
+    return folder
+
+
+@pytest.mark.slow
+def test_every_link_of_the_site_leads_to_a_page(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) >= 12
+    for page in pages:
+        if page.name != "404.html":  # its links are those of a server's root
+            for target in re.findall(r'href="([^"#:]+\.html)', page.read_text("utf-8")):
+                assert (page.parent / target).resolve().exists(), (page.name, target)
+
+
+@pytest.mark.slow
+def test_the_site_shows_notebooks_pictures_and_equations(site):
     assert "<math" in (site / "theory.html").read_text("utf-8")
     notebooks = sorted(site.glob("notebooks/*.html"))
     assert [page.stem for page in notebooks] == sorted(path.stem for path in (ROOT / "notebooks").glob("*.ipynb"))

@@ -7,7 +7,6 @@ The conditions named go to the other stream.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import warnings
@@ -22,7 +21,7 @@ from rigdata import load_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
 from tests.rigs.closed_form_bearing import NOMINAL
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.identification.identify import identify
@@ -159,11 +158,10 @@ def run_row(row: BandRow, seeds: range) -> Tally:
 
 def main() -> None:
     """Command line."""
-    options = argparse.ArgumentParser()
+    options = study_parser(__doc__)
     options.add_argument("--seeds", type=int, default=20)
     options.add_argument("--first-seed", type=int, default=7000)
     options.add_argument("--only", default="")
-    options.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = options.parse_args()
     head = ["excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %"]
     rows = []
@@ -174,9 +172,8 @@ def main() -> None:
             print(rows[-1], flush=True)
             print(f"{row.name}: {dict(tally.named)}", file=sys.stderr, flush=True)
     if given.write:
-        command = f"python -m tests.studies.band_coverage --seeds {given.seeds} --first-seed {given.first_seed} --write"
         head += ["K-C-M inside %", "kyy +- %", "refused", "reported"]
-        write_section("band", command, table(head, rows))
+        write_section("band", typed(), table(head, rows))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ error of the sensors or statement of it, where records, loads and runs alone spe
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 from unittest.mock import patch
@@ -19,7 +18,7 @@ from rigdata.campaign import load_campaign
 from tests.studies.field import acquisition
 from tests.studies.field import closed_form as cf
 from tests.studies.field.acquisition import Acquisition, write_campaign
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
 
@@ -70,10 +69,9 @@ def row(name: str, seeds: int) -> tuple[object, ...]:
 
 def main() -> None:
     """Print the table, or write it."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = study_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=60)
     parser.add_argument("--only", default="")
-    parser.add_argument("--write", action="store_true")
     given = parser.parse_args()
     rows = []
     for name in PLANS:
@@ -81,7 +79,7 @@ def main() -> None:
             rows.append(row(name, given.seeds))
             print(*rows[-1], sep=" | ", flush=True)
     if given.write:
-        write_section("coverage", f"python -P -m tests.studies.coverage --seeds {given.seeds}", table(HEAD, rows))
+        write_section("coverage", typed(), table(HEAD, rows))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ that is off by more than a twentieth at a point without a flag.
 
 from __future__ import annotations
 
-import argparse
 import re
 import shutil
 import tempfile
@@ -21,7 +20,7 @@ import h5py
 from model.bearing_file import parse_bearing
 from rigdata import load_campaign
 from rigdata.problem import RigDataError
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.dynamic.settings import IdentifySettings
@@ -117,8 +116,7 @@ def answers(path: Path, truth: dict[object, list[float]]) -> tuple[str, str, str
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="replace the section of RESULTS.md")
+    parser = study_parser(__doc__)
     options = parser.parse_args()
     with h5py.File(DEMO) as file:
         whole = str(file.attrs["manifest"])
@@ -139,7 +137,7 @@ def main() -> None:
     rows = [(sensor, runs, "; ".join(outcomes)) for (sensor, runs), outcomes in cells.items()]
     text += table(("description", "runs", "factor: check, identify"), rows)
     if options.write:
-        write_section("descriptions", "python -m tests.studies.descriptions --write", text)
+        write_section("descriptions", typed(), text)
     else:
         print(text)
 

@@ -7,14 +7,13 @@ method gets all replicates, the others a quarter of them.
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from tests.rigs.estimator_cases import H_TRUE, OMEGA, Case, draw
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 from tpjb_ident.runtime.executors import local_workers, map_ordered
 
@@ -106,11 +105,10 @@ def score_case(case: Case, replicates: int, seed: int) -> Row:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description="Accuracy, coverage and speed of every estimator")
+    parser = study_parser(__doc__)
     parser.add_argument("--replicates", type=int, default=400)
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     options = parser.parse_args()
     print(f"{options.replicates} replicates, seed {options.seed}: RMSE % (bias kxx, kyy %, coverage %)")
     print("| case | " + " | ".join(METHODS) + " |")
@@ -123,9 +121,7 @@ def main() -> None:
         entries = [[row.case, *(str(row.scores[m]).strip() for m in METHODS)] for row in rows]
         note = f"{options.replicates} replicates, seed {options.seed}: RMSE % of H (bias kxx, kyy %, coverage %).\n\n"
         head = ["case", *(f"`{m}`" for m in METHODS)]
-        write_section(
-            "estimators", "python -m tests.studies.estimators --write", note + table(head, [*entries, ratios])
-        )
+        write_section("estimators", typed(), note + table(head, [*entries, ratios]))
 
 
 if __name__ == "__main__":

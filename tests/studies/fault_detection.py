@@ -11,9 +11,7 @@ various make (number of directions, noise, points, bearings that wander from run
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 import tempfile
 from collections import Counter
 from dataclasses import replace
@@ -29,7 +27,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise, operating_points
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, study_parser, table, typed, write_section
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 
@@ -239,13 +237,12 @@ def run_seed(name: str, seed: int, folder: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--good", type=int, default=12, help="good campaigns")
     parser.add_argument("--faults", nargs="*", help="parts of names")
     parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     stored, entries = Rows(asked.rows, "fault", "seed"), []
     with tempfile.TemporaryDirectory() as scratch:
@@ -260,8 +257,7 @@ def main() -> None:
             print(entries[-1], flush=True)
     if asked.write:
         head = ("fault", "named", "as", "others blamed", "worst error", "identify says")
-        command = f"python -m tests.studies.fault_detection {' '.join(sys.argv[1:])}"
-        write_section("faults", command, table(head, entries))
+        write_section("faults", typed(), table(head, entries))
 
 
 if __name__ == "__main__":

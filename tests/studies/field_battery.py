@@ -8,8 +8,6 @@ is not run again. Limits of the product were once set while looking at seeds 100
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -20,7 +18,7 @@ from typing import Any
 from tests.rigs.campaign_file import write_campaign
 from tests.rigs.field_conditions import Row, rows
 from tests.rigs.field_judge import Outcome, judge
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, study_parser, table, typed, write_section
 
 WORDS = ("right", "told", "silent", "crash")
 
@@ -45,12 +43,11 @@ def cells(row: Row, outcomes: Sequence[Outcome]) -> list[str]:
 
 def main() -> None:
     """Run the battery."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=1000)
     parser.add_argument("--only", default="", help="rows whose names hold one of these words, separated by |")
     parser.add_argument("--rows", type=Path, help="file of JSON lines that outcomes are added to and taken from")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     stored = Rows(asked.rows, "row", "seed")
     entries: list[list[str]] = []
@@ -72,8 +69,7 @@ def main() -> None:
     print(summary)
     if asked.write:
         head = ("condition", "wanted", "right / reported / silent / crash", "inside %", "half-width %")
-        command = f"python -m tests.studies.field_battery {' '.join(sys.argv[1:])}"
-        write_section("field", command, f"{summary}.\n\n{table(head, entries)}")
+        write_section("field", typed(), f"{summary}.\n\n{table(head, entries)}")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ file. The cases run in child processes, so that a crash of a C library is a find
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import logging
@@ -36,7 +35,7 @@ from typing import Any
 
 from tests.hostile.fuzz_mutations import mutated
 from tests.hostile.fuzz_targets import ROOT, TARGETS, Target, make_target
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 
 #: CPU seconds and bytes of growth above which a case is a finding.
 SLOWEST, LARGEST = 5.0, 2**31
@@ -269,14 +268,13 @@ def replay(name: str, seed: int, number: int) -> str | None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("target", nargs="+", choices=[*TARGETS, "all"])
     parser.add_argument("--cases", type=int, default=100_000)
     parser.add_argument("--seconds", type=float, default=600.0, help="wall time per target")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
     parser.add_argument("--case", type=int, help="feed this case of the seed alone")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     names = TARGETS if "all" in given.target else given.target
     if given.case is not None:
@@ -292,7 +290,7 @@ def main() -> None:
         failed = failed or bool(result["findings"])
     head = ("reader", "cases", "taken", "CPU s", "slowest case", "peak memory", "findings")
     if given.write:
-        write_section("fuzz", f"python -m tests.studies.fuzz {' '.join(sys.argv[1:])}", table(head, rows))
+        write_section("fuzz", typed(), table(head, rows))
     sys.exit(failed)
 
 

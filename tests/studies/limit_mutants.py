@@ -8,7 +8,6 @@ where one of them fails. The tests are first run on the copy as it is, so that a
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -17,7 +16,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -69,8 +68,8 @@ MUTANTS = (
     Mutant(_PIVOTS, "np.asarray(centre * np.exp(half))", "np.asarray(centre * np.exp(-half))"),
     Mutant(_PIVOT_TABLE, 'f"{TANGENT}_lo": lo', 'f"{TANGENT}_lo": hi'),
     Mutant(_PIVOT_TABLE, 'f"{SECANT}_lo": secant_lo', 'f"{SECANT}_lo": secant_hi'),
-    Mutant(_DIFFERENCE, '_difference_lo": difference - half', '_difference_lo": difference + half'),
-    Mutant(_DIFFERENCE, '_difference_hi": difference + half', '_difference_hi": difference - half'),
+    Mutant(_DIFFERENCE, "difference - half, difference + half", "difference + half, difference + half"),
+    Mutant(_DIFFERENCE, "difference - half, difference + half", "difference - half, difference - half"),
     Mutant(_COMPARISON, "= values[name], low, high", "= values[name], high, low"),
     Mutant(_EFFECTS, "value[p.name] - s", "value[p.name] + s"),
     Mutant(_EFFECTS, "min(ends), max(ends)", "max(ends), max(ends)"),
@@ -99,8 +98,7 @@ def outcome(folder: Path, mutant: Mutant) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    parser = study_parser(__doc__)
     parser.add_argument("--files", nargs="*", default=list(TESTS), help="of these files alone")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -115,7 +113,7 @@ def main() -> None:
                 print(*rows[-1], flush=True)
         if given.write:
             columns = ("file", "expression", "becomes", "outcome")
-            write_section("limits", "python -m tests.studies.limit_mutants --write", table(columns, rows))
+            write_section("limits", typed(), table(columns, rows))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ can have; a fault that leaves the record as it was (nothing to refuse) is told a
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from dataclasses import replace
@@ -134,12 +133,11 @@ def _label(fault: Fault) -> str:
 
 def main() -> None:
     """Run everything that the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = results.study_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--faults", type=int, default=4, help="per seed")
     parser.add_argument("--programme", choices=("up", *PROGRAMMES), default="up", help="how the load goes")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     given = parser.parse_args()
     rows: list[tuple[float, ...]] = []
     found: list[tuple[Fault, int, str]] = []
@@ -155,8 +153,7 @@ def main() -> None:
     lines = [*report(table), *report_faults(found)]
     print("\n".join(lines))
     if given.write:
-        seeds = f"--seeds {given.seeds} --first {given.first} --faults {given.faults} --programme {given.programme}"
-        results.write_section("pivots", f"python -m tests.studies.pivots {seeds} --write", "\n".join(lines))
+        results.write_section("pivots", results.typed(), "\n".join(lines))
 
 
 if __name__ == "__main__":

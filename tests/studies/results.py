@@ -6,8 +6,10 @@ made it, on which commit and on which day.
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
+import sys
 from collections.abc import Iterable, Sequence
 from datetime import date
 from pathlib import Path
@@ -42,6 +44,18 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
     return "\n".join(lines)
+
+
+def study_parser(described: str | None) -> argparse.ArgumentParser:
+    """What every study can be asked: its first lines, and to write its section."""
+    parser = argparse.ArgumentParser(description=described, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    return parser
+
+
+def typed() -> str:
+    """What was typed to run this study, as it is typed again."""
+    return " ".join(["python -m", sys.modules["__main__"].__spec__.name, *sys.argv[1:]])
 
 
 def write_section(name: str, command: str, text: str, page: Path = PAGE) -> None:

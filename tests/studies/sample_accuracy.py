@@ -5,7 +5,6 @@ python -m tests.studies.sample_accuracy [../shared/samples] [--write]
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 
 import rigdata
 from model.bearing_file import parse_bearing
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, typed, write_section
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.identification.identify import identify
@@ -80,9 +79,8 @@ def locus_error(locus: Any, truth: dict[str, Any]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=Path("../shared/samples"))
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     rows = []
     for name in NAMES:
@@ -92,7 +90,7 @@ def main() -> None:
     text = table(head, rows)
     print(text)
     if asked.write:
-        write_section("samples", "python -m tests.studies.sample_accuracy --write", text)
+        write_section("samples", typed(), text)
 
 
 if __name__ == "__main__":

@@ -139,11 +139,31 @@ def diagnose_campaign(
     >>> print(found.diagnosis.verdict.effects[0].name)
     pivot_flexibility
     """
-    settings = settings or DiagnoseSettings()
+    settings, baseline = settings or DiagnoseSettings(), baseline or Baseline()
     rotations = {run.rotation for run in campaign.runs if run.point.shaft_speed}
     bearing = as_it_turns(bearing, rotations, campaign.rotation)
     measured = measure_campaign(campaign, bearing, settings.tolerances, progress, ahead)
-    return _diagnose_measured(measured, bearing, baseline or Baseline(), settings, progress)
+    settings = replace(settings, tolerances=measured.tolerances)
+    report = progress or (lambda text, done, total: None)
+    setup = _before(bearing, baseline, measured)
+    # curves that the model was given cannot testify about it
+    curves = () if baseline.pivots == "measured" else measured.curves
+    observations = observe(measured.identification, curves, measured.locus, measured.polygon, settings.tolerance)
+    observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
+    result = diagnose(
+        observations, setup, settings, lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100)
+    )
+    return CampaignDiagnosis(result, measured.identification, setup)
+
+
+def _before(bearing: Bearing, baseline: Baseline, measured: Measured | None = None) -> Setup:
+    """The model that a diagnosis starts from."""
+    if measured is not None and baseline.pivots == "measured":
+        laws = measured_laws(measured.curves, len(bearing.pads), measured.identification.campaign)
+    else:
+        laws = pivot_laws(baseline.pivots, bearing)
+    instruments = Instruments() if measured is None else measured.instruments
+    return apply_effects(Setup(bearing, laws, baseline.thermal, instruments=instruments), baseline.effects)
 
 
 def measure_campaign(
@@ -175,36 +195,6 @@ def measure_campaign(
     )
 
 
-def _diagnose_measured(
-    measured: Measured,
-    bearing: Bearing,
-    baseline: Baseline,
-    settings: DiagnoseSettings,
-    progress: Callable[[str, int, int], None] | None,
-) -> CampaignDiagnosis:
-    """Find what the model of an identified campaign lacks."""
-    settings = replace(settings, tolerances=measured.tolerances)
-    report = progress or (lambda text, done, total: None)
-    identification, curves = measured.identification, measured.curves
-    measured_pivots = baseline.pivots == "measured"
-    laws = (
-        measured_laws(curves, len(bearing.pads), identification.campaign)
-        if measured_pivots
-        else pivot_laws(baseline.pivots, bearing)
-    )
-    plain = Setup(bearing, laws, baseline.thermal, instruments=measured.instruments)
-    setup = apply_effects(plain, baseline.effects)
-    # curves that the model was given cannot testify about it
-    observations = observe(
-        identification, () if measured_pivots else curves, measured.locus, measured.polygon, settings.tolerance
-    )  # fmt: skip
-    observations = replace(observations, layout=replace(observations.layout, temperature_position=measured.sensors))
-    result = diagnose(
-        observations, setup, settings, lambda text, share: report(f"diagnosing, {text}", 30 + int(70 * share), 100)
-    )
-    return CampaignDiagnosis(result, identification, setup)
-
-
 def diagnose_table(
     path: Path,
     bearing: Bearing,
@@ -221,7 +211,7 @@ def diagnose_table(
     settings = replace(settings, tolerances=settings.tolerances.layered(bearing))
     observations = observe_table(path, reading_error, settings.tolerance)
     bearing = as_it_turns(bearing, {rotation_of(test.speed) for test in observations.layout.dynamic})
-    setup = apply_effects(Setup(bearing, pivot_laws(baseline.pivots, bearing), baseline.thermal), baseline.effects)
+    setup = _before(bearing, baseline)
     result = diagnose(observations, setup, settings, lambda text, share: report(text, int(100 * share), 100))
     return CampaignDiagnosis(result, None, setup)
 
@@ -237,13 +227,11 @@ def unknown_centre(locus: Locus) -> float:
 def _stated_tolerances(campaign: Campaign, bearing: Bearing, known: Tolerances) -> Tolerances:
     """Tolerances by the weight of their source: command line, bearing file, manifest, defaults."""
     tolerances = known.layered(bearing)
-    probes = [c for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
-    cells = [c for c in campaign.channels.values() if c.quantity == "force" and c.uncertainty]
-    gains = [float(p.uncertainty) for p in probes if p.uncertainty]
-    if gains and tolerances.stated["probe_gain"].source == "default":
-        tolerances = tolerances.states({"probe_gain": max(gains)}, "manifest")
-    if cells and tolerances.stated["cell_gain"].source == "default":
-        tolerances = tolerances.states({"cell_gain": max(float(c.uncertainty or 0.0) for c in cells)}, "manifest")
+    for quantity, name in (("displacement", "probe_gain"), ("force", "cell_gain")):
+        read = [c for c in campaign.channels.values() if c.quantity == quantity and c.axis is not None]
+        gains = [float(channel.uncertainty) for channel in read if channel.uncertainty]
+        if gains and tolerances.stated[name].source == "default":
+            tolerances = tolerances.states({name: max(gains)}, "manifest")
     return tolerances
 
 

@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
 
 from model.effects import Effect, kind_of
 from model.setup import Setup
@@ -249,21 +248,16 @@ def separated(
         return Separation(design, tuple(design.separation(first, rival) for rival in rivals))
     if not design.fits(first, *rivals):
         return None
+    acting = design.acting(first)
     try:
-        return Separation(design, _each(setup, design, first, rivals, known))
+        planned = design.planned(setup)
+        forward = design.forward(setup, planned)
+        prediction = forward(acting)
+        columns = at_baseline(forward, acting, setup, known, prediction)
+        others = [forward(design.acting(rival)) for rival in rivals]
     except NoEquilibriumError:
         return None
-
-
-def _each(
-    setup: Setup, design: Design, one: Sequence[Effect], rivals: Sequence[Sequence[Effect]], known: Tolerances
-) -> tuple[float, ...]:
-    planned = design.planned(setup)
-    forward = design.forward(setup, planned)
-    acting = design.acting(one)
-    prediction = forward(acting)
-    columns = at_baseline(forward, acting, setup, known, prediction)
-    return tuple(apart(planned, columns, prediction - forward(design.acting(rival))) for rival in rivals)
+    return Separation(design, tuple(apart(planned, columns, prediction - other) for other in others))
 
 
 def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
@@ -272,19 +266,8 @@ def ranked(tests: Sequence[Separation]) -> tuple[Separation, ...]:
 
 
 def apart(seen: Observations, columns: FloatArray, difference: FloatArray) -> float:
-    """Whitened length of a difference of two predictions [standard deviations].
-
-    `columns` (n, m), `difference` (n,).
-    """
+    """Whitened length of a difference (n,) of two predictions [standard deviations]; `columns` (n, m)."""
     return float(np.linalg.norm(np.linalg.solve(usual_factor(seen, columns), difference)))
-
-
-def chance(separation: float) -> float:
-    """Probability that chi-square of the wrong explanation exceeds the right one's by `Deciding.margin`.
-
-    The difference is normal with mean d^2 and standard deviation 2 d, d being the separation.
-    """
-    return float(ndtr((separation**2 - Deciding.margin) / (2.0 * separation))) if separation > 0.0 else 0.0
 
 
 def suggested(tests: Sequence[Separation]) -> tuple[Separation, ...]:

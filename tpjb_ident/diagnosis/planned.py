@@ -12,13 +12,12 @@ from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.observations.constants import Tolerance
 from tpjb_ident.diagnosis.observations.gap import direct_scale
 from tpjb_ident.diagnosis.observations.observe import (
-    ENTRY_NAMES,
     DryTest,
     DynamicTest,
-    Element,
     Layout,
     LocusTest,
     Observations,
+    all_elements,
 )
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
@@ -29,7 +28,7 @@ _STIFFNESS, _POSITION, _TEMPERATURE, _DRY, _ANGLE = 0.001, 0.1e-6, 0.05, 0.008, 
 def planned_observations(setup: Setup, layout: Layout) -> Observations:
     """What the baseline predicts for a layout, with the covariance one may expect."""
     tolerance = Tolerance()
-    elements = _elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
+    elements = all_elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
     scale = direct_scale(elements, value)
     table: dict[str, tuple[np.ndarray | float, np.ndarray | float]] = {
@@ -46,26 +45,6 @@ def planned_observations(setup: Setup, layout: Layout) -> Observations:
         row = table["side" if e.observable == "side_angle" else e.family]
         columns[:, i] = [float(np.broadcast_to(v, value.shape)[i]) for v in row]
     return Observations(layout, value, np.diag(columns[0] ** 2), columns[1], elements)
-
-
-def _elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
-    out: list[Element] = []
-    for test in layout.dynamic:
-        base = (("load", test.load), ("direction", test.direction), ("speed", test.speed))
-        for omega in test.excitation:
-            place = (*base, ("excitation", omega))
-            out += [Element("h", f"{part}{entry}", place) for part in "kc" for entry in ENTRY_NAMES]
-        out += [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in test.pads]
-    for locus_test in layout.locus:
-        where3 = (("load", locus_test.load), ("direction", locus_test.direction), ("speed", locus_test.speed))
-        out += [Element("locus", f"locus_{a}", where3) for a in "xy"]
-        out += [Element("load", f"load_{a}", where3) for a in ("ratio", "turn")]
-    for dry in layout.dry:
-        out += [Element("dry", "dry_compliance", (("pad", float(dry.pad)), ("load", load))) for load in dry.load]
-    if layout.push_load is not None:
-        places = [(("pad", k + 1.0), ("angle", angle)) for k, angle in enumerate(angles)]
-        out += [Element("clearance", name, p) for name in ("clearance_pushed", "side_angle") for p in places]
-    return tuple(out)
 
 
 def dynamic(

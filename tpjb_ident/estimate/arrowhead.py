@@ -39,15 +39,18 @@ class Prior:
     distance: FloatArray  #: prior mean minus value
     precision: FloatArray  #: Lambda
     always: BoolArray  #: estimated however little the records tell
+    never: BoolArray  #: considered whatever they seem to tell: what the equations leave out is no evidence
 
     def estimated(self, posterior: FloatArray) -> BoolArray:
         """Which are estimated, by their posterior variance if all were."""
-        return np.asarray((np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED) | self.always)
+        told = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
+        return np.asarray((told | self.always) & ~self.never)
 
     @staticmethod
     def none(points: int) -> Prior:
         """Points without parameters of their own."""
-        return Prior(np.zeros((points, 0)), np.zeros((points, 0)), np.zeros((points, 0), dtype=bool))
+        none, nothing = np.zeros((points, 0)), np.zeros((points, 0), dtype=bool)
+        return Prior(none, none, nothing, nothing)
 
 
 @dataclass

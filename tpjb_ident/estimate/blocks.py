@@ -7,7 +7,7 @@ a factor of one row, and a channel that is dead is a row that is missing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,32 @@ class Sensor:
 
 
 @dataclass(frozen=True)
+class RigStiffness:
+    """Dynamic stiffness of the rig without its bearing, at F frequencies: what hoses, seals and cables carry."""
+
+    omega: FloatArray = field(default_factory=lambda: np.zeros(0))  #: (F,), rad/s, rising
+    h: ComplexArray = field(default_factory=lambda: np.zeros((0, 2, 2), complex))  #: (F, 2, 2), N/m
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 8, 8)))  #: (F, 8, 8), (N/m)^2
+
+    def weights(self, omega: FloatArray) -> FloatArray:
+        """Weights of the frequencies at `omega` (n,), linear between them, (n, F); zero where it is not known."""
+        weights = np.zeros((len(omega), len(self.omega)))
+        for k in range(len(self.omega)):
+            weights[:, k] = np.interp(omega, self.omega, np.arange(len(self.omega)) == k)
+        return weights * self.known(omega)[:, None]
+
+    def known(self, omega: FloatArray) -> BoolArray:
+        """Whether the rig was measured about `omega` (n,), (n,)."""
+        if not len(self.omega):
+            return np.zeros(len(omega), dtype=bool)
+        return np.asarray((omega >= 0.98 * self.omega[0]) & (omega <= 1.02 * self.omega[-1]))
+
+    def at(self, omega: FloatArray) -> ComplexArray:
+        """H at `omega` (n,), (n, 2, 2) [N/m]; zero where it is not known."""
+        return np.asarray(np.einsum("nf,fij->nij", self.weights(omega), self.h))
+
+
+@dataclass(frozen=True)
 class Rig:
     """Sensors in the order of the rows, and the housing that they stand on."""
 
@@ -43,6 +69,8 @@ class Rig:
     mass_uncertainty: float = 0.0
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
     apart: tuple[Condition, ...] = ()  #: what gains said that are since taken as uncertain as they differ
+    late: tuple[Condition, ...] = ()  #: what the housing said of cells that are since taken as late as they may be
+    bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""

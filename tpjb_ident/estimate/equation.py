@@ -4,7 +4,7 @@ Rows are the sensors and two equations of the housing; columns the true displace
 free in every block::
 
     probe j           (  n_j^T       ,  0         )
-    cell j            (  n_j^T h     , -m n_j^T   )       F_cell = F_oil - m a, Eq. (13)
+    cell j            (  n_j^T h     , -m n_j^T   )       F_cell = F_oil - m a, Eq. (13); h with the bare rig's
     accelerometer j   (  0           ,  n_j^T     )
     housing, cells    (  w^2 C h     ,  I - w^2 m C )     a + w^2 C F_cell = 0: it stands on its cells
     housing, floating ( -kappa w^2 I ,  I         )       a = w^2 d: it hangs, and the shaft stands still
@@ -40,13 +40,14 @@ class State:
     factor: ComplexArray  #: (n, m): T
     shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
     u: ComplexArray  #: (n, 4): true motion
+    bare: ComplexArray  #: (n, 2, 2), N/m: the rig beside the film
     parameters: dict[str, FloatArray] = field(default_factory=dict)  #: by term
 
     def at_run(self, blocks: Blocks) -> ComplexArray:
-        """H of every block at its run's own load, (n, 2, 2)."""
+        """H of every block at its run's own load, what the rig carries beside the film with it, (n, 2, 2)."""
         known = self.slope_known[blocks.point][:, None, None]
         change = blocks.miss.real[:, None, None] * self.slope[blocks.point]
-        return self.h[blocks.point] + np.where(known, change, 0.0)
+        return self.h[blocks.point] + np.where(known, change, 0.0) + self.bare
 
     def factor_rows(self, rows: ComplexArray) -> ComplexArray:
         """T times rows (n, m + 2, ..)."""

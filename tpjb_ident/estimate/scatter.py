@@ -1,8 +1,9 @@
 """How much runs differ beyond their records' noise, and which of them stand apart.
 
 Blocks carry a bisquare weight on the campaign's scale, in points where enough good runs remain: one bad run of five is
-found because the other points say what is usual. The scatter of the force from run to run is found by moments, pooled
-over all points; a point whose runs differ clearly more than the others' has one of its own.
+found because the other points say what is usual. The scatter of the force from run to run has four components
+(`force_scatter`), found by moments and pooled over all points, taken as alike as far as the runs do not tell them
+apart; a point whose runs differ clearly more than the others' has scatter of its own.
 """
 
 from __future__ import annotations
@@ -14,9 +15,15 @@ from scipy.special import chdtr, fdtrc, fdtri
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import totals
+from tpjb_ident.estimate.force_scatter import COMPONENTS
 
 #: Real force equations of a block.
 FORCE_ROWS = 4.0
+#: Degrees of freedom that the mean of all components counts as in each of them: simulated with runs that differ in
+#: stiffness, in all of H, in gains of the axes or in every number, 3 to 8 directions; 4 leaves stiffness too narrow.
+_ALIKE = 1.0
+#: Spare equations that tell a scatter, at least.
+_LEAST_SPARE = 0.5
 #: Distance over its usual size at which a block has no weight.
 _NO_WEIGHT = 3.0
 #: Probability of chance below which a run of few has no weight.
@@ -42,34 +49,40 @@ class Residuals:
     chi_square: FloatArray
     rows: FloatArray  #: real equations beyond the unknown motion
     leverage: FloatArray  #: share of them that the point's numbers take
-    force: FloatArray  #: chi-square of the force equations alone, of four real rows
-    information: FloatArray  #: what a scatter of the force of variance one adds to it
+    force: FloatArray  #: (n, 4): chi-square of the force equations along every component of the scatter
+    information: FloatArray  #: (n, 4): what a scatter of the force of variance one adds to it
+    taken: FloatArray  #: (n, 4): degrees of freedom that the point's numbers take of it
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Relative variance of the force from run to run by point, and the blocks' weights."""
+    """Relative variance of the force from run to run by component, and the blocks' weights."""
 
-    variance: FloatArray  #: (P,)
+    variance: FloatArray  #: (P, 4)
     weights: FloatArray  #: (n,)
-    pooled: float
-    spare: float  #: degrees of freedom of the pooled variance
+    pooled: FloatArray  #: (4,)
+    spare: FloatArray  #: (4,): degrees of freedom of the pooled variances
     own: BoolArray  #: (P,): points with a scatter of their own
     own_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
     judges: bool = True  #: whether blocks that stand apart lose their weight
     follows: bool = True  #: whether it is found in the solve
+    usual: float = _USUAL**2  #: what a good rig has: counts where few runs tell
     together: bool = False  #: whether blocks are judged all together: what they have in common is no point's
 
     @staticmethod
     def none(points: int, blocks: int) -> Scatter:
         """No scatter, all blocks count."""
-        zero = np.zeros(points)
-        return Scatter(zero, np.ones(blocks), 0.0, 0.0, np.zeros(points, dtype=bool), zero)
+        none = np.zeros(points, dtype=bool)
+        zero = np.zeros((points, COMPONENTS))
+        return Scatter(zero, np.ones(blocks), np.zeros(COMPONENTS), np.zeros(COMPONENTS), none, np.zeros(points))
 
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom of the pooled variance."""
-        return max(self.spare, 1.0)
+    def freedom(self, point: int, components: list[int]) -> float:
+        """Degrees of freedom of the mean of some components of a point, Welch and Satterthwaite."""
+        if self.own[point]:
+            return max(float(self.own_spare[point]), 1.0)
+        share = self.variance[point, components] / max(float(self.variance[point, components].sum()), 1e-300)
+        each = np.maximum(np.minimum(self.spare[components] + _ALIKE, self.spare.sum()), 1.0)
+        return float(1 / max(float(np.sum(share**2 / each)), 1e-12))
 
     @staticmethod
     def unjudged(groups: int, blocks: int) -> Scatter:
@@ -79,12 +92,13 @@ class Scatter:
     def kept(self, groups: int, weights: FloatArray) -> Scatter:
         """Pooled scatter for other groups of the same blocks, with weights (n,); both stay."""
         none, one = np.zeros(groups, dtype=bool), np.ones(groups)
-        return Scatter(self.pooled * one, weights, self.pooled, self.spare, none, one, judges=False, follows=False)
+        variance = np.tile(self.pooled, (groups, 1))
+        return Scatter(variance, weights, self.pooled, self.spare, none, one, judges=False, follows=False)
 
-    def updated(self, group: IntArray, fit: Residuals, solvable: BoolArray, count: int, numbers: int) -> Scatter:
+    def updated(self, group: IntArray, fit: Residuals, solvable: BoolArray, count: int) -> Scatter:
         """Weights after the first step, scatter from the third on.
 
-        `group` (n,): point of every block, `solvable` (P,), `numbers`: unknowns of a point.
+        `group` (n,): point of every block, `solvable` (P,).
         """
         if not self.follows:
             return self
@@ -97,18 +111,20 @@ class Scatter:
         used = weights > 0.05
         # where too few good runs remain all count in full, and nothing has to be made up for
         kept = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
-        chi = totals(group, kept * fit.force, points)
-        rows = FORCE_ROWS * totals(group, np.asarray(used), points)
-        information = totals(group, kept * fit.information, points)
-        spare = np.where(solvable, rows - numbers, 0.0)
-        told = (spare > 0) & (information > 0)
+        chi = _by_point(group, kept[:, None] * fit.force, points)
+        rows = totals(group, np.asarray(used), points)[:, None]
+        information = _by_point(group, kept[:, None] * fit.information, points)
+        spare = np.where(solvable[:, None], rows - _by_point(group, used[:, None] * fit.taken, points), 0.0)
+        told = (spare > _LEAST_SPARE) & (information > 0)
         gain = np.where(told, information * spare / np.maximum(rows, 1.0), 1.0)
-        unusual = _unusual(chi, spare, told, self.own)
-        pooled, freedom = self._pooled(chi, spare, gain, told & ~unusual)
+        unusual = _unusual(
+            np.sum(chi * told, axis=1), np.sum(spare * told, axis=1), np.asarray(told.any(axis=1)), self.own
+        )
+        pooled, freedom = self._pooled(chi, spare, gain, told & ~unusual[:, None])
         # weights come to rest before a point's runs are said to differ more than the others'
         own = unusual if count >= _OWN_FROM else self.own
-        variance = np.full(points, pooled)
-        excess = self.variance + (chi - spare) / gain
+        variance = np.tile(pooled, (points, 1))
+        excess = _alike(np.maximum(self.variance + np.where(told, (chi - spare) / gain, 0.0), 0.0), spare)
         variance[own] = np.maximum(excess[own], pooled)
         runs = totals(group, used, points)
         own_spare = np.maximum(runs - 2.0, 1.0)
@@ -116,14 +132,17 @@ class Scatter:
             self, variance=variance, weights=weights, pooled=pooled, spare=freedom, own=own, own_spare=own_spare
         )
 
-    def _pooled(self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray) -> tuple[float, float]:
-        """Variance that all points share, by moments, and its degrees of freedom; the usual one counts a little."""
+    def _pooled(
+        self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Variances that all points share (4,), by moments, and their degrees of freedom."""
         if not told.any():
-            return max(self.pooled, _USUAL**2), 0.0
-        moment = max(0.0, self.pooled + float((chi - spare)[told].sum()) / float(gain[told].sum()))
-        freedom = float(spare[told].sum())
+            return np.maximum(self.pooled, self.usual), np.zeros(COMPONENTS)
+        freedom, excess, weight = (np.sum(values * told, axis=0) for values in (spare, chi - spare, gain))
+        moment = np.maximum(0.0, self.pooled + excess / np.maximum(weight, 1e-300))
+        moment = _alike(moment, freedom)
         # what a good rig has is added where few runs tell: a mean of both would shrink what they show
-        usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + freedom) * _USUAL**2
+        usual = _USUAL_FREEDOM / (_USUAL_FREEDOM + float(freedom.sum())) * self.usual
         return moment + usual, freedom
 
     def _weights(self, group: IntArray, fit: Residuals, judged: BoolArray) -> FloatArray:
@@ -140,6 +159,30 @@ class Scatter:
         good = totals(group, np.asarray(weights > _GOOD), points)
         few = good < np.maximum(_MIN_GOOD, _SHARE * runs)
         return np.where(few[group], 1.0, weights)
+
+
+def _alike(moment: FloatArray, freedom: FloatArray) -> FloatArray:
+    """Variances of the components (.., 4) of some freedom, drawn towards their mean."""
+    weight = freedom + 1e-9
+    mean = np.sum(weight * moment, axis=-1, keepdims=True) / np.sum(weight, axis=-1, keepdims=True)
+    return np.asarray((freedom * moment + _ALIKE * mean) / (freedom + _ALIKE))
+
+
+def _by_point(group: IntArray, values: FloatArray, points: int) -> FloatArray:
+    """Sums of the columns of values (n, 4) by point, (P, 4)."""
+    return np.stack([totals(group, column, points) for column in values.T], axis=1)
+
+
+def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
+    """Welch-Satterthwaite degrees of freedom of variances made of two parts.
+
+    `total`, `repeat` (8,), `dof_between` (8,).
+    """
+    between = np.maximum(total - repeat, 0.0)
+    spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
+    with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
+        dof = total**2 / spread
+    return np.where(np.isfinite(dof), np.maximum(dof, 1.0), max(dof_repeat, 1.0))
 
 
 def _expected(rows: FloatArray) -> FloatArray:

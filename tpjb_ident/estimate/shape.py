@@ -6,13 +6,15 @@ band shares one departure from such a model. Sines, lines of a multi-sine and gr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.arrowhead import NUMBERS
 from tpjb_ident.estimate.scatter import Scatter
+from tpjb_ident.estimate.term import Fitted
 
 #: Matrices of a model over frequency, four numbers each.
 MODELS = {"K-C": 2, "K-C-M": 3}
@@ -26,6 +28,7 @@ class Shape:
     columns: FloatArray | None = None  #: (P, 8, k); None: x is h itself
     count: int = 0  #: groups at least: the last may have no point
     scatter: Scatter | None = None  #: to begin with; None: none, and blocks are judged
+    held: Mapping[str, Fitted] = field(default_factory=dict)  #: terms by name, as another solve left them
 
     @property
     def groups(self) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
@@ -24,10 +24,11 @@ from tpjb_ident.estimate.equation import (
     motion_matrix,
     with_factor,
 )
+from tpjb_ident.estimate.force_scatter import AHEAD, IN_PHASE, AlongForce, ForceScatter
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
 from tpjb_ident.estimate.parameters import Table
-from tpjb_ident.estimate.scatter import Residuals, Scatter
+from tpjb_ident.estimate.scatter import Residuals, Scatter, mixed_dof
 from tpjb_ident.estimate.shape import Shape
 from tpjb_ident.estimate.term import Additive, Fitted, Term
 
@@ -58,13 +59,32 @@ class Solution:
     chi_square: FloatArray  #: (P,): of the blocks' equations, reduced
     spare: FloatArray  #: (P,): real equations beyond the unknowns
     weights: FloatArray = field(repr=False)  #: (n,): of the blocks
-    scatter_share: FloatArray = field(repr=False)  #: (n,): of the force equations' variance that is the runs' scatter
+    scatter_share: FloatArray = field(repr=False)  #: (n, 4): of the components' variance that is the runs' scatter
     factor: ComplexArray = field(repr=False)  #: (n, m): what multiplies the readings of every block
     shift: ComplexArray = field(repr=False)  #: (n, m), SI: what is in the readings beside the motion's part
     run_change: ComplexArray = field(repr=False)  #: (n, 2, 2), N/m: H of a run beside that of its point
     motion: ComplexArray = field(repr=False)  #: (n, 4): true displacement and acceleration
     housing_noise: float  #: scatter of the housing's equations over its acceleration
     steps: int
+
+    def freedom(self, group: int, chosen: BoolArray, noise_dof: float) -> FloatArray:
+        """Degrees of freedom of a group's random part (k,): its records' noise and its runs' scatter.
+
+        `chosen` (n,): its blocks, `noise_dof`: real ones of their noise.
+        """
+        total = np.diag(self.records[group])
+        if not chosen.any():
+            return np.full(len(total), noise_dof)
+        weights = np.maximum(self.weights[chosen], 1e-9)
+        share = np.average(self.scatter_share[chosen], axis=0, weights=weights)
+        dof = np.zeros(len(total))
+        for k in range(len(total)):
+            # stiffness and mass show in phase with the motion, damping ahead of it
+            of_number = list(AHEAD if k // 4 == 1 else IN_PHASE)
+            repeat = (1 - share[of_number].mean()) * total[k]
+            between = np.array(self.scatter.freedom(group, of_number))
+            dof[k] = mixed_dof(total[k], repeat, noise_dof, between)
+        return dof
 
     def words(self) -> tuple[str, ...]:
         """What the records tell of the terms' parameters."""
@@ -92,7 +112,7 @@ class Solver:
         self.group = self.shape.group[blocks.point]
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
-        self.shared = Table([term for term in self.terms if not term.points], 1)
+        self.shared = Table([term for term in self.terms if not term.points], 1, held=self.shape.held)
         self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
@@ -107,12 +127,11 @@ class Solver:
 
     def run(self) -> Solution:
         """Steps until H rests."""
-        last: Step | None = None
         count = 0
         # runs that stand apart are told at the robust start, before one of them pulls the others away
-        self.scatter = self._scatter(self._sums(None)[1], 0)
+        self.scatter = self._scatter(self._sums(first=True)[1], 0)
         for count in range(1, _STEPS + 1):
-            sums, fit = self._sums(last)
+            sums, fit = self._sums()
             last = step(sums, self.shared.prior(), self.own.prior())
             change = self._move(last)
             if count == 3:
@@ -121,7 +140,7 @@ class Solver:
                 self.scatter = self._scatter(fit, count)
             elif count > 3 and change < _CONVERGED:
                 break
-        sums, fit = self._sums(last)
+        sums, fit = self._sums()
         last = step(sums, self.shared.prior(), self.own.prior())
         return self._solution(last, fit, count)
 
@@ -131,7 +150,7 @@ class Solver:
         return table.of(term, table.value)
 
     def _scatter(self, fit: Residuals, count: int) -> Scatter:
-        return self.scatter.updated(self.group, fit, self.answered, count, self.shape.numbers)
+        return self.scatter.updated(self.group, fit, self.answered, count)
 
     def _housing_misfit(self) -> ComplexArray:
         """What the housing's equations leave at the fitted motion, (n, 2)."""
@@ -152,7 +171,7 @@ class Solver:
         for first in range(0, max(len(self.blocks), 1), _CHUNK):
             yield slice(first, first + _CHUNK)
 
-    def _sums(self, last: Step | None) -> tuple[Sums, Residuals]:
+    def _sums(self, first: bool = False) -> tuple[Sums, Residuals]:
         numbers = self.shape.numbers + self.own.value.shape[1]
         sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
         fits = []
@@ -169,12 +188,14 @@ class Solver:
                 np.concatenate([rows.J_h, rows.J_own], axis=2) * weight[:, None, None],
                 rows.J_t * weight[:, None, None],
             )
-            fits.append(self._fit(group, rows, weight**2, last))
-        if last is None:  # a point whose readings leave a number untold has no answer
+            fits.append((group, rows, weight**2))
+        if first:  # a point whose readings leave a number untold has no answer
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        joined = (np.concatenate([getattr(f, name) for f in fits]) for name in Residuals.__dataclass_fields__)
+        given = np.asarray(np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers]), dtype=float)
+        parts = [_fit(rows, weight, given[group]) for group, rows, weight in fits]
+        joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 
     def _state(self, blocks: Blocks, places: slice, slope: ComplexArray, known: BoolArray) -> State:
@@ -188,6 +209,7 @@ class Solver:
             np.ones((n, m), complex),
             np.zeros((n, m + HOUSING_ROWS), complex),
             self.u[places],
+            self.rig.bare.at(blocks.omega),
             {term.name: self._value(term) for term in self.terms},
         )
         self._apply(blocks, state, additive=False)
@@ -204,7 +226,10 @@ class Solver:
     def _rows(self, blocks: Blocks, state: State, scatter: FloatArray) -> _Rows:
         """Equations of blocks without their motion, real and of unit variance; the state's motion is renewed."""
         rig = self.rig
-        N = covariance(rig, blocks, state, scatter, self.housing_noise)
+        N = covariance(rig, blocks, state, scatter.mean(axis=1), self.housing_noise)
+        # of the same motion as N, which holds their mean
+        motion, sizes = state.u[:, :2], scatter_patterns(blocks, state, np.ones(len(blocks)))
+        forces = film_force_rows(rig, blocks, state, np.stack(sizes, axis=2))
         for term in self.random:
             effects = term.random_effects(blocks, state)
             if effects is not None:
@@ -218,15 +243,16 @@ class Solver:
         white = np.linalg.solve(L, z[:, :, None])
         state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
-        forces = np.stack(scatter_patterns(blocks, state, np.ones(len(blocks))), axis=2)
         own = [term.columns(blocks, state) for term in self.own.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]
         columns = np.concatenate([film, 1j * film, *own, *shared], axis=2)
-        projected = _real(Q2 @ np.linalg.solve(L, columns))
-        remainder = Q2 @ white
-        force = _along_force(Q2 @ np.linalg.solve(L, film_force_rows(rig, blocks, state, forces)), remainder)
-        r = _real(remainder)[:, :, 0]
+        patterns = Q2 @ np.linalg.solve(L, forces)
+        components = ForceScatter.of(patterns, motion, state.at_run(blocks), scatter)
+        projected = components.white(_real(Q2 @ np.linalg.solve(L, columns)))
+        r = components.white(_real(Q2 @ white))[:, :, 0]
         J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
+        J_h = self.shape.mapped(J_h, blocks.point)
+        along = components.along(r, J_h)
         slopes = self._slope_rows(blocks, state)
         if slopes is not None:
             r = np.concatenate([r, slopes[0]], axis=1)
@@ -234,7 +260,7 @@ class Solver:
             more = slopes[0].shape[1]
             J_h, J_own = (np.pad(J, ((0, 0), (0, more), (0, 0))) for J in (J_h, J_own))
         counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
-        return _Rows(r, self.shape.mapped(J_h, blocks.point), J_own, J_t, force, counted, 2 * Q2.shape[1])
+        return _Rows(r, J_h, J_own, J_t, along, counted, 2 * Q2.shape[1])
 
     def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
         """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
@@ -251,15 +277,6 @@ class Solver:
         J = _real(Q2 @ np.linalg.solve(L, columns)) * told[:, None, None]
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
         return r - J @ self.shared.value[0], J
-
-    def _fit(self, group: IntArray, rows: _Rows, weight: FloatArray, last: Step | None) -> Residuals:
-        r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
-        if last is None:
-            leverage = np.zeros(len(group))
-        else:
-            taken = np.einsum("nka,nab,nkb->n", J_h, last.given[group], J_h)
-            leverage = weight * taken / np.maximum(rows.counted, 1.0)
-        return Residuals(np.einsum("nk,nk->n", r, r), rows.counted, leverage, rows.force[:, 0], rows.force[:, 1])
 
     def _move(self, taken: Step) -> float:
         x = taken.h * self.unit
@@ -305,7 +322,7 @@ class Solver:
             chi_square / np.maximum(spare, 1.0),
             spare,
             weight,
-            np.clip(self.scatter.variance[self.group] * fit.information / 4, 0.0, 1.0),
+            np.clip(self.scatter.variance[self.group] * fit.information, 0.0, 1.0),
             *self._apart(),
             self.u,
             self.housing_noise,
@@ -340,9 +357,19 @@ class _Rows:
     J_h: FloatArray  #: (n, k, 8)
     J_own: FloatArray  #: (n, k, L): of the points' own parameters
     J_t: FloatArray  #: (n, k, q)
-    force: FloatArray  #: (n, 2): chi-square of the force equations, and what a scatter of variance one adds to it
+    along: AlongForce
     counted: FloatArray  #: (n,): equations that say something
     block_rows: int  #: of r: the others are those of the clocks
+
+
+def _fit(rows: _Rows, weight: FloatArray, given: FloatArray) -> Residuals:
+    """What is left of blocks of a weight (n,), and what the numbers of their points take; `given` (n, k, k)."""
+    r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
+    given = weight[:, None, None] * given
+    leverage = np.einsum("nka,nab,nkb->n", J_h, given, J_h, optimize=True) / np.maximum(rows.counted, 1.0)
+    taken = np.einsum("nca,nab,ncb->nc", rows.along.J_h, given, rows.along.J_h, optimize=True)
+    chi_square = np.einsum("nk,nk->n", r, r)
+    return Residuals(chi_square, rows.counted, leverage, rows.along.chi_square, rows.along.information, taken)
 
 
 def _regular(R: ComplexArray) -> ComplexArray:
@@ -350,14 +377,6 @@ def _regular(R: ComplexArray) -> ComplexArray:
     size = np.abs(np.einsum("nii->ni", R))
     untold = size <= _UNTOLD * size.max(axis=1, keepdims=True)
     return np.asarray(R + untold[:, :, None] * np.eye(UNKNOWNS), dtype=complex)
-
-
-def _along_force(patterns: ComplexArray, remainder: ComplexArray) -> FloatArray:
-    """Chi-square of the remainder (n, k, 1) along the force patterns (n, k, 2), and the patterns' own, (n, 2)."""
-    unit = np.linalg.qr(patterns)[0].conj().transpose(0, 2, 1)
-    chi_square = 2 * np.sum(np.abs(unit @ remainder) ** 2, axis=(1, 2))
-    information = 2 * np.sum(np.abs(patterns) ** 2, axis=(1, 2))
-    return np.stack([chi_square, information], axis=1)
 
 
 def _real(rows: ComplexArray) -> FloatArray:

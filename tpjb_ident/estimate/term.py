@@ -53,6 +53,8 @@ class Term:
     always_estimated : bool
         Whether its parameters are estimated however little the records tell; else only where they tell clearly more
         than the prior.
+    never_estimated : bool
+        Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
     additive : bool
         Whether it adds to readings, and so is applied after what multiplies them.
 
@@ -65,6 +67,7 @@ class Term:
 
     name = ""
     always_estimated = False
+    never_estimated = False
     additive = False
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:

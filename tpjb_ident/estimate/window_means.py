@@ -117,7 +117,8 @@ def _pooled(
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, devices)
     residual = z - mean[run] - drift[run] * away[:, None]
-    taken = 1.0 + 0.5 * (total >= _DRIFT_WINDOWS)  # the mean, and one complex rate a device of several channels
+    # the mean, and one complex rate a device of several channels
+    taken = 1.0 + 0.5 * ((total >= _DRIFT_WINDOWS) & (spread > 0))
     each = np.maximum(total - taken, 0.0)
     spare = float(each.sum())
     # a channel that some runs lack has fewer residuals: its row and column are scaled alike, which keeps N positive
@@ -177,3 +178,10 @@ def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[
         turn = np.exp(-1j * np.angle(along))
         result[places] = z[places] * turn[:, None]
     return result, wandering
+
+
+def attenuation(D: ComplexArray, count: FloatArray, noise: ComplexArray) -> FloatArray:
+    """Noise power over total power of the displacements D (g, 2) along their principal directions, larger first."""
+    total = count.sum()
+    power = (count[:, None] * D).T @ D.conj() / total + noise * (1 - len(D) / total)
+    return np.sort(np.linalg.eigvals(np.linalg.solve(power, noise)).real)[::-1]

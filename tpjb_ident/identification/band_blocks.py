@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
@@ -139,7 +139,7 @@ def _run_rows(
     noises, freedoms = pooled_noise(responses)
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
     rows: list[tuple[int, dict[str, object]]] = []
-    for place, (bins, response, noise, freedom) in enumerate(zip(groups, responses, noises, freedoms)):
+    for place, (response, noise, freedom) in enumerate(zip(responses, noises, freedoms)):
         covariance = np.zeros((m, m), complex)
         covariance[np.ix_(present, present)] = (noise / response.count + np.diag(least**2))[np.ix_(order, order)]
         covariance /= np.outer(gain, gain)
@@ -147,24 +147,10 @@ def _run_rows(
         z[:, present] = response.z[:, order]
         z = z / gain
         stands = stands_out(z, covariance, freedom, present)
-        rig = point.baseline.at(2 * np.pi * float(spectra.frequencies[bins].mean()))
-        if rig is not None:
-            z = _without_rig(z, channels, rig[0])
         for values in z:
             row = {"z": values, "present": present, "noise": covariance, "dof": freedom, "stands": stands}
             rows.append((place, row))
     return rows
-
-
-def _without_rig(z: ComplexArray, channels: Sequence[Channel | None], rig: ComplexArray) -> ComplexArray:
-    """Responses (k, m) without the force of the rig (2, 2) [N/m] beside the film."""
-    along = axes_of(channels)
-    probes = [j for j, c in enumerate(channels) if c is not None and c.quantity == "displacement"]
-    cells = [j for j, c in enumerate(channels) if c is not None and c.quantity == "force"]
-    motion = z[:, probes] @ np.linalg.pinv(along[probes]).T
-    result = z.copy()
-    result[:, cells] -= motion @ rig.T @ along[cells].T
-    return result
 
 
 def _strengths(sensors: Sequence[Sensor], blocks: Blocks, line: IntArray, lines: int) -> FloatArray:

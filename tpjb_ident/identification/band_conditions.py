@@ -48,7 +48,7 @@ def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Cond
     elif np.median(conditions) > _ILL_CONDITIONED:
         text = f"condition number {np.median(conditions):.0f} (median over the band)"
         flags.append(Condition("ill-conditioned", text))
-    flags += [*_disturbances(point), *_instrument(point, solved, usable), *_baseline(point, solved, usable)]
+    flags += [*_disturbances(point), *_instrument(point, solved, usable), *_baseline(solved, usable)]
     if point.spectra[0].phasors.acceleration is None and point.spectra[0].phasors.housing_mass > 0:
         flags.append(Condition("inertia-not-corrected", "no accelerometers"))
     return tuple(flags)
@@ -76,8 +76,9 @@ def _instrument(point: BandPoint, solved: SolvedBands, usable: np.ndarray) -> li
     return flags
 
 
-def _baseline(point: BandPoint, solved: SolvedBands, usable: np.ndarray) -> list[Condition]:
-    if not point.baseline.estimates:
+def _baseline(solved: SolvedBands, usable: np.ndarray) -> list[Condition]:
+    bare = solved.first.rig.bare
+    if not len(bare.omega):
         return []
-    bare = [k for k in usable if point.baseline.at(float(solved.data.line_omega[k])) is None]
-    return [Condition("baseline-missing", f"at {len(bare)} of {len(usable)} lines of the band")] if bare else []
+    unknown = int((~bare.known(solved.data.line_omega[usable])).sum())
+    return [Condition("baseline-missing", f"at {unknown} of {len(usable)} lines of the band")] if unknown else []

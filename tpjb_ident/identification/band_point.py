@@ -14,7 +14,6 @@ from rigdata.run import Run
 from tpjb_ident.dynamic.broadband.clock_rate import common_rates
 from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
-from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.errors import BadInputError
 
@@ -49,7 +48,6 @@ class BandPoint:
     group: BandGroup
     spectra: list[RunSpectra]
     plan: LinePlan
-    baseline: Baseline
 
     @property
     def point(self) -> OperatingPoint:
@@ -70,7 +68,7 @@ class BandPoint:
 
 
 def read_point(
-    group: BandGroup, housing_mass: float, settings: BandSettings, baseline: Baseline
+    group: BandGroup, housing_mass: float, settings: BandSettings
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
     """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
@@ -84,7 +82,7 @@ def read_point(
             remaining.append(ExcludedRun(run.id, run.point, error))
     if not spectra:
         return None, remaining
-    return BandPoint(group, spectra, line_plan(_alike(spectra)), baseline), remaining
+    return BandPoint(group, spectra, line_plan(_alike(spectra))), remaining
 
 
 def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:

@@ -1,7 +1,8 @@
 """The solve of all bands of a campaign: h of every line, then K-C and K-C-M over each band, and h of its parts.
 
-All are one equation and one set of blocks; only what the points share differs. Scatter and weights are found with the
-lines, whose h is free, and kept: a model that does not hold must not pass for runs that differ.
+All are one equation and one set of blocks; only what the points share differs. Scatter, weights and what the sensors
+share are found with the lines, whose h is free, and stay: a model that does not hold must not pass for runs that
+differ, nor for a gain or a load's direction.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     away = (solution.h - start)[first]
     usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(at_lines).max(axis=(1, 2))
     h[usable] = at_lines[usable] + away[usable]
-    task = replace(task, kept=solution.scatter)
+    task = replace(task, kept=solution)
     models: dict[str, ModelFit] = {}
     parts = _parts(data, used)
     at = np.array([part.omega for part in parts]), np.array([part.band for part in parts], dtype=np.intp)
@@ -111,12 +112,13 @@ class _Task:
     data: BandBlocks
     terms: tuple[Term, ...]
     correct: bool
-    kept: Scatter | None
+    kept: Solution | None  #: whose scatter, weights and shared parameters stay
 
     def solved(self, start: ComplexArray, shape: Shape) -> Solution:
         """One solve from a start (P, 2, 2), NaN where points take no part."""
         if self.kept is not None:
-            shape = replace(shape, scatter=self.kept.kept(shape.groups, self.kept.weights))
+            scatter = self.kept.scatter
+            shape = replace(shape, scatter=scatter.kept(shape.groups, scatter.weights), held=self.kept.fitted)
         return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
 
     def with_gains(self, deviation: FloatArray) -> _Task:
@@ -190,7 +192,7 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
         condition[k] = np.linalg.cond(D[mine])
         if condition[k] < _ONE_LINE:
             h[k] = np.linalg.lstsq(D[mine], F[mine], rcond=None)[0].T
-    return h, condition
+    return h - rig.bare.at(data.line_omega), condition
 
 
 def _middles(data: BandBlocks, used: BoolArray) -> FloatArray:

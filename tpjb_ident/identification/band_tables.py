@@ -12,7 +12,6 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.classic import ClassicLine
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.band_result import BandLine, BandResult
 from tpjb_ident.dynamic.results.frequency_model import FrequencyModel, supported
@@ -20,7 +19,6 @@ from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.dynamic.results.quality import feeds_motion
 from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.estimate.shape import MODELS, real_numbers
-from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
@@ -83,18 +81,6 @@ def shared_by_bands(solved: SolvedBands) -> SharedChanges:
     return shared_changes(solved.first.part, parts)
 
 
-def _freedom(solved: SolvedBands, solution: Solution, group: IntArray, g: int, noise_dof: float) -> FloatArray:
-    """Degrees of freedom of a group's random part; `group` (n,) of the blocks."""
-    mine = (group == g) & (solution.weights > 0)
-    total = np.diag(solution.records[g])
-    if not mine.any():
-        return np.full(len(total), noise_dof)
-    share = float(np.mean(solution.scatter_share[mine]))
-    scatter = solution.scatter
-    spare = scatter.own_spare[g] if scatter.own[g] else scatter.freedom
-    return mixed_dof(total, (1 - share) * total, noise_dof, np.full(len(total), max(spare, 1.0)))
-
-
 def _noise_dof(solved: SolvedBands, chosen: np.ndarray) -> float:
     """Real degrees of freedom of the noise of some blocks."""
     return 2 * float(np.median(solved.data.blocks.dof[chosen])) if chosen.any() else 1.0
@@ -106,16 +92,15 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     classic, solution = solved.classic[k], solved.first.lines
     h, bracket = solved.between([s.h[k] for s in solved.solutions])
     of_line = solved.data.line[solved.data.blocks.point]
-    dof = _freedom(solved, solution, of_line, k, _noise_dof(solved, of_line == k))
+    dof = solution.freedom(k, of_line == k, _noise_dof(solved, of_line == k))
     systematic = np.sum([np.zeros((8, 8)), *(share[k] for share in solution.shares.values())], axis=0)
-    rig = point.baseline.at(omega)
-    systematic = systematic + (0.0 if rig is None else rig[1])
     # a rectangle's standard deviation is half its width by the root of three
     own = systematic + np.diag(bracket**2) / 3
     none, condition = np.empty((0, 2)), float(solved.first.condition[k])
     best = DynamicStiffness(h, omega, solution.records[k], dof, point.method, none, condition=condition, systematic=own)
     table = {point.method: best}
-    others = dict(classic.h)
+    rig = solved.first.rig.bare.at(np.array([omega]))[0]
+    others = {name: value - rig for name, value in classic.h.items()}
     if len(solved.solutions) > 1 and bracket.any():
         others |= {"h1": solved.solutions[0].h[k], "h2": solved.solutions[1].h[k]}
     for name, value in others.items():
@@ -134,7 +119,7 @@ def _model(solved: SolvedBands, name: str, b: int, quiet: bool) -> FrequencyMode
     scale = np.repeat(solved.first.middle[b] ** -np.arange(MODELS[name], dtype=float), 4)
     outer = np.outer(scale, scale)
     shared = np.sum([np.diag(half**2) / 3, *(share[b] for share in first.shares.values())], axis=0)
-    dof = _freedom(solved, first, data.band[data.line[data.blocks.point]], b, _MANY)
+    dof = first.freedom(b, data.band[data.line[data.blocks.point]] == b, _MANY)
     chi_square, spare, probability, misfit = _held_against_parts(solved, name, b)
     unjudged = float("nan")  # without an instrument, the bias of either solve looks like a misfit
     omega = data.line_omega[lines]
@@ -224,13 +209,10 @@ def _estimate(
     h, bracket = solved.between([s.part_h[q] for s in solved.solutions])
     shared = {name: share[q] for name, share in solution.shares.items() if np.any(share[q])}
     own = {"random": solution.records[q]} | {name: shared.pop(name) for name in RUN_TERMS if name in shared}
-    rig = point.baseline.at(part.omega)
-    if rig is not None:
-        shared["baseline"] = rig[1]
     if bracket.any():
         shared["no instrument"] = np.diag(bracket**2) / 3
-    of_part = _part_of_block(solved)
-    dof = _freedom(solved, solution, of_part, q, _noise_dof(solved, of_part == q))
+    of_part = _part_of_block(solved) == q
+    dof = solution.freedom(q, of_part, _noise_dof(solved, of_part))
     condition = float(np.median([line.stiffness.condition for line in result.lines])) if result.lines else np.nan
     covariance, systematic = (np.sum([np.zeros((8, 8)), *parts.values()], axis=0) for parts in (own, shared))
     return DynamicStiffness(

@@ -14,6 +14,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Sensor, stacked
+from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
 
@@ -137,7 +138,6 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
         own: ComplexArray = pool if p.means is None else p.means.noise
         freedom = max(spare + more, 1.0)
         noise = (spare * own + more * pool) / freedom
-        # the inverse of a covariance of few degrees of freedom is too large on average
-        noises.append(np.asarray(noise * max(freedom / max(freedom - m, 1.0), 1.0), complex))
+        noises.append(unbiased_noise(noise, freedom))
         freedoms.append(freedom)
     return noises, np.array(freedoms)

@@ -14,7 +14,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, 
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
 from tpjb_ident.dynamic.runs.finished_runs import RunDigest
 from tpjb_ident.dynamic.runs.point_source import PointSource
-from tpjb_ident.estimate.blocks import Blocks, Rig, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, vector
 from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
@@ -76,6 +76,7 @@ def solve_campaign(
     digests: Sequence[RunDigest],
     workers: Workers,
     correct: bool = True,
+    bare: RigStiffness | None = None,
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
@@ -95,13 +96,13 @@ def solve_campaign(
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
         mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), common)
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount)
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare or RigStiffness())
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
-        rates = _clock_rates(rig, blocks, means)
+        rates = _clock_rates(rig, blocks, _starts(rig, sources, means))
         offsets = {device: offsets.get(device, 0.0) + rate for device, rate in rates.items()}
         task = replace(task, sensors=sensors, rates=offsets)
-    start = np.array([point.start for point in means])
+    start = _starts(rig, sources, means)
 
     def solved(rig: Rig, blocks: Blocks) -> Solution:
         used = [term for term in TERMS if correct or term is not LoadTurn]
@@ -136,8 +137,9 @@ def _with_lag(rig: Rig, solution: Solution) -> Rig:
     lag = 0.0 if housing is None else housing.lag_of_cells(solution.fitted[housing.name])
     if not lag or any(sensor.delay_uncertainty for sensor in rig.sensors):
         return rig
+    assert housing is not None
     sensors = tuple(replace(s, delay_uncertainty=lag) if s.quantity == "force" else s for s in rig.sensors)
-    return replace(rig, sensors=sensors)
+    return replace(rig, sensors=sensors, late=housing.conditions(solution.fitted[housing.name]))
 
 
 def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
@@ -158,10 +160,15 @@ def _film(source: PointSource, point: PointMeans) -> FilmChange:
     return film_change([pair for pair in pairs if pair is not None], point.start)
 
 
-def _clock_rates(rig: Rig, blocks: Blocks, means: Sequence[PointMeans]) -> dict[str, float]:
+def _starts(rig: Rig, sources: Sequence[PointSource], means: Sequence[PointMeans]) -> ComplexArray:
+    """H of the film to start from at every point, (P, 2, 2) [N/m]."""
+    omega = np.array([source.data.omega for source in sources])
+    return np.array([point.start for point in means]) - rig.bare.at(omega)
+
+
+def _clock_rates(rig: Rig, blocks: Blocks, start: ComplexArray) -> dict[str, float]:
     """Rates of the devices' clocks that the blocks show, relative."""
     clock = Clock(rig, blocks)
-    start = np.array([point.start for point in means])
     fitted = Solver(rig, blocks, [Gain(rig, blocks), clock, Housing(rig, blocks)], start).run().fitted
     return clock.rates(fitted[clock.name].value)
 

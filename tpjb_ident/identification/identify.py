@@ -12,7 +12,7 @@ from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
 from tpjb_ident.dynamic.results.quality import with_probe_doubts
-from tpjb_ident.dynamic.runs.baseline import measured_baseline
+from tpjb_ident.dynamic.runs.baseline import DryTest, dry_test
 from tpjb_ident.dynamic.runs.checked_runs import check_finished
 from tpjb_ident.dynamic.runs.excluded_runs import named_runs
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
@@ -82,14 +82,14 @@ def identify(
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
+    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
     if any(is_broadband(run) for run in runs):
-        rig = measured_baseline(campaign, settings.phasors, own_method(settings.method))
-        bands = identify_bands(campaign, _band_settings(settings), report, rig)
+        bands = identify_bands(campaign, _band_settings(settings), report, dry.stiffness)
     if not sines.of_kind("dynamic"):
         identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
     else:
         finished = all_runs(sines, settings.phasors, report, workers, store)
-        identification = assemble(sines, finished, settings, report, workers)
+        identification = assemble(sines, finished, settings, report, workers, dry)
     identification = identification if bands is None else _with_bands(identification, bands)
     return _with_zero_uncertainty(identification, campaign)
 
@@ -139,17 +139,18 @@ def assemble(
     settings: IdentifySettings,
     report: Progress,
     workers: Workers | None = None,
+    dry: DryTest | None = None,
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
-    baseline = measured_baseline(campaign, settings.phasors, own_method(settings.method))
-    sources = point_sources(finished, baseline)
+    dry = dry or dry_test(campaign, settings.phasors, own_method(settings.method))
+    sources = point_sources(finished)
     report("estimating", 0, len(sources))
-    solved = solve_campaign(campaign, sources, digests, workers, settings.correct)
+    solved = solve_campaign(campaign, sources, digests, workers, settings.correct, dry.stiffness)
     temperatures = {digest.run: digest.temperatures for digest in digests}
-    task = PointTask(settings, solved.task, temperatures, checked)
+    task = PointTask(settings, solved.task, temperatures, checked, dry)
     jobs = [(source, point_share(solved, source, p)) for p, source in enumerate(sources)]
     points = []
     for point in map_ordered(workers, finished_point, jobs, task):

@@ -17,10 +17,9 @@ from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
 from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
 from tpjb_ident.dynamic.results.band_result import BandResult
-from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, points_without_runs, without_runs
-from tpjb_ident.estimate.blocks import Rig, Sensor
+from tpjb_ident.estimate.blocks import Rig, RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
@@ -48,7 +47,7 @@ class IdentifiedBands:
 
 
 def identify_bands(
-    campaign: Campaign, settings: BandSettings, progress: Progress, baseline: Baseline | None = None
+    campaign: Campaign, settings: BandSettings, progress: Progress, bare: RigStiffness | None = None
 ) -> IdentifiedBands:
     """Identify every operating point of a campaign that was excited over a band."""
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
@@ -59,14 +58,14 @@ def identify_bands(
     ]
     points: list[BandPoint] = []
     for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
-        point, bad = read_point(group, campaign.housing_mass, settings, baseline or Baseline())
+        point, bad = read_point(group, campaign.housing_mass, settings)
         remaining += bad
         points += [] if point is None else [point]
     if not points:
         raise remaining[0].error
     zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
-    solved = _solved(campaign, points, (misses, common), settings)
+    solved = _solved(campaign, points, (misses, common), settings, bare or RigStiffness())
     results = []
     for b, point in enumerate(points):
         conditions = load_conditions(misses[b], common) + zero.conditions()
@@ -84,7 +83,11 @@ def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation
 
 
 def _solved(
-    campaign: Campaign, points: list[BandPoint], loads: tuple[list[LoadMiss], complex], settings: BandSettings
+    campaign: Campaign,
+    points: list[BandPoint],
+    loads: tuple[list[LoadMiss], complex],
+    settings: BandSettings,
+    bare: RigStiffness,
 ) -> SolvedBands:
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
     sensors = _sensors(campaign, points)
@@ -98,7 +101,7 @@ def _solved(
         instruments = [_INSTRUMENTS[point.method][turn] for point in points]
         own = band_blocks(points, sensors, loads[0], temperatures, instruments)
         own = own.with_film(points, settings.clearance) if settings.clearance else own
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty)
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare)
         mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads[1])
         solutions.append(solve_bands(replace(rig, mount=mount), own, settings.correct, _told(points, own, classic)))
         data = data or own

@@ -13,9 +13,9 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss, load_conditions
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, not_locked
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.estimators.uncertainty import mixed_dof
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
 from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.runs.baseline import DryTest
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions
 from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
 from tpjb_ident.dynamic.runs.point_source import PointSource
@@ -61,6 +61,7 @@ class PointTask:
     means: MeansTask
     temperatures: dict[str, dict[int, float]]
     checked: Verdicts
+    dry: DryTest
 
 
 def point_share(solved: CampaignSolution, source: PointSource, p: int) -> PointShare:
@@ -125,7 +126,8 @@ def _estimate(
     for name in RUN_TERMS:
         if name in solution.shares:
             budget[name] = solution.shares[name][p]
-    dof = _freedom(solved, p)
+    mine = solved.blocks.point == p
+    dof = solution.freedom(p, mine, 2 * float(np.median(solved.blocks.dof[mine])))
     if p in solved.mains:
         fit = solved.mains[p]
         budget["mains"] = fit.covariance
@@ -136,7 +138,7 @@ def _estimate(
     if p in solved.in_cells:
         common["mains on the cells"] = solved.in_cells[p]
     weights = window_weight * run_weight[_run_index(source, window_weight)]
-    omega = float(np.median(solved.blocks.omega[solved.blocks.point == p]))
+    omega = float(np.median(solved.blocks.omega[mine]))
     estimate = DynamicStiffness(
         solved.h[p],
         omega,
@@ -157,17 +159,6 @@ def _estimate(
 def _run_index(source: PointSource, window_weight: FloatArray) -> np.ndarray:
     index = source.data.run_index
     return index if len(index) == len(window_weight) else np.zeros(len(window_weight), dtype=int)
-
-
-def _freedom(solved: CampaignSolution, p: int) -> FloatArray:
-    """Degrees of freedom of the random part (8,): the records' noise and the runs' scatter, Welch and Satterthwaite."""
-    scatter = solved.solution.scatter
-    mine = solved.blocks.point == p
-    noise_dof = float(np.median(solved.blocks.dof[mine])) * 2
-    total = np.diag(solved.solution.records[p])
-    share = float(np.average(solved.solution.scatter_share[mine], weights=np.maximum(scatter.weights[mine], 1e-9)))
-    spare = scatter.own_spare[p] if scatter.own[p] else scatter.freedom
-    return mixed_dof(total, (1 - share) * total, noise_dof, np.full(8, max(spare, 1.0)))
 
 
 def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans) -> tuple[Condition, ...]:
@@ -192,11 +183,10 @@ def finished_point(task: PointTask, source: PointSource, share: PointShare) -> P
     figures = point_figures(_without_shaft_remarks(corrected, share), settings, by_method, share.mains_in_cells)
     bent = change_conditions(share.film, share.amplitude_left, best, figures.amplitude, settings.clearance)
     checks = check_conditions(task.checked, [run.run for run in recorded.runs])
-    missing = source.baseline.missing(recorded)
+    missing = task.dry.missing(recorded.omega)
     conditions = merged(share.conditions, missing, bent, checks)
-    budget = share.budget | source.baseline.spread(recorded)
     figures = replace(figures, conditions=merged(figures.conditions, conditions))
-    return _result(task, recorded, by_method, figures, replace(share, budget=budget))
+    return _result(task, recorded, by_method, figures, share)
 
 
 def _without_shaft_remarks(data: PointData, share: PointShare) -> PointData:

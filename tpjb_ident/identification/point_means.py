@@ -12,19 +12,16 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.errors_in_variables import attenuation
-from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.sensors import alive
-from tpjb_ident.estimate.window_means import WindowMeans, window_means
+from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_means
 from tpjb_ident.phasors.shaft import shaft_order
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
-#: A run with less than this share of its windows accepted differs as a whole: its windows are judged among themselves.
-_ACCEPTED = 0.2
 #: Share of the windows of a run's best channel in which a channel has a phasor, at least, to count as recorded.
 _LEAST_WINDOWS = 0.4
 #: A window whose phasors are below this share of its run's loud ones (nine in ten are less loud) has no drive.
@@ -40,7 +37,6 @@ class PointMeans:
     start: ComplexArray  #: (2, 2), N/m: NaN where the windows give none
     means: WindowMeans | None
     channels: tuple[tuple[Channel | None, ...], ...]  #: (g, m): None where a run says nothing of a sensor
-    mean_load: FloatArray  #: (g, 2), N
     load_error: FloatArray  #: (g,), N: standard error of the mean load's size
     condition: float
     attenuation: FloatArray = field(repr=False)  #: (2,)
@@ -70,7 +66,7 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     present = np.array([[channel is not None for channel in run] for run in channels])
     D, F = vectors(z, data, task)
     table = phasor_table(D, F, data.run_index)
-    loads, errors = _loads(data)
+    errors = _load_errors(data)
     weights, start, status = _robust_start(table)
     means = window_means(z, data.run_index, time, [s.device for s in task.sensors], weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
@@ -79,7 +75,7 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     residual = _residual_density(data, task)
     usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
     more = (status, shaft, conditions)
-    return PointMeans(start, means, channels, loads, errors, condition, attenuation, residual, usable, *more)
+    return PointMeans(start, means, channels, errors, condition, attenuation, residual, usable, *more)
 
 
 def _residual_density(data: PointData, task: MeansTask) -> tuple[ComplexArray, float]:
@@ -123,8 +119,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
 def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tuple[tuple[Channel | None, ...], ...]]:
     """Phasors of the windows channel by channel (n, m), NaN where there is none, and the channels of each run (g, m).
 
-    What is known of a channel is taken off: the drift of its gain with the run's temperature, in the cells the rig
-    without its bearing.
+    The drift of a channel's gain with the run's temperature is taken off as far as it is known.
     """
     rows: list[ComplexArray] = []
     described: list[list[Channel | None]] = []
@@ -145,9 +140,6 @@ def channel_windows(data: PointData, task: MeansTask) -> tuple[ComplexArray, tup
         described.append(channels)
     z = _without_dead(np.concatenate(rows), task)
     alive = np.array([np.isfinite(z[data.run_index == g]).any(axis=0) for g in range(len(data.runs))])
-    if data.rig is not None:
-        cells = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "force"]
-        z[:, cells] -= data.D @ data.rig.T @ task.along[cells].T
     living = []
     for g, run_channels in enumerate(described):
         living.append(tuple(c if alive[g, j] else None for j, c in enumerate(run_channels)))
@@ -238,26 +230,19 @@ def _robust_start(table: PhasorTable) -> tuple[FloatArray, ComplexArray, tuple[C
         weights[table.valid] = 1.0
         return weights, none, ()
     fit = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)
-    good = fit.weights.copy()
-    size = np.bincount(table.direction, minlength=table.n_directions)
-    share = np.bincount(table.direction, weights=good > 0.2, minlength=table.n_directions) / size
-    # a run as a whole is no outlier of the windows: the scatter of runs, or the weight of its block, takes it
-    good[(share < _ACCEPTED)[table.direction]] = 1.0
-    weights[table.valid] = good
+    weights[table.valid] = within_directions(fit.weights, table.direction)
     # few windows have no robust start; their runs are judged beside those of the other points all the same
     conditions = tuple(c for c in fit.conditions if c != "no-robust-start")
     return weights, fit.coefficients * table.h_scale, conditions
 
 
-def _loads(data: PointData) -> tuple[FloatArray, FloatArray]:
-    """Mean cell force of every run (g, 2), and the standard error of its size (g,) [N]."""
-    means, errors = [], []
+def _load_errors(data: PointData) -> FloatArray:
+    """Standard error of the size of every run's mean cell force, (g,) [N]."""
+    errors = []
     for run in data.runs:
         rows = run.cell_force.mean[np.isfinite(run.cell_force.mean).all(axis=1)]
-        means.append(rows.mean(axis=0) if len(rows) else np.full(2, np.nan))
-        spread = np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows)) if len(rows) > 1 else 0.0
-        errors.append(float(spread))
-    return np.array(means), np.array(errors)
+        errors.append(float(np.linalg.norm(rows.std(axis=0, ddof=1)) / np.sqrt(len(rows))) if len(rows) > 1 else 0.0)
+    return np.array(errors)
 
 
 def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:

@@ -47,6 +47,10 @@ _AGREE = 0.15
 _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
 #: An image so near to a line of the record [1 / record length] may be what a drift leaves of that.
 _NEAR = 8.0
+#: An image of less than this share of what it would be is none.
+_MISSING = 0.3
+#: The largest peaks are tried as images, so many.
+_TRIED = 24
 #: Rates that divide the export's rate to this share do so exactly.
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
@@ -95,18 +99,18 @@ def filled_channels(records: tuple[WholeRecord, ...], result: RunPhasors) -> dic
             sizes = np.abs(np.nan_to_num(record.z[:, column]))
             floor = noise_floor(amplitude[:, column])
             for strong in np.argsort(-sizes)[:2]:
-                line = record.lines.whole[strong].frequency, float(sizes[strong])
-                found = _images_of(line, amplitude[:, column], floor, record)
+                found = _images_of(int(strong), sizes, amplitude[:, column], floor, record)
                 if found is not None:
                     slower.setdefault(result.channels[place].name, found)
     return slower
 
 
 def _images_of(
-    line: tuple[float, float], amplitude: FloatArray, floor: FloatArray, record: WholeRecord
+    strong: int, sizes: FloatArray, amplitude: FloatArray, floor: FloatArray, record: WholeRecord
 ) -> SlowerChannel | None:
-    """Rate and order of filling by a pair of images of one line (frequency [Hz], size)."""
-    frequency, size = line
+    """Rate and order of filling by a pair of images of one line of the record; `sizes` (n_whole_lines,)."""
+    line, size = record.lines.whole[strong], float(sizes[strong])
+    frequency, first, driven = line.frequency, line.frequency / (line.order or 1), line.name == "excitation"
     least = np.maximum(_CLEAR * floor, _SHARE * size)
     if not np.isfinite(least).all() or size <= 0:
         return None
@@ -114,11 +118,14 @@ def _images_of(
     top = (inside > least[1:-1]) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
     peaks = np.flatnonzero(top) + 1
     peaks = peaks[(peaks > 1.2 * frequency * record.duration) & _is_free(peaks, record)]
-    for low in peaks[np.argsort(-amplitude[peaks])][:8]:
+    for low in peaks[np.argsort(-amplitude[peaks])][:_TRIED]:
         rate = low / record.duration + frequency
         mirror = record.rate - (rate + frequency) if rate + frequency > record.rate / 2 else rate + frequency
         around = np.round(mirror * record.duration).astype(int) + np.arange(-1, 2)
         if around.min() < 1 or around.max() >= len(amplitude) - 1 or not _is_free(around, record).all():
+            continue
+        # shaft and mains have orders of their own, beside one another
+        if not driven and abs((rate + 0.5 * first) % first - 0.5 * first) * record.duration < _NEAR:
             continue
         high = int(around[np.argmax(amplitude[around])])
         orders = [
@@ -126,13 +133,32 @@ def _images_of(
             for k, sign in ((low, -1), (high, 1))
         ]
         order = min(_ORDERS, key=lambda n: abs(n - orders[0]))
-        if amplitude[high] > least[high] and max(abs(n - order) for n in orders) < _AGREE:
-            offset = _peak_offset(amplitude, int(low))
-            exact = (low + offset) / record.duration + frequency
-            ratio = record.rate / exact
-            exact = record.rate / round(ratio) if abs(ratio - round(ratio)) < _EVEN * ratio else exact
-            return SlowerChannel(exact, record.rate, order)
+        if amplitude[high] <= least[high] or max(abs(n - order) for n in orders) >= _AGREE:
+            continue
+        exact = (low + _peak_offset(amplitude, int(low))) / record.duration + frequency
+        ratio = record.rate / exact
+        exact = record.rate / round(ratio) if abs(ratio - round(ratio)) < _EVEN * ratio else exact
+        slower = SlowerChannel(exact, record.rate, order)
+        if not _is_missing(slower, sizes, amplitude, least, record):
+            return slower
     return None
+
+
+def _is_missing(
+    slower: SlowerChannel, sizes: FloatArray, amplitude: FloatArray, least: FloatArray, record: WholeRecord
+) -> bool:
+    """Whether some line has no image where this filling would have left a clear one."""
+    frequencies = np.array([line.frequency for line in record.lines.whole])
+    for image in (slower.rate - frequencies, slower.rate + frequencies):
+        expected = _MISSING * sizes * np.abs(frequencies / image) ** slower.order
+        folded = np.abs((image + 0.5 * record.rate) % record.rate - 0.5 * record.rate)
+        at = np.round(folded * record.duration).astype(int)
+        seen = (at > _NEAR) & (at < len(amplitude) - 1) & _is_free(at, record)
+        place = at[seen]
+        found = np.maximum(amplitude[place], np.maximum(amplitude[place - 1], amplitude[place + 1]))
+        if (expected[seen] > np.maximum(least[place], found)).any():
+            return True
+    return False
 
 
 def _is_free(bins: IntArray, record: WholeRecord) -> BoolArray:

@@ -35,6 +35,8 @@ _GAPS = {
     "after": "all points, with what was added, all else as stated",
     "heldout_before": "points that no fit has seen, model as stated",
     "heldout_after": "points that no fit has seen, with what was added, all else as stated",
+    "touched_before": "along what the effect does, in deviations of all else that may be off, without it",
+    "touched_after": "along what the effect does, in deviations of all else that may be off, with it",
     "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
     "noise_floor": "what noise alone would leave",
 }
@@ -89,7 +91,8 @@ def _gap_table(verdict: Verdict) -> Table:
     rows = [
         [words, fixed(verdict.gap.get(name, math.nan), 2)]
         for name, words in _GAPS.items()
-        if verdict.effects or not name.endswith("after")  # where nothing was added, both are the same
+        # where nothing was added, both are the same
+        if (verdict.effects or not name.endswith("after")) and (name in verdict.gap or not name.startswith("touched"))
     ]
     return Table("Gap: root mean square of (measured - predicted) / sigma", ["", "sigma"], rows)
 

@@ -100,10 +100,7 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
     if verdict.verdict == "consistent":
         return f"{name}: model and measurement agree within noise and tolerance."
     if verdict.verdict == "named":
-        gap = verdict.gap
-        shrunk = f"from {gap['heldout_before']:.1f} to {gap['heldout_after']:.1f} standard deviations"
-        where = "on points left out of the fit" if _tested(verdict) else "over all points (none could be left out)"
-        return f"{name}: {found}. That explains the disagreement: {where} it shrinks {shrunk}."
+        return f"{name}: {found}. {_deciding(verdict)}"
     if verdict.verdict == "ambiguous":
         rivals = dict.fromkeys(label_in_words(n) for group in verdict.indistinguishable for n in group[1:])
         return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."
@@ -111,6 +108,15 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
         return f"{name}: {found}. That explains most of the disagreement, and something is left."
     worst = _largest(deviations)
     return f"{name}: unexplained{worst}. Nothing in the library of effects closes the gap."
+
+
+def _deciding(verdict: Verdict) -> str:
+    """What a name rests on: the gap along what the effects do."""
+    gap = verdict.gap
+    acting = "it acts" if len(verdict.effects) == 1 else "the less certain one acts"
+    where = "on points left out of the fit" if gap["touched_unseen"] else "over all points (none left out shows it)"
+    shrunk = f"from {gap['touched_before']:.1f} to {gap['touched_after']:.1f} standard deviations"
+    return f"That explains the disagreement: where {acting}, {where}, it shrinks {shrunk}."
 
 
 def _largest(deviations: Mapping[str, tuple[float, float]] | None) -> str:

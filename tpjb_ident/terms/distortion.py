@@ -51,6 +51,7 @@ class Distortion(Additive):
     """
 
     name = "distortion"
+    never_estimated = True
 
     def __init__(
         self,

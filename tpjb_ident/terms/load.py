@@ -20,6 +20,7 @@ class Load(Additive):
     """The runs' scatter over the root of their number is how well their mean is known."""
 
     name = "load miss"
+    never_estimated = True
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)

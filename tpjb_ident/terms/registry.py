@@ -5,6 +5,7 @@ from __future__ import annotations
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.axis import Axis
+from tpjb_ident.terms.baseline import Baseline
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.distortion import Distortion
@@ -27,6 +28,7 @@ TERMS: tuple[type[Term], ...] = (
     Clock,
     Mass,
     Housing,
+    Baseline,
     Shaft,
     Tilt,
     LoadTurn,

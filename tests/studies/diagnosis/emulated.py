@@ -34,7 +34,6 @@ from tpjb_ident.diagnosis.forward.forward import (
     Forward,
     ModelCache,
     NoEquilibriumError,
-    Reading,
     SolvedPoint,
     StaticPoint,
 )
@@ -178,7 +177,9 @@ class Emulated(ModelCache):
         """The same: nothing that is asked changes an answer."""
         return self
 
-    def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
+    def ask(
+        self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]
+    ) -> SolvedPoint:
         """See `Memory.ask`."""
         if self._setup is None or self._setup[0] is not setup:
             self._setup = setup, self._answers(setup)

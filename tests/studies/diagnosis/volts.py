@@ -1,28 +1,27 @@
 """Mixtures as raw records: written by the virtual rig, identified and diagnosed by the command line.
 
-    python -m tests.studies.diagnosis.volts --rows FILE [--bearing rocker] [--count 100] [--core 1] [--write]
+    python -m tests.studies.diagnosis.volts --rows FILE [--bearing stranger] [--count 100] [--core 1] [--write]
 
-Everything that may be off is drawn from its stated tolerance as in `mixtures`, the same kinds in the same order; the
-rig writes a campaign of the paper's plan from it (bearing and pivots that are off, probes, cells and thermometers with
-errors, noise, runout, drift, glitches, loads that miss their set points), and ``tpjb diagnose CAMPAIGN`` is run on it
-with the bearing as drawn. The model that writes the records is ours, on a finer mesh than the one that diagnoses: what
-is tested beyond `mixtures` is the way from volts to coefficients and the model itself in the place of its emulator. An
-effect cannot be taken out of the library of a command: outside it are a cross-coupled stiffness and growth with the
-load. Campaigns are deleted once they are diagnosed; rows that are there are not drawn again, so that a run that was
-stopped goes on where it was.
+Everything that may be off is drawn from its stated tolerance as in `strangers`, the same kinds in the same order, each
+on a bearing and a plan of its own (``--bearing rocker``: as in `mixtures`, the paper's plan); the rig writes a campaign
+from it (bearing and pivots that are off, probes, cells and thermometers with errors, noise, runout, drift, glitches,
+loads that miss their set points), which is diagnosed with the bearing as drawn. The model that writes the records is
+ours, on a finer mesh than the one that diagnoses: what is tested beyond emulated campaigns is the way from volts to
+coefficients and the model itself in the place of its emulator. Campaigns are deleted once they are diagnosed; rows
+that are there are not drawn again, so that a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
-import json
+import math
 import os
-import subprocess
-import sys
+import pickle
 import tempfile
 import time
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,50 +31,105 @@ from model.bearing_file import load_bearing
 from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.setup import Setup
+from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
-from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, draw, hidden
+from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, Timing
+from tests.studies.diagnosis import mixtures, strangers
+from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, hidden, said
 from tests.studies.diagnosis.tables import tables
 from tests.studies.results import Rows, write_section
-from tpjb_ident.compare.rig_from_model import (
-    INSTRUMENT_ERRORS,
-    ModelConvergenceError,
-    erring_instruments,
-    truth_of,
-)
-from tpjb_ident.diagnosis.forward.nuisance import Nuisance, Shift
+from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance, Shift
+from tpjb_ident.diagnosis.from_python import diagnose
+from tpjb_ident.diagnosis.observations.observe import Layout
+from tpjb_ident.errors import TpjbError
 
 #: Slow to simulate.
 SKIPPED = frozenset({"pad_conduction", "pivot_friction"})
-PROBES, CELLS = ("X1A", "X1B"), {"cell 1": "L1H", "cell 2": "L1V"}
+#: Tolerances of the instruments, and the effects of single channels.
+READ = {"probe_gain", "cell_gain", "thermometer"}
+CHANNELS = {name: own for name, own in OWN_NUMBERS.items() if own.tolerance in READ}
+NAMES = {"probe 1": "X1A", "probe 2": "X1B", "cell 1": "L1H", "cell 2": "L1V"}
 
 
-def rig_of(name: str, drawn: Drawn, seed: int) -> VirtualRig:
+@dataclass(frozen=True)
+class Case:
+    """A bearing's file, how it is tested, and a campaign that was drawn on it."""
+
+    text: str
+    plan: RigPlan
+    bench: Bench
+    drawn: Drawn
+    words: str = ""
+
+
+def case_of(name: str, kind: str, seed: int, own: Bench | None) -> Case | None:
+    """Draw a campaign on a bearing of the library, or on one that is drawn itself."""
+    rng = np.random.default_rng([seed, 20190761])
+    if own is not None:
+        text = (BEARINGS / f"{name}.toml").read_text(encoding="utf-8")
+        drawn = mixtures.draw(replace(own, forward=own.forward.fresh()), kind, rng, OUTSIDE[1:])
+        return None if drawn is None else Case(text, RigPlan.like_paper(), own, drawn)
+    one = strangers.stranger(seed, None)
+    tries = (strangers.draw(one, kind, rng) for _ in range(6))
+    drawn = next((d for d in tries if d is not None), None)
+    if drawn is None:
+        return None
+    return Case(one.text, plan_of(one.bench.problem.observations.layout), one.bench, drawn, one.words)
+
+
+def plan_of(layout: Layout) -> RigPlan:
+    """The test plan that gives a layout of observations."""
+    points = tuple(
+        OperatingPoint(test.load, test.direction, test.speed, omega)
+        for test in layout.dynamic
+        for omega in test.excitation
+    )
+    top = max(point.static_load for point in points)
+    fastest = max(max(point.excitation, point.shaft_speed) for point in points) / (2.0 * math.pi)
+    levels = tuple(top * share for share in np.arange(1, 11) / 10.0)
+    return RigPlan(
+        dynamic=points,
+        locus=tuple(OperatingPoint(test.load, test.direction, test.speed) for test in layout.locus),
+        dry=tuple(DryTest(test.pad, levels, start=0.5 * levels[0]) for test in layout.dry),
+        clearance=(ClearanceSweep(layout.push_load),) if layout.push_load else (),
+        timing=Timing(dynamic_rate=max(1000.0, 12.0 * fastest)),
+    )
+
+
+def rig_of(case: Case, seed: int) -> VirtualRig:
     """A virtual rig with what was drawn in it."""
-    text = (BEARINGS / f"{name}.toml").read_text(encoding="utf-8")
-    bearing = load_bearing(BEARINGS / f"{name}.toml")
-    known = list(zip(drawn.problem.nuisances, map(float, drawn.size), strict=True))
-    physical = [(n, s) for n, s in known if n.change is not None and n.name not in {"probe_gain", "cell_gain"}]
+    bearing, drawn, problem = load_bearing(case.text), case.drawn, case.drawn.problem
+    known = list(zip(problem.nuisances, map(float, drawn.size), strict=True))
+    physical = [(n, s) for n, s in known if n.change is not None and n.name not in READ]
     shift = Shift(tuple(n for n, _ in physical), tuple(s for _, s in physical))
-    inside = [e for e in drawn.hidden if e.name not in INSTRUMENT_ERRORS]
+    inside = [e for e in drawn.hidden if e.name not in {*INSTRUMENT_ERRORS, *CHANNELS}]
     plain = Setup(bearing, pivot_laws("kirk", bearing))
 
     def setup(growth: float) -> Setup:
         more = [Effect("thermal_growth", clearance_change=growth)] if growth else []
         return shift(apply_effects(plain, [*inside, *more]))
 
-    instruments = erring_instruments(Instruments.like_paper(len(bearing.pads), seed), drawn.hidden)
+    layout = problem.observations.layout
+    top = max(test.load for test in layout.dynamic)
+    instruments = erring_instruments(Instruments.like_paper(len(bearing.pads), seed, top), drawn.hidden)
+    instruments = _off(instruments, known, drawn.hidden)
+    if not any(test.pads for test in layout.dynamic):
+        sensors = tuple(sensor for sensor in instruments.sensors if sensor.quantity != "temperature")
+        instruments = replace(instruments, sensors=sensors)
     return VirtualRig(
-        truth=_truth(setup, drawn.growth, text), instruments=_off(instruments, known), campaign=f"volts-{seed}",
-        noise=Noise.like_samples(), plan=RigPlan.like_paper(), seed=seed,
+        truth=_truth(setup, drawn.growth / top, case.text), instruments=instruments, campaign=f"volts-{seed}",
+        noise=Noise.like_samples(), plan=case.plan, seed=seed,
     )  # fmt: skip
 
 
 def _truth(setup: Any, growth: float, text: str) -> RigTruth:
-    """What a bearing does; its clearance grows in proportion to the load where that is hidden."""
+    """What a bearing does; its clearance grows in proportion to the load [m/N] where that is hidden."""
     base = truth_of(setup(0.0), text)
     if not growth:
         return base
-    at = functools.lru_cache(maxsize=4096)(lambda load: truth_of(setup(growth * load / 8750.0), text))
+    at = functools.lru_cache(maxsize=4096)(lambda load: truth_of(setup(growth * load), text))
     return replace(
         base,
         stiffness=lambda point: at(point.static_load).stiffness(point),
@@ -84,84 +138,81 @@ def _truth(setup: Any, growth: float, text: str) -> RigTruth:
     )
 
 
-def _off(instruments: Instruments, known: list[tuple[Nuisance, float]]) -> Instruments:
+def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]], effects: Sequence[Effect]) -> Instruments:
     """Sensors whose gains and zeros are off as drawn."""
-    changes: dict[str, dict[str, float]] = {}
-    for one, size in known:
-        if one.name == "probe_gain":
-            changes[PROBES[int(one.place.split()[-1]) - 1]] = {"gain": 1.0 + size * one.sigma}
-        elif one.name == "cell_gain":
-            changes[CELLS[one.place]] = {"gain": 1.0 + size * one.sigma}
-        elif one.name == "thermometer":
-            changes[f"T{one.place.split()[-1]}"] = {"offset": size * one.sigma}
-    sensors = []
-    for sensor in instruments.sensors:
-        new = dict(changes.get(sensor.name, {}))
-        if "gain" in new:
-            new["gain"] *= sensor.error.gain
-        sensors.append(sensor.with_error(**new))
-    return replace(instruments, sensors=tuple(sensors))
+    changes = [(n.name, n.place, size * n.sigma) for n, size in known if n.name in READ]
+    for effect in effects:
+        if effect.name in CHANNELS:
+            own, (number, value) = CHANNELS[effect.name], effect.parameters.values()
+            changes.append((own.tolerance, f"{own.place} {number:.0f}", own.change(value)))
+    sensors = {sensor.name: sensor for sensor in instruments.sensors}
+    for name, place, change in changes:
+        at = f"T{place.split()[-1]}" if name == "thermometer" else NAMES[place]
+        error = sensors[at].error
+        more = {"offset": error.offset + change} if name == "thermometer" else {"gain": error.gain * math.exp(change)}
+        sensors[at] = sensors[at].with_error(**more)
+    return replace(instruments, sensors=tuple(sensors.values()))
 
 
-def run(one: Bench, name: str, kind: str, seed: int) -> dict[str, Any] | None:
-    """Draw, write, diagnose one campaign; a row as of `mixtures.run`."""
-    rng = np.random.default_rng([seed, 20190761])
-    drawn = draw(replace(one, forward=one.forward.fresh()), kind, rng, OUTSIDE[1:])
-    if drawn is None:
-        return None
+def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) -> dict[str, Any]:
+    """Write and diagnose one campaign; a row as of `mixtures.run`."""
+    drawn = case.drawn
+    left_out = {c.name for c in case.bench.problem.pool} - {c.name for c in drawn.problem.pool}
+    known = {"seed": seed, "words": case.words, **hidden(drawn)}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "campaign.h5"
         try:
-            write_campaign(path, rig_of(name, drawn, seed))
-        except ModelConvergenceError as error:
-            return {"kind": kind, "seed": seed, "failed": f"no campaign: {error}", "code": None}
-        out = Path(folder) / "out"
-        began = os.times()
-        command = [sys.executable, "-m", "tpjb_ident", "diagnose", str(path), "--out", str(out), "--quiet"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        spent = os.times()
-        if not (out / "diagnosis.json").exists():
-            return {"kind": kind, "seed": seed, "failed": done.stderr[-500:], "code": done.returncode}
-        told = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-    named = [
-        {"name": e["name"], "parameters": {k: (p["value"], p["lo"], p["hi"]) for k, p in e["parameters"].items()}}
-        for e in told["effects"]
-    ]
+            write_campaign(path, rig_of(case, seed))
+            began = time.process_time()
+            result = diagnose(path, settings=replace(settings, skip=frozenset(left_out)))
+        except TpjbError as error:
+            return {**known, "failed": f"{type(error).__name__}: {error}"}
+    spent, diagnosis = time.process_time() - began, result.diagnosis
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+        stored = diagnosis.observations, result.setup, frozenset(left_out)
+        (keep / f"{seed}.pickle").write_bytes(pickle.dumps(stored))
+    verdict, comparison = diagnosis.verdict, diagnosis.comparison
+    pairs = zip(comparison.fits[:6], comparison.probabilities)
     return {
-        "kind": kind, "seed": seed, **hidden(drawn), "code": done.returncode, "verdict": told["verdict"],
-        "named": named, "alike": told["indistinguishable"],
-        "behaves_like": [b["words"] for b in told["behaves_like"]],
-        "drift": [f"{d['effect']}: {d['words']}" for d in told["drift"]], "gap": told["gap"],
-        "remainder": told["remainder"]["sigma"], "below_floor": told["below_floor"], "elsewhere": {},
-        "seconds": spent.children_user + spent.children_system - began.children_user - began.children_system,
+        **known, **said(verdict), "gap": verdict.gap, "reasons": list(verdict.reasons),
+        "scale": comparison.best.posterior.scale, "below_floor": verdict.below_floor, "elsewhere": {},
+        "far": [(d.name, d.size, d.significance) for d in comparison.best.tolerances[:3]],
+        "fits": [(f.label, f.posterior.total, p, f.p, f.posterior.scale) for f, p in pairs],
+        "seconds": spent, "tried": len(comparison.fits),
     }  # fmt: skip
 
 
 def main() -> None:
     """Draw, write, diagnose, and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--bearing", default="rocker")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bearing", default="stranger", help="or rocker, spherical")
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=80000)
     parser.add_argument("--rows", type=Path, default=Path("volts.jsonl"))
+    parser.add_argument("--keep", type=Path, help="folder for the vectors of observations")
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    parser.add_argument("--core", type=int, help="run on this core only, with one worker")
+    parser.add_argument("--core", type=int, help="run on this core only")
     asked = parser.parse_args()
     if asked.core is not None:
         os.sched_setaffinity(0, {asked.core})
-    stored = Rows(asked.rows, "bearing", "seed")
-    one = bench(asked.bearing, None, SKIPPED)
+    stored, settings = Rows(asked.rows, "bearing", "seed"), DiagnoseSettings(workers=1)
+    drawn_too = asked.bearing == "stranger"
+    kinds = strangers.KINDS if drawn_too else KINDS
+    own = None if drawn_too else bench(asked.bearing, None, SKIPPED)
     for number in range(asked.count):
-        seed, began = asked.seed + number, time.time()
+        seed, kind, began = asked.seed + number, kinds[number % len(kinds)], time.time()
         if (asked.bearing, seed) not in stored.known:
-            row = run(one, asked.bearing, KINDS[number % len(KINDS)], seed)
-            if row is not None:
-                stored.add({"bearing": asked.bearing, "wall": time.time() - began, **row})
+            case = case_of(asked.bearing, kind, seed, own)
+            if case is not None:
+                row = run(case, seed, settings, asked.keep)
+                stored.add({"bearing": asked.bearing, "kind": kind, "wall": time.time() - began, **row})
     rows = [*stored.known.values()]
     text = tables([row for row in rows if "failed" not in row])
-    print(text)
     if asked.write:
         write_section("volts", f"python -m tests.studies.diagnosis.volts --rows {asked.rows} --write", text)
+    else:
+        print(text)
     for row in rows:
         if "failed" in row:
             print(row["seed"], row["kind"], row["failed"])

@@ -33,7 +33,7 @@ from scipy.stats import norm
 
 from tests.studies.field.acquisition import Array, Campaign, write_campaign
 from tests.studies.field.conditions import Condition, conditions
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, study_parser, table, typed, write_section
 
 ROOT = Path(__file__).resolve().parents[3]
 WORDS = ("right", "reported", "silent", "alarm", "wide", "crash")
@@ -227,7 +227,7 @@ def summary(path: Path, rows: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run the battery."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--only", default="", help="conditions whose names hold one of these words, separated by |")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=38_000)
@@ -235,7 +235,6 @@ def main() -> None:
     parser.add_argument("--checkout", type=Path, default=ROOT, help="whose packages run [default: this one]")
     parser.add_argument("--other", type=Path, help="a second checkout, side by side")
     parser.add_argument("--rows", type=Path, help="file of JSON lines that outcomes are added to and taken from")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     paths = [path.resolve() for path in (asked.checkout, asked.other) if path]
     lines: list[list[str]] = []
@@ -249,8 +248,7 @@ def main() -> None:
     sums = ".\n".join(summary(path, total) for path, total in zip(paths, totals))
     print(sums)
     if asked.write:
-        command = f"python -P -m tests.studies.field.battery {' '.join(sys.argv[1:])}"
-        write_section("second-field", command, f"{sums}.\n\n{table(HEAD, lines)}")
+        write_section("second-field", typed(), f"{sums}.\n\n{table(HEAD, lines)}")
 
 
 if __name__ == "__main__":

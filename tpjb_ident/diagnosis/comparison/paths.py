@@ -35,10 +35,6 @@ class AmplitudePath:
         """Weights of the columns in the derivative at some amplitudes, (k, 2 m); `amplitudes` (k,)."""
         return self._pieces(self._inside(amplitudes), _SLOPE)
 
-    def slope(self, amplitude: float) -> FloatArray:
-        """Derivative at an amplitude, (n,)."""
-        return np.asarray(self.columns @ self.slope_weights(np.array([amplitude]))[0])
-
     def _inside(self, amplitudes: FloatArray) -> FloatArray:
         return np.clip(amplitudes, self.at[0], self.at[-1])
 
@@ -102,9 +98,7 @@ class Path:
     @property
     def neutral_slope(self) -> FloatArray:
         """Derivatives where nothing happens yet, (n, k)."""
-        if self.curve is None:
-            return self.columns
-        return self.curve.slope(0.0)[:, None]
+        return np.asarray(self.columns @ self.slopes(np.zeros((1, len(self.fault.width))))[0])
 
     def tried(self, pull: FloatArray, square: FloatArray) -> FloatArray:
         """Amplitudes to look at, (t, k): a grid, or the likeliest ones of straight columns.

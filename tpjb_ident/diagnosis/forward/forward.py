@@ -36,33 +36,22 @@ class NoEquilibriumError(TpjbError):
 
 @dataclass(frozen=True)
 class SolvedPoint:
-    """What a bearing alone does at one static point, before structure and instruments."""
+    """What a bearing does at one static point: alone, or as structure and instruments show it."""
 
     h: ComplexArray  #: (n, 2, 2) complex, N/m
     position: FloatArray  #: (2,), m
-    force: FloatArray  #: (2,), N: static load
+    load: FloatArray  #: (2,), N
     temperature: FloatArray  #: (n_pads,), degC
     pad_load: FloatArray  #: (n_pads,), N
 
-    def read(self, setup: Setup, lines: tuple[float, ...]) -> Reading:
+    def read(self, setup: Setup, lines: tuple[float, ...]) -> SolvedPoint:
         """As the structure and the instruments of a set-up show it."""
         instruments, omega = setup.instruments, np.array(lines)
-        return Reading(
+        return SolvedPoint(
             instruments.shown_stiffness(with_structure(setup, self.h, omega), omega) if lines else self.h,
-            instruments.shown_position(self.position + setup.structure @ self.force),
-            instruments.shown_load(self.force), instruments.shown_temperature(self.temperature), self.pad_load,
+            instruments.shown_position(self.position + setup.structure @ self.load),
+            instruments.shown_load(self.load), instruments.shown_temperature(self.temperature), self.pad_load,
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What the records of a static point would show; arrays as of `SolvedPoint`."""
-
-    h: ComplexArray
-    position: FloatArray
-    load: FloatArray
-    temperature: FloatArray
-    pad_load: FloatArray
 
 
 @dataclass
@@ -77,7 +66,9 @@ class ModelCache:
         """Return a memory of its own that begins with the same knowledge."""
         return ModelCache({setup: dict(points) for setup, points in self.solved.items()}, dict(self.start))
 
-    def ask(self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]) -> Reading:
+    def ask(
+        self, setup: Setup, point: StaticPoint, lines: tuple[float, ...], sensors: tuple[float, ...]
+    ) -> SolvedPoint:
         """Look a point up, or solve it."""
         if self._last is None or self._last[0] is not setup:
             # a set-up is some hundred numbers to be compared: once for all points of a prediction
@@ -165,17 +156,14 @@ class Forward:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""
         names = ("load", "direction", "speed", "pad")
         places = [tuple(e.place(name) for name in names) for e in self.elements]
-        members = [e.family == "temperature" for e in self.elements]
-        return np.array(
-            [self._shares.get(place, math.nan) if m else math.nan for place, m in zip(places, members, strict=True)]
-        )
+        return np.array([self._shares.get(place, math.nan) for place in places])
 
     @property
     def _sensors(self) -> tuple[float, ...]:
         positions = self.layout.temperature_position
         return (*positions, *(SENSOR for _ in range(len(self.setup.bearing.pads) - len(positions))))
 
-    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> Reading:
+    def _solve(self, setup: Setup, point: StaticPoint, excitation: Sequence[float]) -> SolvedPoint:
         return self.cache.ask(setup, point, tuple(excitation), self._sensors)
 
 
@@ -190,7 +178,7 @@ class _PredictedTable:
     def get(self, element: Element) -> float:
         return self.table[(element.observable, *(v for _, v in element.where))]
 
-    def dynamic(self, test: DynamicTest, reading: Reading) -> None:
+    def dynamic(self, test: DynamicTest, reading: SolvedPoint) -> None:
         point = (test.load, test.direction, test.speed)
         for h, omega in zip(reading.h, test.excitation, strict=True):
             for name, at in _ROW.items():
@@ -199,7 +187,7 @@ class _PredictedTable:
         for pad, t in enumerate(reading.temperature, start=1):
             self.table[("pad_temperature", *point, float(pad))] = float(t)
 
-    def locus(self, point: StaticPoint, reading: Reading) -> None:
+    def locus(self, point: StaticPoint, reading: SolvedPoint) -> None:
         self.table[("locus_x", *point)], self.table[("locus_y", *point)] = map(float, reading.position)
         load = reading.load
         self.table[("load_ratio", *point)] = float(np.hypot(*load)) / point[0]

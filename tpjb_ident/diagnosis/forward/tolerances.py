@@ -6,12 +6,12 @@ They come from the bearing file's ``[tolerances]``, from ``--tolerance NAME=VALU
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from model.bearing import Bearing
+from rigdata.near_names import hint
 from rigdata.units import UnitError, parse_quantity
 from tpjb_ident.errors import BadInputError
 
@@ -60,9 +60,7 @@ class Tolerances:
         table = dict(self.stated)
         for name, value in values.items():
             if name not in DEFAULTS:
-                near = difflib.get_close_matches(name, DEFAULTS, n=1)
-                hint = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(DEFAULTS)}."
-                raise BadInputError(f"tolerance {name!r} ({source}): not known. {hint}")
+                raise BadInputError(f"tolerance {name!r} ({source}): not known. {hint(name, DEFAULTS)}")
             dimension = DEFAULTS[name][1]
             try:
                 number = parse_quantity(value, dimension, name) if isinstance(value, str) else float(value)

@@ -33,7 +33,7 @@ class Deciding:
     right: float = 0.2
     #: Held-out gap of the baseline below which nothing is compared: nothing off gives 0.07 to 0.13.
     quiet: float = 0.2
-    #: Held-out gap above noise as stated, after over before, that a name takes; right names reach 0 to 0.41.
+    #: Gap above noise along what an effect moves, after over before, that its name takes; right ones reach 0 to 0.45.
     halved: float = 0.5
     #: Squared held-out gap above noise with tolerances free, after over before: effects explain the larger part.
     rest: float = 0.2
@@ -108,9 +108,9 @@ class Deciding:
     same = 0.1
     #: Size at which a plan asks what an effect would be mistaken for [standard deviations].
     seen = 6.0
-    #: Separation from which one test is enough: with 5 the wrong explanation's chi-square exceeds the right one's by
-    #: `margin`, from which it counts as wrong, in 95 of 100 cases.
-    enough, margin = 5.0, 9.0
+    #: Separation from which one test is enough: with 5 the wrong explanation's chi-square exceeds the right one's by 9,
+    #: from which it counts as wrong, in 95 of 100 cases.
+    enough = 5.0
     #: Other explanations that a confirming test is chosen against.
     impostors = 2
 

@@ -47,10 +47,7 @@ def _correlation(elements: Sequence[Element]) -> FloatArray:
 
 
 def usual_factor(observations: Observations, columns: FloatArray) -> FloatArray:
-    """Cholesky factor of the covariance to expect: identification, model error and nuisances, (n, n).
-
-    `columns` (n, m).
-    """
+    """Cholesky factor of the covariance to expect: identification, model error and nuisances (n, m), (n, n)."""
     scale = observations.total_sigma
     share = observations.sigma / scale
     total = (observations.covariance + columns @ columns.T) / np.outer(scale, scale)

@@ -8,8 +8,8 @@ their angles), ``dry`` (tangent compliance of every pivot), ``temperature``.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +67,7 @@ class Layout:
     temperature_position: tuple[float, ...] = ()
 
 
-ENTRY_NAMES = ("xx", "xy", "yx", "yy")
+Where = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,59 @@ class Element:
 
     family: str
     observable: str
-    where: tuple[tuple[str, float], ...]
+    where: Where
 
     def place(self, name: str) -> float:
         """Coordinate of the operating point; NaN where it has none."""
         return dict(self.where).get(name, math.nan)
+
+
+def _at_point(*point: float) -> Where:
+    """An operating point as elements have it: load, direction, speed, and excitation where there is one."""
+    return tuple(zip(("load", "direction", "speed", "excitation"), point))
+
+
+def _stiffness_elements(where: Where) -> list[Element]:
+    """Real, then imaginary parts."""
+    return [Element("h", f"{part}{entry}", where) for part in "kc" for entry in ("xx", "xy", "yx", "yy")]
+
+
+def _temperature_elements(where: Where, pads: Iterable[int]) -> list[Element]:
+    """One per pad."""
+    return [Element("temperature", "pad_temperature", (*where, ("pad", float(pad)))) for pad in pads]
+
+
+def _locus_elements(where: Where) -> list[Element]:
+    """A position and a load reading."""
+    named = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
+    return [Element(family, name, where) for family, name in named]
+
+
+def _dry_elements(pad: int, loads: Iterable[float]) -> list[Element]:
+    """One per load."""
+    return [Element("dry", "dry_compliance", (("pad", float(pad)), ("load", float(load)))) for load in loads]
+
+
+def _clearance_elements(name: str, angles: Iterable[float]) -> list[Element]:
+    """One per side of the polygon."""
+    return [Element("clearance", name, (("pad", k), ("angle", float(a)))) for k, a in enumerate(angles, 1)]
+
+
+def all_elements(layout: Layout, angles: Sequence[float]) -> tuple[Element, ...]:
+    """Everything that a layout of tests shows of a bearing with pivots at these angles."""
+    out: list[Element] = []
+    for test in layout.dynamic:
+        place = _at_point(test.load, test.direction, test.speed)
+        for omega in test.excitation:
+            out += _stiffness_elements((*place, ("excitation", omega)))
+        out += _temperature_elements(place, test.pads)
+    for locus_test in layout.locus:
+        out += _locus_elements(_at_point(*astuple(locus_test)))
+    for dry in layout.dry:
+        out += _dry_elements(dry.pad, dry.load)
+    if layout.push_load is not None:
+        out += [*_clearance_elements("clearance_pushed", angles), *_clearance_elements("side_angle", angles)]
+    return tuple(out)
 
 
 @dataclass(frozen=True)
@@ -134,7 +182,8 @@ def observe(
     builder = _Builder()
     dynamic = _add_dynamic(builder, identification, tolerance)
     locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
-    dry = tuple(_add_dry(builder, c, tolerance) for c in curves if _usable(c))
+    usable = [c for c in curves if c.valid_from < c.valid_to < math.inf]
+    dry = tuple(_add_dry(builder, curve, tolerance) for curve in usable)
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
     layout = Layout(dynamic, locus_tests, dry, push)
     return Observations(
@@ -151,12 +200,12 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
         tests.setdefault(key, []).append(i)
     out = []
     for (load, direction, speed), members in tests.items():
-        base = (("load", load), ("direction", direction), ("speed", speed))
+        place = _at_point(load, direction, speed)
         for i in members:
-            _add_stiffness(builder, points[i], base, tolerance)
+            _add_stiffness(builder, points[i], place, tolerance)
         kelvin = pad_means([points[i].temperatures for i in members])
         temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
-        names = [Element("temperature", "pad_temperature", (*base, ("pad", float(k)))) for k in temperature]
+        names = _temperature_elements(place, temperature)
         if temperature:
             noise = np.eye(len(names)) * Deciding.temperature**2
             value = np.array(list(temperature.values()))
@@ -172,12 +221,9 @@ def _mains_on_excitation(result: PointResult) -> bool:
     return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
 
 
-def _add_stiffness(builder: _Builder, result, base: tuple, tolerance: Tolerance) -> None:  # type: ignore[no-untyped-def, type-arg]
-    omega = result.point.excitation
+def _add_stiffness(builder: _Builder, result: PointResult, place: Where, tolerance: Tolerance) -> None:
     h = result.stiffness.h
-    place = (*base, ("excitation", omega))
-    elements = [Element("h", f"k{e}", place) for e in ENTRY_NAMES]
-    elements += [Element("h", f"c{e}", place) for e in ENTRY_NAMES]
+    elements = _stiffness_elements((*place, ("excitation", result.point.excitation)))
     scale = np.repeat(result.stiffness.direct, 4)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
@@ -194,48 +240,35 @@ def _add_locus(
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
     stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
     for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
-        place = (
-            ("load", p.point.static_load), ("direction", p.point.static_load_direction), ("speed", p.point.spin),
-        )  # fmt: skip
-        names = (("locus", "locus_x"), ("locus", "locus_y"), ("load", "load_ratio"), ("load", "load_turn"))
+        test = LocusTest(p.point.static_load, p.point.static_load_direction, p.point.spin)
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
         stacked = np.vstack([give, np.eye(2)])
         covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
-        builder.add(
-            [Element(family, name, place) for family, name in names],
-            np.array([*p.position, p.load / p.point.static_load, turn]), covariance, np.array(stated),
-        )  # fmt: skip
-        out.append(LocusTest(p.point.static_load, p.point.static_load_direction, p.point.spin))
+        value = np.array([*p.position, p.load / test.load, turn])
+        builder.add(_locus_elements(_at_point(*astuple(test))), value, covariance, np.array(stated))
+        out.append(test)
     return tuple(out)
-
-
-def _usable(curve: PivotCurve) -> bool:
-    return curve.valid_to > curve.valid_from and math.isfinite(curve.valid_to)
 
 
 def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
     load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in Deciding.dry_shares])
     value = -np.log(np.asarray(curve.stiffness(load), float))
-    elements = [Element("dry", "dry_compliance", (("pad", float(curve.pad)), ("load", float(w)))) for w in load]
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
-    builder.add(elements, value, covariance, tolerance.dry)
+    builder.add(_dry_elements(curve.pad, load), value, covariance, tolerance.dry)
     used_loads = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in used_loads))
 
 
 def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
-    n = len(polygon.angles)
-    places = [(("pad", k + 1.0), ("angle", float(polygon.angles[k]))) for k in range(n)]
-    elements = [Element("clearance", "clearance_pushed", place) for place in places]
-    builder.add(
-        elements, polygon.clearance_pushed, np.diag(np.asarray(polygon.clearance_pushed_se) ** 2),
-        tolerance.position,
-    )  # fmt: skip
-    elements = [Element("clearance", "side_angle", place) for place in places]
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
-    builder.add(elements, turn, np.diag(np.asarray(polygon.fitted_angle_se) ** 2), tolerance.angle)
+    rows = (
+        ("clearance_pushed", polygon.clearance_pushed, polygon.clearance_pushed_se, tolerance.position),
+        ("side_angle", turn, polygon.fitted_angle_se, tolerance.angle),
+    )
+    for name, value, error, stated in rows:
+        builder.add(_clearance_elements(name, polygon.angles), value, np.diag(np.asarray(error) ** 2), stated)
     return float(polygon.push_load)
 
 
@@ -299,7 +332,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
         point = entry.point
         static = (point.static_load, point.static_load_direction, point.spin)
         tests.setdefault(static, []).append(point.excitation)
-        where = tuple(zip(("load", "direction", "speed", "excitation"), (*static, point.excitation), strict=True))
+        where = _at_point(*static, point.excitation)
         for part in "kc":
             factor = point.excitation if part == "c" else 1.0
             part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}

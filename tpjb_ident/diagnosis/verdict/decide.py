@@ -24,48 +24,26 @@ from tpjb_ident.diagnosis.verdict.held_out import free_gap, free_prediction
 from tpjb_ident.diagnosis.verdict.rules import Judgement, judge
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
 
-#: Effect and parameter: what its source allows. What is not here is bounded by three typical sizes of the library,
-#: whose sources stand with the effects.
+#: What a source allows where that is not three typical sizes of the library, whose sources stand with the effects.
+_PIVOTS, _SPRINGS = (0.2, 2.0), (1e8, math.inf)
 _RANGES = {
-    ("oil_viscosity", "factor"): (
-        0.9,
-        1.1,
-        "ISO 3448 holds a grade within 10 %, the next one is 1.5 times as thick or thin",
-    ),
-    ("pivot_flexibility", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
-    ("soft_pivot", "stiffness_factor"): (0.2, 2.0, "pivots are measured 2 to 3 times softer than the formula"),
-    ("hot_oil_carryover", "fraction"): (0.0, 0.95, "groove mixing of 0.4 to 0.95 in flooded bearings"),
-    ("starvation", "arc_fraction"): (0.0, 0.4, "leading-edge starvation of 10 to 40 % at low flow"),
-    ("heat_loss", "share"): (0.0, 0.4, "pads, shaft and drained oil take 5 to 25 % of a film's heat"),
-    ("pad_bending", "compliance_factor"): (0.0, 2.5, "1 is as computed"),
-    ("housing_flexibility", "stiffness"): (1e8, math.inf, "rig housings have 1e9 to 5e9 N/m"),
-    ("structure_compliance", "stiffness"): (1e8, math.inf, "rig structures have 1e9 to 5e9 N/m"),
-    ("channel_delay", "delay"): (-5e-4, 5e-4, "demodulators and anti-alias filters take 20 to 500 us"),
-    ("fluid_inertia", "added_mass"): (0.0, 60.0, "K-C-M fits of tilting-pad bearings: 0 to 60 kg at 100 mm"),
-}
+    "oil_viscosity": (0.9, 1.1), "pivot_flexibility": _PIVOTS, "soft_pivot": _PIVOTS,
+    "housing_flexibility": _SPRINGS, "structure_compliance": _SPRINGS,
+}  # fmt: skip
 
 
-def _stands_in(name: str, parameter: str, value: Estimate, pads: int) -> str:
+def _stands_in(fault: Fault, value: Estimate) -> str:
     """What to say of a size that lies wholly beyond what its source allows; empty where it does not."""
-    kind = kind_of(name)
-    described = next((p for p in kind.parameters_of(pads) if p.name == parameter), None)
-    if value.lo == value.hi:
-        return ""
-    if (name, parameter) in _RANGES:
-        low, high, source = _RANGES[(name, parameter)]
-    elif described is None or math.isnan(described.neutral) or math.isnan(described.typical):
-        return ""
-    else:
-        origin, reach = described.to_linear(described.neutral), Deciding.width * described.typical_step
-        ends = sorted(described.from_linear(origin + s * reach) for s in (-1.0, 1.0))
-        low, high = max(ends[0], described.low), min(ends[1], described.high)
-        source = f"three times a typical size; {kind.source}"
+    parameter = fault.candidate.parameter
+    origin, reach = parameter.to_linear(parameter.neutral), Deciding.width * parameter.typical_step
+    ends = sorted(parameter.from_linear(origin + sign * reach) for sign in (-1.0, 1.0))
+    low, high = _RANGES.get(fault.name, (max(ends[0], parameter.low), min(ends[1], parameter.high)))
     if value.lo <= high and value.hi >= low:
         return ""
     limit = high if value.value > high else low
     return (
-        f"{name} {parameter} {value.value:.3g} is beyond {limit:.3g}, as far as its source goes ({source}): "
-        "another cause, or a second one, may stand behind this name"
+        f"{fault.name} {parameter.name} {value.value:.3g} is beyond {limit:.3g}, as far as its source goes "
+        f"({kind_of(fault.name).source}): another cause, or a second one, may stand behind this name"
     )
 
 
@@ -84,18 +62,16 @@ class Decision:
 
 def decide(run: Map, problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> Decision:
     """Turn a comparison into a verdict."""
-    observations, held = problem.observations, problem.held
+    observations, rows = problem.observations, problem.held
     judgement = judge(run, comparison, settings)
-    effects = _effects(comparison, judgement) if judgement.has_effects else ()
+    effects, held = _effects(comparison, judgement) if judgement.has_effects else (), judgement.held
     after = unseen = problem.base
-    if effects and judgement.held.stated is not None:
+    if effects and held.stated is not None:
         (exact,) = tuple(run(_exact, [(effects,)]))
-        unseen = judgement.held.stated
+        unseen = held.stated
         after = unseen if exact is None else exact
-    model = judgement.held.fit
+    model, heldout_after = held.fit, gap(observations, unseen, rows)
     worst = localise(observations, free_prediction(model))
-    remaining = judgement.held.free
-    heldout_after = gap(observations, unseen, held)
     verdict = Verdict(
         verdict=judgement.name,
         effects=effects,
@@ -104,19 +80,20 @@ def decide(run: Map, problem: Problem, comparison: Comparison, settings: Diagnos
         next_test="",
         candidates=_ranked(comparison),
         disagreement=localise(observations, problem.base),
-        gap_by_observable=gap_by_observable(observations, problem.base, unseen, held),
+        gap_by_observable=gap_by_observable(observations, problem.base, unseen, rows),
         gap={
             "before": gap(observations, problem.base),
             "after": gap(observations, after),
-            "heldout_numbers": 0 if held.all() else int(held.sum()),
-            "heldout_before": judgement.held.before,
+            "heldout_numbers": 0 if rows.all() else int(rows.sum()),
+            "heldout_before": held.before,
             "heldout_after": heldout_after,
-            "within_tolerances": remaining,
-            "closed": 1.0 - judgement.held.remaining(heldout_after) if effects else math.nan,
-            "noise_floor": noise_floor(observations, held),
+            "within_tolerances": held.free,
+            "closed": 1.0 - held.remaining(heldout_after) if effects else math.nan,
+            "noise_floor": noise_floor(observations, rows),
+            **(held.along_effects if effects else {}),
         },
         remainder=Remainder(
-            remaining, min(judgement.held.remaining(remaining), 1.0),
+            held.free, min(held.remaining(held.free), 1.0),
             f"{worst[0].observable} at {worst[0].where}" if worst else "", model.p,
         ),
         behaves_like=() if judgement.name in {"consistent", "named"} else behaviours(model),
@@ -139,15 +116,13 @@ def _exact(forward: Forward, problem: Problem, effects: tuple[FoundEffect, ...])
 def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect, ...]:
     """The effects of the model, the largest change of the prediction first."""
     fit, shares = judgement.held.fit, comparison.shares
-    pads = sum(n.name == "clearance_scatter" for n in fit.problem.nuisances)
     rows = []
     for index, (fault, at) in enumerate(zip(fit.faults, fit.unknowns.slices, strict=True)):
         if fault.is_term:
             continue
         parameters = parameters_of(fit, index)
         change = float(np.linalg.norm(fit.point.jacobian[:, at] @ fit.point.theta[at]))
-        said = (_stands_in(fault.name, key, value, pads) for key, value in parameters.items())
-        words = "; ".join(word for word in said if word)
+        words = _stands_in(fault, parameters[fault.candidate.parameter.name])
         rows.append((change, FoundEffect(fault.name, parameters, words, round(shares[fault.name], 4))))
     return tuple(effect for _, effect in sorted(rows, key=lambda row: -row[0]))
 

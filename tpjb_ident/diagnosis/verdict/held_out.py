@@ -3,15 +3,34 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.fit import Fit
+from tpjb_ident.diagnosis.comparison.problem import Fault
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns, prediction
 from tpjb_ident.diagnosis.forward.workers import Map
+from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.gap import gap, noise_floor
+
+
+@dataclass(frozen=True)
+class Touched:
+    """The gap along what one fault moves, in standard deviations of everything else that may be off."""
+
+    label: str
+    before: float  #: without it, all other faults there
+    after: float
+    unseen: bool  #: on points left out of the fit; over all of them where these do not hear the fault
+
+    @property
+    def remaining(self) -> float:
+        """Share of the squared gap above noise that is left."""
+        return _share(self.after, self.before, 1.0)
 
 
 @dataclass(frozen=True)
@@ -19,14 +38,14 @@ class HeldOut:
     """An explanation on held-out points."""
 
     fit: Fit
-    stated: FloatArray | None = field(
-        repr=False
-    )  #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
+    #: (n,): its faults alone, every tolerance as stated; None: no equilibrium
+    stated: FloatArray | None = field(repr=False)
+    touched: tuple[Touched, ...] = ()  #: by fault, the largest remainder first; none where one has no equilibrium
 
     @property
     def as_stated(self) -> float:
         """Gap with exactly the faults, every tolerance as stated."""
-        return float("inf") if self.stated is None else _gap(self.fit, self.stated)
+        return math.inf if self.stated is None else _gap(self.fit, self.stated)
 
     @functools.cached_property
     def free(self) -> float:
@@ -40,22 +59,64 @@ class HeldOut:
 
     def remaining(self, after: float) -> float:
         """Share of the baseline's squared gap above noise that a gap leaves; none where it leaves noise alone."""
-        floor = noise_floor(self.fit.problem.observations, self.fit.problem.held)
-        rest, room = (max(value**2 - floor**2, 0.0) for value in (after, self.before))
-        return rest / max(room, 1e-300)
+        return _share(after, self.before, noise_floor(self.fit.problem.observations, self.fit.problem.held))
+
+    @property
+    def along_effects(self) -> dict[str, float]:
+        """The gap along what the fault moves that closes it least."""
+        first = vars(self.touched[0]) if self.touched else {}
+        return {f"touched_{name}": float(value) for name, value in first.items() if name != "label"}
+
+    def is_shrunk(self, settings: Deciding) -> bool:
+        """Whether every fault halves the gap along what it moves, and the gap over everything does not grow."""
+        halved = all(one.remaining <= settings.halved**2 for one in self.touched)
+        return bool(self.touched) and halved and self.as_stated <= self.before
+
+
+def _share(after: float, before: float, floor: float) -> float:
+    rest, room = (max(value**2 - floor**2, 0.0) for value in (after, before))
+    return rest / max(room, 1e-300)
 
 
 def held_out_gap(run: Map, fit: Fit) -> HeldOut:
     """Solve a model with amplitudes from all other points, without its generic terms, every tolerance as stated."""
     theta = np.clip(_from_others(fit), fit.unknowns.low, fit.unknowns.high)
-    faults = tuple(fault for fault in fit.faults if not fault.is_term)
+    faults = [fault for fault in fit.faults if not fault.is_term]
+    without = [[other for other in faults if other is not fault] for fault in faults]
+    whole, *partial = run(prediction, [_alone(fit, theta, chosen) for chosen in (faults, *without)])
+    if whole is None:
+        return HeldOut(fit, None)
+    moved = [] if any(part is None for part in partial) else zip(faults, partial, strict=True)
+    touched = sorted((_touched(fit, *pair, whole) for pair in moved), key=lambda one: -one.remaining)
+    return HeldOut(fit, whole * fit.problem.sigma, tuple(touched))
+
+
+def _alone(fit: Fit, theta: FloatArray, faults: Sequence[Fault]) -> tuple[tuple[Fault, ...], FloatArray]:
+    """Some faults of a fit at the amplitudes in `theta`, every tolerance as stated."""
     unknowns = Unknowns(fit.problem, faults)
     alone = np.zeros(len(unknowns.width))
     for fault, at in zip(fit.faults, fit.unknowns.slices, strict=True):
-        if not fault.is_term:
-            alone[unknowns.slices[faults.index(fault)]] = theta[at]
-    (predicted,) = tuple(run(prediction, [(faults, alone)]))
-    return HeldOut(fit, None if predicted is None else predicted * fit.problem.sigma)
+        if fault in faults:
+            alone[unknowns.slices[unknowns.faults.index(fault)]] = theta[at]
+    return unknowns.faults, alone
+
+
+def _touched(fit: Fit, fault: Fault, without: FloatArray, whole: FloatArray) -> Touched:
+    """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated."""
+    held, stated = fit.problem.held, fit.point.jacobian[:, fit.unknowns.tolerances]
+    for rows in (held, np.ones_like(held)):
+        moved = (whole - without)[rows]
+        weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
+        size = math.sqrt(max(float(weights @ moved), 1e-300))
+        if size >= Deciding.visible:
+            break
+    after = float(weights @ (fit.problem.measured - whole)[rows]) / size
+    return Touched(fault.label, abs(after + size), abs(after), rows is held and not held.all())
+
+
+def _covariance(fit: Fit, rows: BoolArray, columns: FloatArray) -> FloatArray:
+    """Of some elements at the likeliest scale, with numbers of unit variance behind `columns`."""
+    return np.asarray(fit.problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + columns @ columns.T)
 
 
 def free_gap(fit: Fit) -> float:
@@ -79,6 +140,5 @@ def _from_others(fit: Fit) -> FloatArray:
     rows = ~held if not held.all() else held
     linear, width = fit.linear, fit.unknowns.width
     columns = (linear.jacobian * width)[rows]
-    total = fit.problem.errors.covariance(fit.posterior.leading)[np.ix_(rows, rows)] + columns @ columns.T
     residual = (linear.residual + linear.jacobian @ linear.theta)[rows]
-    return np.asarray(width * (columns.T @ np.linalg.solve(total, residual)))
+    return np.asarray(width * (columns.T @ np.linalg.solve(_covariance(fit, rows, columns), residual)))

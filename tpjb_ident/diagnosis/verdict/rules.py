@@ -36,7 +36,7 @@ def judge(run: Map, comparison: Comparison, settings: DiagnoseSettings) -> Judge
     held = held_out_gap(run, nothing)
     if held.before <= settings.quiet or (comparison.is_tenable(nothing) and chance >= settings.nothing):
         return _without_effects(held, settings)
-    sure = _sure(comparison, settings)
+    sure = frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
     model = _exactly(comparison, sure, settings) or comparison.best
     held = held_out_gap(run, model)
     judgement = _of_model(comparison, model, sure, held, settings)
@@ -72,10 +72,6 @@ def _without_effects(held: HeldOut, settings: DiagnoseSettings) -> Judgement:
     return Judgement("unexplained", held, (reason,))
 
 
-def _sure(comparison: Comparison, settings: DiagnoseSettings) -> frozenset[str]:
-    return frozenset(name for name, share in comparison.shares.items() if share >= settings.included)
-
-
 def _exactly(comparison: Comparison, sure: frozenset[str], settings: DiagnoseSettings) -> Fit | None:
     """The most probable tenable fit with exactly these names, unless it is as sure that one of a few stands beside."""
     fit = next((f for f in comparison.fits if sure and f.names == sure and comparison.is_tenable(f)), None)
@@ -101,14 +97,14 @@ def _look_alikes(model: Fit, held: HeldOut, family: tuple[str, ...]) -> Judgemen
 
 
 def _named(model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
-    """Named where exactly these effects halve the held-out gap and keep their size over the operating range."""
+    """Named where each effect halves the gap along what it moves, and no effect changes over the operating range."""
     if model.has_terms and all(fault.is_term for fault in model.faults):
         reason = "what describes it is a term that no effect of the library stands for"
         return Judgement("unexplained", held, (reason,))
     drift = drifts(model, settings.drifting)
-    if held.remaining(held.as_stated) <= settings.halved**2 and not (drift or model.has_terms):
+    if held.is_shrunk(settings) and not (drift or model.has_terms):
         return Judgement("named", held, (_shrunk(held),))
-    reason = f"{_shrunk(held)}, more than the half above noise that a name leaves at the most"
+    reason = f"{_shrunk(held)}: a name leaves half of the first above noise at the most, and the second no larger"
     if drift:
         reason = f"the size of {drift[0].effect} {drift[0].words}, so its name is not the whole story"
     if model.has_terms:
@@ -118,7 +114,15 @@ def _named(model: Fit, held: HeldOut, settings: DiagnoseSettings) -> Judgement:
 
 
 def _shrunk(held: HeldOut) -> str:
-    return f"the held-out gap goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
+    whole = f"the held-out gap goes from {held.before:.2f} to {held.as_stated:.2f} sigma with all tolerances as stated"
+    if not held.touched:
+        return whole
+    one = held.touched[0]
+    where = "on points left out of the fit" if one.unseen else "over all points (those left out do not show it)"
+    return (
+        f"along what {one.label} does the gap goes from {one.before:.2f} to {one.after:.2f} standard deviations of all "
+        f"else that may be off, {where}; over everything {whole}"
+    )
 
 
 def _untenable(model: Fit) -> str:

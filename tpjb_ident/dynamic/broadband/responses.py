@@ -17,6 +17,7 @@ from scipy.special import fdtri
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
+from tpjb_ident.estimate.noise import unbiased_noise
 
 #: A direction of the command with less than this share of its power is at rest.
 _AT_REST = 1e-3
@@ -123,15 +124,12 @@ def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], Flo
     """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
     residual = np.array([r.residual for r in responses])
     freedom = np.array([r.freedom for r in responses])
-    m = residual.shape[1]
     reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9))) if len(freedom) else 0
     noises, totals = [], []
     for k in range(len(freedom)):
         near = slice(max(k - reach, 0), k + reach + 1)
         total = max(float(freedom[near].sum()), 1.0)
-        # the inverse of a covariance of few degrees of freedom is too large on average
-        unbiased = total / max(total - m, 1.0)
-        noises.append(np.asarray(residual[near].sum(axis=0) / total * unbiased, complex))
+        noises.append(unbiased_noise(residual[near].sum(axis=0) / total, total))
         totals.append(total)
     return noises, np.array(totals)
 

@@ -11,11 +11,11 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.estimators.errors_in_variables import eiv_fit, repeats, windows_used_again
 from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
-from tpjb_ident.dynamic.estimators.mm import mm_fit
+from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, ols_fit, phasor_table
 from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit
+from tpjb_ident.dynamic.estimators.solved_windows import solved_windows
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic, with_repeats
 from tpjb_ident.errors import ArgumentError
@@ -173,19 +173,18 @@ def _mm(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
 
 def _mm_eiv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:
     start = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)  # tells which windows are good, no more
-    repeated = repeats(table, windows_used_again(table, start.weights))
-    if repeated is None:
+    solved = solved_windows(table, start.coefficients, within_directions(start.weights, table.direction))
+    if solved is None:
         plain = _mm(table, omega, name)
         missing = Condition(
             "no-repeats",
             "too few repeats per direction for a noise covariance: plain MM, not corrected for displacement noise",
         )
         return replace(plain, status=merged(plain.status, (missing,)))
-    fit = eiv_fit(repeated, table.directions_differ)
-    numbers = (fit.h, fit.covariance, fit.dof, fit.chi_square)
-    conditions = start.conditions + not_locked(repeated.wandering, table.n_directions)
-    result = _result(table, omega, name, numbers, repeated.weights, conditions)
-    return replace(result, attenuation=fit.attenuation)
+    numbers = (solved.h, solved.covariance, solved.dof, solved.chi_square)
+    conditions = start.conditions + not_locked(solved.wandering, table.n_directions)
+    result = _result(table, omega, name, numbers, solved.weights, conditions)
+    return replace(result, attenuation=solved.attenuation)
 
 
 def _iv(table: PhasorTable, omega: float, name: str) -> DynamicStiffness:

@@ -22,6 +22,8 @@ _STEPS = 12
 _METRIC_FLOOR = 0.01
 #: Share of the windows in the smaller core that is looked for besides the half.
 _SMALL_CORE = 0.38
+#: A core that tells less than this of some window leaves H undetermined, and fits it exactly by that.
+_UNDETERMINED = 1e-12
 
 
 class Regression:
@@ -45,17 +47,22 @@ class Regression:
     def fit(self, weights: FloatArray) -> ComplexArray:
         """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
         sums = weights @ self._terms
-        a, d = sums[..., 0], sums[..., 1]
-        b = sums[..., 2] + 1j * sums[..., 3]
+        a, d, b, det = (part[..., None] for part in _normal(sums))
         half = (sums.shape[-1] - 4) // 2
         moment = (sums[..., 4 : 4 + half] + 1j * sums[..., 4 + half :]).reshape(*sums.shape[:-1], 2, self.q)
-        tiny = 1e-14 * a * d + np.finfo(float).tiny
-        det = a * d - (b.real**2 + b.imag**2)
-        det = np.where(np.abs(det) > tiny, det, tiny)[..., None]
         B = np.empty((*sums.shape[:-1], self.q, 2), dtype=complex)
-        B[..., 0] = (d[..., None] * moment[..., 0, :] - b[..., None] * moment[..., 1, :]) / det
-        B[..., 1] = (a[..., None] * moment[..., 1, :] - b.conj()[..., None] * moment[..., 0, :]) / det
+        B[..., 0] = (d * moment[..., 0, :] - b * moment[..., 1, :]) / det
+        B[..., 1] = (a * moment[..., 1, :] - b.conj() * moment[..., 0, :]) / det
         return B
+
+    def told(self, weights: FloatArray) -> FloatArray:
+        """Share of noise in the variance of every window's residual, (..., n): what B is not told there is the rest.
+
+        Windows alone in their direction cannot be held against a fit that has none of them.
+        """
+        a, d, b, det = _normal(weights @ self._terms[:, :4])
+        inverse = np.stack([d, a, -2 * b.real, -2 * b.imag], axis=-1) / det[..., None]
+        return np.asarray(1 / (1 + np.maximum(inverse @ self._terms[:, :4].T, 0.0)))
 
     def residual(self, B: ComplexArray) -> ComplexArray:
         """Y - X B', (n, q); `B` (q, 2)."""
@@ -64,6 +71,13 @@ class Regression:
     def terms(self, B: ComplexArray) -> FloatArray:
         """`products` of the residual, (..., q^2, n); `B` (..., q, 2)."""
         return products(self._y - B @ self._x)
+
+
+def _normal(sums: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray, FloatArray]:
+    """Entries xx, yy, xy of the normal equations, and their determinant, never zero; `sums` (..., 4 or more)."""
+    a, d, b = sums[..., 0], sums[..., 1], sums[..., 2] + 1j * sums[..., 3]
+    least = 1e-14 * a * d + 1e-28 * (a + d) ** 2 + np.finfo(float).tiny
+    return a, d, b, np.maximum(a * d - (b.real**2 + b.imag**2), least)
 
 
 @functools.cache
@@ -129,14 +143,15 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
     fitted exactly, so it does not count.)
     """
     seeds = _first_fits(regression, _start_pairs(direction, seed))
-    B, exact = _concentrated(regression, seeds, 0.5)
+    repeats = len(direction) / len(np.unique(direction))
+    half, exact = _concentrated(regression, seeds, 0.5, repeats)
     if exact:
-        return InitialFit(B, np.zeros((regression.q, regression.q), dtype=complex), True)
-    majority = InitialFit(*_reweighted(regression, B, 0.5))
-    B, exact = _concentrated(regression, seeds, _SMALL_CORE)
+        return InitialFit(regression.fit(half), np.zeros((regression.q, regression.q), dtype=complex), True)
+    majority = InitialFit(*_reweighted(regression, half, 0.5))
+    few, exact = _concentrated(regression, seeds, _SMALL_CORE, repeats)
     if exact:
         return majority
-    core = InitialFit(*_reweighted(regression, B, _SMALL_CORE))
+    core = InitialFit(*_reweighted(regression, few, _SMALL_CORE))
     limit = trimming_limits(2 * regression.q)[0]
     accepted = distance2(regression.terms(core.coefficients), core.scatter) <= limit
     everywhere = len(np.unique(direction[accepted])) == len(np.unique(direction))
@@ -175,31 +190,32 @@ def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, 
     B = regression.fit(chosen)
     terms = regression.terms(B)
     spread = np.broadcast_to(regression.metric, (len(B), regression.q, regression.q))
-    return B, terms, distance2(terms, spread)
+    return B, terms, regression.told(chosen) * distance2(terms, spread)
 
 
 def _concentrated(
-    regression: Regression, seeds: tuple[ComplexArray, FloatArray, FloatArray], share: float
-) -> tuple[ComplexArray, bool]:
-    """Best of many concentrated two-window starts, and whether its core fits exactly."""
+    regression: Regression, seeds: tuple[ComplexArray, FloatArray, FloatArray], share: float, repeats: float
+) -> tuple[FloatArray, bool]:
+    """Weights (n,) of the core of the best of many concentrated two-window starts, and whether it fits exactly."""
     h = _core_size(regression, share)
     B, terms, distance = seeds
     for step in range(_STEPS):
         previous = B
         weights = _nearest(distance, h)
+        told = regression.told(weights / repeats)  # windows of one direction may be off alike: they tell H once
         B = regression.fit(weights)
         terms = regression.terms(B)
         spread = _regular(scatter(terms, weights, regression.q), regression.metric)
-        exact = _fits_exactly(spread, regression.Y)
+        exact = _fits_exactly(spread, regression.Y) & (told.min(axis=-1) > _UNDETERMINED)
         if exact.any():
-            return B[int(np.argmax(exact))], True
+            return weights[int(np.argmax(exact))], True
         if step == 1:
             best = np.argsort(_log_det(spread), kind="stable")[:_KEPT]
-            B, spread, terms = B[best], spread[best], terms[best]
+            B, spread, terms, weights, told = B[best], spread[best], terms[best], weights[best], told[best]
         elif np.array_equal(B, previous):
             break  # every start keeps the same windows
-        distance = distance2(terms, spread)
-    return B[int(np.argmin(_log_det(spread)))], False
+        distance = told * distance2(terms, spread)
+    return weights[int(np.argmin(_log_det(spread)))], False
 
 
 def _nearest(distance: FloatArray, h: int) -> FloatArray:
@@ -225,20 +241,21 @@ def _regular(spread: ComplexArray, metric: ComplexArray) -> ComplexArray:
     return np.asarray(spread + (1e-28 + 1e-13 * size)[..., None, None] * metric)
 
 
-def _reweighted(regression: Regression, B: ComplexArray, share: float) -> tuple[ComplexArray, ComplexArray]:
-    """Fit and scatter of the windows that belong together, from the concentrated core."""
+def _reweighted(regression: Regression, core: FloatArray, share: float) -> tuple[ComplexArray, ComplexArray]:
+    """Fit and scatter of the windows that belong together, from the weights (n,) of the concentrated core."""
     n, q, metric = regression.n, regression.q, regression.metric
     h = _core_size(regression, share)
+    B, told = regression.fit(core), regression.told(core)
     terms = regression.terms(B)
     spread = _regular(scatter(terms, np.ones(n), q), metric)
     # The core's own scatter is self-consistent after a few looks at which windows it holds.
     for _ in range(4):
-        spread = _regular(scatter(terms, _nearest(distance2(terms, spread), h), q), metric)
+        spread = _regular(scatter(terms, _nearest(told * distance2(terms, spread), h), q), metric)
     spread = spread / half_shrinkage(2 * q, h / n)
     lower, upper, shrinkage = trimming_limits(2 * q)
     for _ in range(2):
-        weights = trimming_weight(distance2(terms, spread), lower, upper)
-        B = regression.fit(weights)
+        weights = trimming_weight(told * distance2(terms, spread), lower, upper)
+        B, told = regression.fit(weights), regression.told(weights)
         terms = regression.terms(B)
         freedom = (weights.sum() - 2) / weights.sum()
         spread = _regular(scatter(terms, weights, q) / (shrinkage * freedom), metric)

@@ -19,6 +19,8 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.least_trimmed import Regression, distance2, evenly_chosen, robust_start
 from tpjb_ident.estimate.robust_constants import bisquare_weight, efficiency_constant
 
+#: A direction with less than this share of its windows accepted differs as a whole.
+_ACCEPTED = 0.2
 #: Fewer windows than this leave nothing to be robust with: least squares, and said so.
 _MIN_WINDOWS = 8
 #: The start looks at no more windows than this: as many tell what the majority is, and its memory grows with them.
@@ -51,18 +53,28 @@ def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1,
     B, scatter = start.coefficients, start.scatter
     constant = efficiency_constant(2 * q)
     steps, change = 0, np.inf
-    distance = distance2(regression.terms(B), scatter)
+    weights = bisquare_weight(np.sqrt(distance2(regression.terms(B), scatter)), constant)
     while change > tolerance and steps < _MAX_ITERATIONS:
         steps += 1
-        B_new = regression.fit(bisquare_weight(np.sqrt(distance), constant))
-        distance = distance2(regression.terms(B_new), scatter)
+        B_new = regression.fit(weights)
+        weights = bisquare_weight(np.sqrt(distance2(regression.terms(B_new), scatter)), constant)
         change = float(np.abs(B_new - B).max() / np.abs(B).max())
         B = B_new
     conditions: tuple[Condition, ...] = ()
     if steps == _MAX_ITERATIONS:
         conditions = (Condition("iteration-limit", f"MM regression not settled after {steps} steps"),)
-    weights = bisquare_weight(np.sqrt(distance), constant)
     return RobustFit(B, scatter, weights, steps, conditions)
+
+
+def within_directions(weights: FloatArray, direction: IntArray) -> FloatArray:
+    """Weights (n,) by which windows are judged within their direction (n,).
+
+    A direction as a whole is no outlier of the windows: the scatter of the directions, or the weight of its block in
+    the solve, takes it.
+    """
+    size = np.bincount(direction)
+    share = np.bincount(direction, weights=weights > _ACCEPTED) / np.maximum(size, 1)
+    return np.where((share < _ACCEPTED)[direction], 1.0, weights)
 
 
 def _exact_fit(regression: Regression, B: ComplexArray) -> RobustFit:

@@ -45,8 +45,6 @@ class PhasorTable:
         Instruments, scaled likewise.
     valid : (n_given,) ndarray of bool
         Which of the given windows are in the table (finite ones).
-    directions_differ : bool
-        Whether directions are known (from elsewhere in the campaign) to differ by more than their repeats.
     """
 
     D: ComplexArray
@@ -56,7 +54,6 @@ class PhasorTable:
     f_scale: float
     reference: ComplexArray | None
     valid: BoolArray
-    directions_differ: bool = False
 
     def __len__(self) -> int:
         return len(self.D)

@@ -11,17 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri, gammaincinv
+from scipy.special import gammaincinv
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
+from tpjb_ident.estimate.scatter import mixed_dof
 
 #: Up to so many directions their effects are pooled over directions and axes: a jackknife of three or four is none.
 _FEW_DIRECTIONS = 5
 #: Degrees of freedom per spare direction of the pooled variance: effects are real gains as a rule, not circular noise.
 _POOLED_DOF = 3.0
-#: Significance from which direction effects take part in weighting the directions.
-CLEAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -50,35 +49,13 @@ def information(D: ComplexArray, D_star: ComplexArray, inverse: ComplexArray) ->
     return np.einsum("gac,gb,gd->abcd", inverse, D_star.conj(), D).reshape(4, 4)
 
 
-def direction_effect(residual: ComplexArray, means: DirectionMeans, noise: ComplexArray) -> tuple[ComplexArray, float]:
-    """Between-direction covariance per unit |D|^2, by moments, never negative.
-
-    `residual` (g, 2), `noise` (2, 2), gives T (2, 2).
-    """
-    g = len(means)
-    if g <= 2:
-        return np.zeros((2, 2), dtype=complex), np.nan
+def direction_chi_square(residual: ComplexArray, means: DirectionMeans, noise: ComplexArray) -> float:
+    """Reduced chi-square of the directions' residuals (g, 2) against the repeats' own `noise` (2, 2)."""
+    spare = len(means) - 2
+    if spare <= 0:
+        return np.nan
     moment = (means.count[:, None] * residual).T @ residual.conj()
-    gram = (means.count[:, None] * means.D.conj()).T @ means.D
-    leverage = means.count * np.einsum("ga,ab,gb->g", means.D, np.linalg.inv(gram), means.D.conj()).real
-    power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
-    gain = float(((1 - leverage) * means.count * power).sum())
-    # In coordinates where the repeat noise is the unit matrix, truncation keeps the axes' freedom.
-    root = np.linalg.cholesky(noise)
-    inverse_root = np.linalg.inv(root)
-    white = inverse_root @ moment @ inverse_root.conj().T
-    chi_square = float(np.trace(white).real / (2 * (g - 2)))
-    if chi_square * 4 * (g - 2) < chdtri(4 * (g - 2), CLEAR):
-        return np.zeros((2, 2), dtype=complex), chi_square
-    values, vectors = np.linalg.eigh(white - (g - 2) * np.eye(2))
-    T_white = (vectors * np.maximum(values, 0.0)) @ vectors.conj().T / gain
-    return root @ T_white @ root.conj().T, chi_square
-
-
-def direction_covariances(means: DirectionMeans, noise: ComplexArray, T: ComplexArray) -> ComplexArray:
-    """V_g = noise / count_g + T |D_g|^2, shape (g, 2, 2); `noise` (2, 2), `T` (2, 2)."""
-    power = np.einsum("ga,ga->g", means.D, means.D.conj()).real
-    return noise / means.count[:, None, None] + T * power[:, None, None]
+    return float(np.trace(np.linalg.solve(noise, moment)).real) / (2 * spare)
 
 
 @dataclass(frozen=True)
@@ -92,9 +69,7 @@ class VarianceByDirection:
     pooled: FloatArray | None = None  #: (8, 8)
 
 
-def spread_of(
-    shares: VarianceByDirection, chi_square: float, known_effect: bool = False
-) -> tuple[FloatArray, FloatArray]:
+def spread_of(shares: VarianceByDirection, chi_square: float) -> tuple[FloatArray, FloatArray]:
     """Repeat noise as known, plus what leaving out one direction at a time shows beyond it.
 
     A direction effect is no circular noise: a static load that is off changes K and hardly C, one entry
@@ -108,10 +83,10 @@ def spread_of(
     repeat_noise = _positive(complex_to_real_covariance(shares.repeat))
     g = len(score)
     spare = 4.0 * (g - 2)
-    if g <= 2 or not (known_effect or chi_square > 1.0):
+    if g <= 2 or not chi_square > 1.0:
         return repeat_noise, np.full(8, max(dof_repeat, 1.0))
     limit = 2.0 * gammaincinv(spare / 2, 0.95) / spare
-    certain = min(1.0, (chi_square - 1.0) / (limit - 1.0)) if not known_effect else 1.0
+    certain = min(1.0, (chi_square - 1.0) / (limit - 1.0))
     moved = np.linalg.solve(parts.sum(axis=0) - parts, score[:, :, None])[:, :, 0]
     moved = np.concatenate([moved.real, moved.imag], axis=1)
     jackknife = (g - 1) / g * moved.T @ moved
@@ -154,18 +129,6 @@ def pooled_effect(residual: ComplexArray, means: DirectionMeans) -> FloatArray:
     return complex_to_real_covariance(np.kron(np.eye(2), share * inverse @ spread @ inverse.conj().T))
 
 
-def mixed_dof(total: FloatArray, repeat: FloatArray, dof_repeat: float, dof_between: FloatArray) -> FloatArray:
-    """Welch-Satterthwaite degrees of freedom of variances made of two parts.
-
-    `total`, `repeat` (8,), `dof_between` (8,).
-    """
-    between = np.maximum(total - repeat, 0.0)
-    spread = repeat**2 / max(dof_repeat, 1.0) + between**2 / dof_between
-    with np.errstate(divide="ignore", invalid="ignore"):  # no spread at all: the next line says what then
-        dof = total**2 / spread
-    return np.where(np.isfinite(dof), np.maximum(dof, 1.0), max(dof_repeat, 1.0))
-
-
 def homoscedastic(
     D: ComplexArray, residual: ComplexArray, weights: FloatArray, correction: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
@@ -198,7 +161,7 @@ def with_repeats(
     if spare < 4.0 or np.linalg.eigvalsh(noise)[0] <= 0:
         return None
     means = DirectionMeans(mean[used, :2], mean[used, 2:4], count[used])
-    _, chi_square = direction_effect(mean[used, 4:], means, noise)
+    chi_square = direction_chi_square(mean[used, 4:], means, noise)
     scaled = means.D * means.count[:, None]
     parts = _regression_parts(table, weights)
     bread = np.linalg.inv(parts.sum(axis=0))
@@ -207,7 +170,7 @@ def with_repeats(
     score = np.einsum("ga,gb->gab", mean[used, 4:] * means.count[:, None], means.D.conj()).reshape(-1, 4)
     pooled = pooled_effect(mean[used, 4:], means) if used.sum() > 2 else None
     shares = VarianceByDirection(score, parts[used], bread @ meat @ bread.conj().T, 2 * spare, pooled)
-    return (*spread_of(shares, chi_square, table.directions_differ), chi_square)
+    return (*spread_of(shares, chi_square), chi_square)
 
 
 def _regression_parts(table: PhasorTable, weights: FloatArray) -> ComplexArray:

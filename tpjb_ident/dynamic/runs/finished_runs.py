@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
-from tpjb_ident.dynamic.runs.point_data import finite_mean
 from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore
 from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_force, mains_line
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -52,11 +51,6 @@ class RunDigest:
     def conditions(self) -> tuple[Condition, ...]:
         """What its records gave rise to."""
         return self.phasors.conditions
-
-    @property
-    def mean_load(self) -> FloatArray:
-        """Mean cell force, (2,) [N]."""
-        return finite_mean(self.phasors.cell_force.mean)
 
 
 def digest(result: RunResult, sample_rate: float = 0.0) -> RunDigest:

@@ -28,7 +28,6 @@ class PointData:
     A: ComplexArray  #: (n, 2) complex, m/s^2
     run_index: IntArray  #: (n,): windows of one run are repeats of one excitation
     found: float = 0.0
-    rig: ComplexArray | None = None  #: (2, 2) complex, N/m: stiffness of the rig that was taken off F
 
     @property
     def omega(self) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.runs.baseline import Baseline
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
 from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
 
@@ -15,9 +14,8 @@ from tpjb_ident.dynamic.runs.point_data import PointData, group, point_data
 class PointSource:
     """An operating point with its runs."""
 
-    data: PointData = field(repr=False)  #: all windows, without the rig's own part
+    data: PointData = field(repr=False)
     digests: tuple[RunDigest, ...]
-    baseline: Baseline
 
     @property
     def point(self) -> OperatingPoint:
@@ -34,11 +32,11 @@ class PointSource:
         return any(condition in digest.conditions for digest in self.digests)
 
 
-def point_sources(finished: FinishedRuns, baseline: Baseline) -> list[PointSource]:
+def point_sources(finished: FinishedRuns) -> list[PointSource]:
     """Operating points of all runs kept."""
     digests = finished.digests
     sources = []
     for point, members in group([(digest.point, digest.excitations) for digest in digests]):
-        data = baseline.taken_off(point_data(point, [(digests[k].phasors, i) for k, i in members]))
-        sources.append(PointSource(data, tuple(digests[k] for k, _ in members), baseline))
+        data = point_data(point, [(digests[k].phasors, i) for k, i in members])
+        sources.append(PointSource(data, tuple(digests[k] for k, _ in members)))
     return sources

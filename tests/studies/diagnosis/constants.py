@@ -1,0 +1,122 @@
+"""Constants of the decision, each at half and at double of its value, on campaigns of `strangers`.
+
+    python -m tests.studies.diagnosis.constants [--bearings 12] [--count 6] [--seed 302] [--rows FILE] [--write]
+
+Every campaign is searched once, with the constants as they stand; what was fitted is then weighed and judged again with
+one constant changed: the decision alone. An answer is its verdict with its names. The share that a name takes keeps
+half or twice its distance from one; of the prior each further fault has half or twice its odds.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.studies.diagnosis.mixtures import SKIPPED, hidden, said
+from tests.studies.diagnosis.strangers import KINDS, Stranger, draw, stranger
+from tests.studies.diagnosis.tables import all_there, no_false
+from tests.studies.results import Rows, table, write_section
+from tpjb_ident.diagnosis.comparison.search import Comparison, _Search
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.forward.workers import workers
+from tpjb_ident.diagnosis.verdict.decide import decide
+
+#: Constants that act on what was fitted.
+JUDGED = (
+    "prior", "term", "untenable", "included", "nothing", "family", "right", "quiet", "halved", "rest", "drifting",
+)  # fmt: skip
+ENDS = {"half": 0.5, "double": 2.0}
+
+
+def changed(settings: DiagnoseSettings, name: str, factor: float) -> DiagnoseSettings:
+    """Settings with one constant changed; a probability near one keeps its distance to one times the factor."""
+    value: Any = getattr(settings, name)
+    if name == "prior":  # of one fault and more, beside none
+        value = (value[0], *(factor**count * share for count, share in enumerate(value[1:], 1)))
+    elif name == "included":
+        value = round(1.0 - (1.0 - value) * factor, 6)
+    else:
+        value = type(value)(max(round(value * factor), 1) if isinstance(value, int) else value * factor)
+    return replace(settings, **{name: value})
+
+
+def run(one: Stranger, number: int, seed: int) -> dict[str, Any] | None:
+    """Draw and search a campaign; what is said of it with every constant changed."""
+    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
+    drawn = next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
+    if drawn is None:
+        return None
+    settings = DiagnoseSettings(workers=1, skip=SKIPPED)
+    with workers(one.bench.forward, drawn.problem, 1) as processes:
+        search = _Search(processes, drawn.problem, settings, lambda text, share: None)
+
+        def answer(comparison: Comparison, chosen: DiagnoseSettings) -> dict[str, Any]:
+            return said(decide(processes, drawn.problem, comparison, chosen).verdict)
+
+        answers = {"as it is": answer(search.result(), settings)}
+        for name in JUDGED:
+            for end, factor in ENDS.items():
+                search.settings = changed(settings, name, factor)
+                answers[f"{name} {end}"] = answer(search._weighed(), search.settings)
+    return {"bearing": number, "seed": seed, "kind": kind, **hidden(drawn), "answers": answers}
+
+
+def report(rows: Sequence[dict[str, Any]]) -> str:
+    """The table: answers that change, and where to."""
+    lines = [_line(rows, "as it stands", "", "as it is")]
+    for name in JUDGED:
+        lines += [
+            _line(rows, name, str(getattr(changed(DiagnoseSettings(), name, factor), name)), f"{name} {end}")
+            for end, factor in ENDS.items()
+        ]
+    head = ["constant", "value", "answers that change", "all that is hidden listed", "a wrong name listed", "named"]
+    return f"{len(rows)} campaigns.\n\n" + table([*head, "a name where scatter is all"], lines)
+
+
+def _line(rows: Sequence[dict[str, Any]], name: str, value: str, key: str) -> list[object]:
+    known = [{**row, **row["answers"][key]} for row in rows]
+    inside = [row for row in known if row["truth"] and not row["outside"]]
+    moved = sum(_answer(row["answers"][key]) != _answer(row["answers"]["as it is"]) for row in rows)
+    return [
+        name, value, moved, sum(map(all_there, inside)), sum(not no_false(row) for row in known),
+        sum(row["verdict"] == "named" for row in known),
+        sum(bool(row["named"]) for row in known if row["kind"] == "scatter"),
+    ]  # fmt: skip
+
+
+def _answer(row: dict[str, Any]) -> tuple[str, list[str]]:
+    return row["verdict"], sorted(effect["name"] for effect in row["named"])
+
+
+def main() -> None:
+    """Search, judge with every constant, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bearings", type=int, default=12)
+    parser.add_argument("--count", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=302)
+    parser.add_argument("--rows", type=Path, default=Path("constants.jsonl"))
+    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    asked = parser.parse_args()
+    stored = Rows(asked.rows, "bearing", "seed")
+    for number in range(asked.bearings):
+        seeds = [asked.seed + k for k in range(asked.count)]
+        missing = [seed for seed in seeds if (number, seed) not in stored.known]
+        one = stranger(number, asked.rows.parent) if missing else None
+        for seed in missing:
+            row = run(one, number, seed) if one is not None else None
+            if row is not None:
+                stored.add(row)
+    text = report([*stored.known.values()])
+    if asked.write:
+        write_section("constants", "python -m tests.studies.diagnosis.constants --write", text)
+    else:
+        print(text)
+
+
+if __name__ == "__main__":
+    main()
