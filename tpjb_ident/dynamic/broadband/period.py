@@ -26,7 +26,7 @@ _MAX_SLIP = 0.01
 def find_period(samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
     """Smallest period in samples of what excites the band, None where nothing repeats; `lines` of shaft and mains."""
     step = samples.rate / samples.length
-    frequency = np.asarray(step * np.arange(samples.length // 2 + 1), dtype=float)
+    frequency = step * np.arange(samples.length // 2 + 1)
     keep = (frequency > band[0] - 1.5 * step) & (frequency < band[1] + 1.5 * step)
     keep &= ~bins_taken(frequency, lines, 1 / step)
     # first taken off, as a notch leaves what has leaked from them; then all of their bins, which drift leaves
