@@ -152,7 +152,8 @@ def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
 def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
     if run.excitation_kind not in _MAY_REPEAT:
         return None
-    period = find_period(samples, band, lines)
+    frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
+    period = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
     if period is None and run.excitation_kind == "multisine":
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
