@@ -36,6 +36,8 @@ from tpjb_ident.estimate.term import Additive, Fitted, Term
 _STEPS, _CONVERGED = 18, 1e-9
 #: Steps in which weights and scatter follow.
 _SCATTER_STEPS = 12
+#: Steps after which the noise of the housing is found: at first, and where what turns with the shaft has settled.
+_HOUSING_STEPS = (3, 7)
 #: Change of H in one step, of its size, at most: a line next to noise could run away.
 _LARGEST_STEP = 1.0
 #: Weight of an unknown beside a block's best told one below which nothing is told of it.
@@ -134,7 +136,7 @@ class Solver:
             sums, fit = self._sums()
             last = step(sums, self.shared.prior(), self.own.prior())
             change = self._move(last)
-            if count == 3:
+            if count in _HOUSING_STEPS:
                 self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
             if self.scatter.follows and count < _SCATTER_STEPS:
                 self.scatter = self._scatter(fit, count)
