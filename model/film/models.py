@@ -22,13 +22,12 @@ def solve_by(
     sharp: bool,
     supplied: float,
 ) -> FilmForces:
-    """Pressure of one film; sharp: its derivatives once more, with the pressure that `work` holds.
+    """Pressure of one film; where it is None when a search is compiled, the search has no code of the other models.
 
-    Where the model is None when a search is compiled, the search has no code of the others. `supplied`: oil there is
-    at the leading edge [kg/s/m].
+    `supplied`: oil there is at the leading edge [kg/s/m].
     """
     if model is None:
-        return solve_film(grid, work, wedge, speed, sharp, None, sharp)
+        return solve_film(grid, work, wedge, speed, sharp)
     if model == _JFO:
         return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
-    return solve_film(grid, work, wedge, speed, sharp, True, sharp)
+    return solve_film(grid, work, wedge, speed, sharp, True)
