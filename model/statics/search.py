@@ -297,11 +297,12 @@ class Search:
             if self.case.mixing and math.isfinite(self.case.fresh):
                 state.passed[m] = through_flow(other)[1]
             state.tilt[m], state.deflection[m], state.idle[m] = other.tilt, other.deflection, other.idle
-            film.work.temperature[:] = other.work.temperature
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
                 state.inlet[m] = other.inlet
-            for own, known in zip(film.heat_state, other.heat_state, strict=False):
-                own[:] = known
+            if self.case.thermal != ISOTHERMAL:  # there the film is as warm as its own supply
+                film.work.temperature[:] = other.work.temperature
+                for own, known in zip(film.heat_state, other.heat_state, strict=False):
+                    own[:] = known
             film.work.ruptured[:] = other.work.ruptured
             film.work.pressure[1:] = other.work.pressure[1:]
             if self.setup.flexible_pads:

@@ -238,7 +238,7 @@ def test_cells_on_a_clock_of_another_rate_are_found_and_put_right(tmp_path, kind
     assert "clocks-differ" in result.quality
     h = truth(rig, result)
     # not put right it would be 0.11; where the cells began to record is known to half a sample only
-    assert abs(np.median(np.angle(result.h[:, 0, 0] / h[:, 0, 0]))) < 0.03
+    assert abs(np.median(np.angle(result.h[:, 0, 0] / h[:, 0, 0]))) < 0.05
     away = np.concatenate([(result.h - h).real.reshape(-1, 4), (result.h - h).imag.reshape(-1, 4)], axis=1)
     assert np.mean(np.abs(away) <= result.half_width()) > 0.9
     same = band_of(tmp_path, replace(rig, cells=0.0), seed=3)

@@ -107,6 +107,16 @@ def test_warm_start_does_not_change_the_answer(rocker):
     np.testing.assert_allclose(warm.position, cold.position, atol=1e-12)
 
 
+@pytest.mark.parametrize("thermal", ["isothermal", "adiabatic"])
+def test_a_neighbour_in_other_oil_does_not_change_the_answer(rocker, thermal):
+    oil = rocker.oil
+    hot = replace(rocker, oil=replace(oil, supply_temperature=oil.supply_temperature + 10.0))
+    cold = predict(rocker, 5000.0, DOWN, SPEED, thermal=thermal)
+    alone = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal)
+    warm = predict(hot, 5000.0, DOWN, SPEED, thermal=thermal, start=cold)
+    np.testing.assert_allclose(warm.k, alone.k, atol=1e-6 * alone.kyy)
+
+
 def test_upper_pads_unload_and_are_listed(rocker):
     p = predict(rocker, 8750.0, DOWN, SPEED, pivots=4e8)
     assert p.idle_pads == (3, 4)
