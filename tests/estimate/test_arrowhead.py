@@ -142,6 +142,17 @@ def test_always_means_always():
     assert step(taken(point, r, J_h, J_t), shared(to_prior, precision, always), Prior.none(POINTS)).estimated.all()
 
 
+def test_never_means_never_and_the_prior_passes_on():
+    point, r, J_h, J_t, to_prior, precision = problem(8)
+    never = np.arange(PARAMETERS) == 1
+    prior = Prior(to_prior, precision, np.zeros(PARAMETERS, dtype=bool), never)
+    free, found = (step(taken(point, r, J_h, J_t), p, Prior.none(POINTS)) for p in (shared(to_prior, precision), prior))
+    assert free.estimated[1]
+    np.testing.assert_array_equal(found.estimated, free.estimated & ~never)
+    assert found.theta[1] == to_prior[1]
+    assert np.abs(found.factors()[1]).max() > 0.0
+
+
 def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
     """One row of size j tells 1 / sqrt(1 + j^2) of a prior of one."""
     for tells, estimated in ((0.81, False), (0.79, True)):

@@ -9,6 +9,7 @@ import pytest
 
 from tests.dynamic.phasor_cases import complex_normal
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
+from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 
 EXACT = Case(noise=0.0)
@@ -175,3 +176,27 @@ def test_two_bad_runs_of_five_leave_a_wide_interval_that_holds(seed):
     # the other points know nothing of it
     assert np.median(deviations(solution)[[0, 2]] / usual[[0, 2]]) < 2
     assert np.abs(away(solution, truth)[[0, 2]]).max() < 5
+
+
+def test_a_dry_test_that_is_exact_is_taken_off_and_leaves_no_error():
+    """Its covariance is rounding, negative at places."""
+    rig, blocks, truth = made(EXACT)
+    omega = np.unique(blocks.omega)
+    bare = np.tile(np.diag([2e7, 3e7]) + 1e6j, (len(omega), 1, 1))
+    covariance = np.tile(-1e-9 * np.eye(8), (len(omega), 1, 1))
+    known = replace(rig, bare=RigStiffness(omega, bare, covariance))
+    solution = Solver(known, blocks, terms_of(known, blocks), truth - bare[0]).run()
+    np.testing.assert_allclose(solution.h, truth - bare[0], atol=1e-8 * np.abs(truth).max())
+    assert not solution.shares["baseline"].any()
+
+
+def test_what_a_dry_test_does_not_know_is_an_error_of_every_point():
+    rig, blocks, truth = made(EXACT)
+    omega = np.unique(blocks.omega)
+    bare = np.tile(np.diag([2e7, 3e7]) + 1e6j, (len(omega), 1, 1))
+    covariance = np.tile(np.diag(np.arange(1.0, 9.0)) * 1e10, (len(omega), 1, 1))
+    known = replace(rig, bare=RigStiffness(omega, bare, covariance))
+    solution = Solver(known, blocks, terms_of(known, blocks), truth - bare[0]).run()
+    np.testing.assert_allclose(
+        solution.shares["baseline"], np.broadcast_to(covariance[0], (len(truth), 8, 8)), rtol=1e-3, atol=1e7
+    )

@@ -84,6 +84,10 @@ class Sums:
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
 
+    def given(self, numbers: int) -> FloatArray:
+        """Covariance of the first `numbers` of every point with all parameters given, (P, numbers, numbers)."""
+        return np.asarray(np.linalg.inv(self.A[:, :numbers, :numbers]), dtype=float)
+
     def drop(self, points: BoolArray, numbers: int) -> None:
         """Leave points (P,) out that have no answer, `numbers` of H each."""
         self.A[points], self.E[points], self.g_h[points] = 0.0, 0.0, 0.0
@@ -151,7 +155,7 @@ class Step:
 def step(sums: Sums, shared: Prior, own: Prior) -> Step:
     """Solve the normal equations; the points' own parameters are the last of their numbers."""
     k = sums.A.shape[1] - own.precision.shape[1]
-    given = np.asarray(np.linalg.inv(sums.A[:, :k, :k]), dtype=float)
+    given = sums.given(k)
     A, g = sums.A.copy(), sums.g_h.copy()
     last = np.arange(k, A.shape[1])
     A[:, last, last] += own.precision

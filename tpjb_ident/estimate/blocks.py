@@ -44,10 +44,8 @@ class RigStiffness:
 
     def weights(self, omega: FloatArray) -> FloatArray:
         """Weights of the frequencies at `omega` (n,), linear between them, (n, F); zero where it is not known."""
-        weights = np.zeros((len(omega), len(self.omega)))
-        for k in range(len(self.omega)):
-            weights[:, k] = np.interp(omega, self.omega, np.arange(len(self.omega)) == k)
-        return weights * self.known(omega)[:, None]
+        rows = [np.interp(omega, self.omega, one) for one in np.eye(len(self.omega))]
+        return np.reshape(rows, (len(self.omega), len(omega))).T * self.known(omega)[:, None]
 
     def known(self, omega: FloatArray) -> BoolArray:
         """Whether the rig was measured about `omega` (n,), (n,)."""
@@ -68,8 +66,8 @@ class Rig:
     mass: float
     mass_uncertainty: float = 0.0
     mount: str = "cells"  #: "cells", "floating", or "unknown": no accelerometer tells
-    apart: tuple[Condition, ...] = ()  #: what gains said that are since taken as uncertain as they differ
-    late: tuple[Condition, ...] = ()  #: what the housing said of cells that are since taken as late as they may be
+    #: by term: what its test said of sensors that are since taken as uncertain as it showed them
+    contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
 
     def of(self, quantity: str) -> IntArray:

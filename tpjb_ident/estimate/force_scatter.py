@@ -20,10 +20,10 @@ from rigdata.arrays import ComplexArray, FloatArray
 
 #: In phase with the motion along the spring force and across it, ahead of it along the damping force and across it.
 COMPONENTS = 4
-#: Which components move the numbers of a point, four each: stiffness, damping, mass.
-IN_PHASE, AHEAD = (0, 1), (2, 3)
+#: Which components move stiffness and mass of a point, and which its damping.
+PHASES = slice(0, 2), slice(2, 4)
 #: Which act across the spring force, or the damping force.
-ACROSS = (1, 3)
+ACROSS = slice(1, 4, 2)
 #: A scatter across the force is at most so many times its size: where stiffness and mass cancel there is none along.
 _LARGEST = 10.0
 #: A component has at least this share of the mean scatter: keeps rows of computed records solvable.
@@ -56,8 +56,9 @@ class ForceScatter:
         """
         force = np.einsum("nij,nj->ni", h, motion)
         usual = np.linalg.norm(h, axis=(1, 2)) * np.linalg.norm(motion, axis=1) / np.sqrt(2)
-        across = np.minimum(usual / np.maximum(np.linalg.norm(force, axis=1), 1e-300), _LARGEST)
-        size = np.where(np.isin(np.arange(COMPONENTS), ACROSS), across[:, None], 1.0)
+        size = np.ones((len(force), COMPONENTS))
+        ratio = usual / np.maximum(np.linalg.norm(force, axis=1), 1e-300)
+        size[:, ACROSS] = np.minimum(ratio, _LARGEST)[:, None]
         phase = np.exp(0.5j * np.angle(np.sum(motion**2, axis=1)))[:, None]
         spring, damper = (_directions(part) for part in ((force / phase).real, (force / phase).imag))
         columns = patterns @ np.concatenate([spring, 1j * damper], axis=2) * phase[:, None]

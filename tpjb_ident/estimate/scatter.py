@@ -76,7 +76,7 @@ class Scatter:
         zero = np.zeros((points, COMPONENTS))
         return Scatter(zero, np.ones(blocks), np.zeros(COMPONENTS), np.zeros(COMPONENTS), none, np.zeros(points))
 
-    def freedom(self, point: int, components: list[int]) -> float:
+    def freedom(self, point: int, components: slice) -> float:
         """Degrees of freedom of the mean of some components of a point, Welch and Satterthwaite."""
         if self.own[point]:
             return max(float(self.own_spare[point]), 1.0)

@@ -24,7 +24,7 @@ from tpjb_ident.estimate.equation import (
     motion_matrix,
     with_factor,
 )
-from tpjb_ident.estimate.force_scatter import AHEAD, IN_PHASE, AlongForce, ForceScatter
+from tpjb_ident.estimate.force_scatter import PHASES, AlongForce, ForceScatter
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import HOUSING_NOISE, covariance, housing_noise, scatter_patterns
 from tpjb_ident.estimate.parameters import Table
@@ -77,16 +77,11 @@ class Solution:
         total = np.diag(self.records[group])
         if not chosen.any():
             return np.full(len(total), noise_dof)
-        weights = np.maximum(self.weights[chosen], 1e-9)
-        share = np.average(self.scatter_share[chosen], axis=0, weights=weights)
-        dof = np.zeros(len(total))
-        for k in range(len(total)):
-            # stiffness and mass show in phase with the motion, damping ahead of it
-            of_number = list(AHEAD if k // 4 == 1 else IN_PHASE)
-            repeat = (1 - share[of_number].mean()) * total[k]
-            between = np.array(self.scatter.freedom(group, of_number))
-            dof[k] = mixed_dof(total[k], repeat, noise_dof, between)
-        return dof
+        share = np.average(self.scatter_share[chosen], axis=0, weights=np.maximum(self.weights[chosen], 1e-9))
+        phase = (np.arange(len(total)) // 4) % 2  # stiffness, damping, mass: four numbers each
+        repeat = np.array([1 - share[components].mean() for components in PHASES])[phase] * total
+        between = np.array([self.scatter.freedom(group, components) for components in PHASES])[phase]
+        return mixed_dof(total, repeat, noise_dof, between)
 
     def words(self) -> tuple[str, ...]:
         """What the records tell of the terms' parameters."""
@@ -195,7 +190,7 @@ class Solver:
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        given = np.asarray(np.linalg.inv(sums.A[:, : self.shape.numbers, : self.shape.numbers]), dtype=float)
+        given = sums.given(self.shape.numbers)
         parts = [_fit(rows, weight, given[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)

@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, vector
 from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
+from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
 from tpjb_ident.identification.unstated_clocks import with_found_devices
@@ -75,8 +76,8 @@ def solve_campaign(
     sources: Sequence[PointSource],
     digests: Sequence[RunDigest],
     workers: Workers,
-    correct: bool = True,
-    bare: RigStiffness | None = None,
+    correct: bool,
+    bare: RigStiffness,
 ) -> CampaignSolution:
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
@@ -96,7 +97,7 @@ def solve_campaign(
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
         mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), common)
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare or RigStiffness())
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
         rates = _clock_rates(rig, blocks, _starts(rig, sources, means))
@@ -134,12 +135,13 @@ def learnt_rig(rig: Rig, solution: Solution) -> Rig:
 def _with_lag(rig: Rig, solution: Solution) -> Rig:
     """The rig, its cells as uncertain in time as the housing shows them late, where the manifest says nothing."""
     housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    lag = 0.0 if housing is None else housing.lag_of_cells(solution.fitted[housing.name])
-    if not lag or any(sensor.delay_uncertainty for sensor in rig.sensors):
+    if housing is None or any(sensor.delay_uncertainty for sensor in rig.sensors):
         return rig
-    assert housing is not None
+    lag = housing.lag_of_cells(solution.fitted[housing.name])
+    if not lag:
+        return rig
     sensors = tuple(replace(s, delay_uncertainty=lag) if s.quantity == "force" else s for s in rig.sensors)
-    return replace(rig, sensors=sensors, late=housing.conditions(solution.fitted[housing.name]))
+    return _contradicted(replace(rig, sensors=sensors), housing, solution)
 
 
 def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
@@ -152,7 +154,12 @@ def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
         return rig
     wide = {s.name: max(spread.get(s.quantity, 0.0), s.uncertainty or 0.0) or None for s in rig.sensors}
     sensors = tuple(replace(s, uncertainty=wide[s.name]) for s in rig.sensors)
-    return replace(rig, sensors=sensors, apart=gain.conditions(solution.fitted[gain.name]))
+    return _contradicted(replace(rig, sensors=sensors), gain, solution)
+
+
+def _contradicted(rig: Rig, term: Term, solution: Solution) -> Rig:
+    """The rig, with what a term's test said of sensors that are now taken as more uncertain."""
+    return replace(rig, contradicted={**rig.contradicted, term.name: term.conditions(solution.fitted[term.name])})
 
 
 def _film(source: PointSource, point: PointMeans) -> FilmChange:

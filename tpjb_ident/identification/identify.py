@@ -145,7 +145,7 @@ def assemble(
     workers = workers or Workers()
     checked = check_finished(campaign, finished)
     digests = finished.digests
-    dry = dry or dry_test(campaign, settings.phasors, own_method(settings.method))
+    dry = dry or DryTest()
     sources = point_sources(finished)
     report("estimating", 0, len(sources))
     solved = solve_campaign(campaign, sources, digests, workers, settings.correct, dry.stiffness)

@@ -47,7 +47,7 @@ class IdentifiedBands:
 
 
 def identify_bands(
-    campaign: Campaign, settings: BandSettings, progress: Progress, bare: RigStiffness | None = None
+    campaign: Campaign, settings: BandSettings, progress: Progress, bare: RigStiffness
 ) -> IdentifiedBands:
     """Identify every operating point of a campaign that was excited over a band."""
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
@@ -65,7 +65,7 @@ def identify_bands(
         raise remaining[0].error
     zero = campaign_zero(points, cell_zero_uncertainty(campaign))
     misses, common = load_misses(points, zero.force)
-    solved = _solved(campaign, points, (misses, common), settings, bare or RigStiffness())
+    solved = _solved(campaign, points, (misses, common), settings, bare)
     results = []
     for b, point in enumerate(points):
         conditions = load_conditions(misses[b], common) + zero.conditions()

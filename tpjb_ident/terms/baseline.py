@@ -27,6 +27,8 @@ class Baseline(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """Force of one standard deviation of every number, as cells and housing feel it."""
         bare = self.rig.bare
-        changes = complex_matrix(np.asarray(np.linalg.cholesky(bare.covariance).transpose(0, 2, 1), float))
+        # of a computed record the covariance is nothing, and rounding makes that negative
+        values, vectors = np.linalg.eigh(bare.covariance)
+        changes = complex_matrix((vectors * np.sqrt(np.maximum(values, 0.0))[:, None]).transpose(0, 2, 1))
         force = np.einsum("nf,fkij,nj->nifk", bare.weights(blocks.omega), changes, state.u[:, :2], optimize=True)
         return film_force_rows(self.rig, blocks, state, force.reshape(len(blocks), 2, -1))

@@ -55,7 +55,7 @@ class Gain(Factor):
         """Sensors that differ from the others beyond what is stated."""
         outliers = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
         if not outliers:
-            return self.rig.apart
+            return self.rig.contradicted.get(self.name, ())
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
         apart = max(np.ptp(self._values(fitted, quantity)) for quantity in self.spread(fitted))
         return (Condition("records-contradicted" if apart > _NO_GAIN else "probe-gains-differ", text),)

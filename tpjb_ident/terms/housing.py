@@ -103,8 +103,8 @@ class Housing(Term):
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
-        if self.rig.late:
-            return self.rig.late
+        if self.rig.contradicted.get(self.name):
+            return self.rig.contradicted[self.name]
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if fitted.unexplained > _UNEXPLAINED and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"

@@ -25,13 +25,8 @@ from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_me
 _MIN_SPARE_REPEATS = 8.0
 #: Rows of a table: displacement and force along X and Y, straight, without uncertainty.
 _AXES = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
-_RIG = Rig(
-    tuple(
-        Sensor(name, quantity) for quantity in ("displacement", "force") for name in (f"{quantity} X", f"{quantity} Y")
-    ),
-    mass=0.0,
-    mount="unknown",
-)
+_QUANTITIES = ("displacement", "displacement", "force", "force")
+_RIG = Rig(tuple(Sensor(quantity, quantity) for quantity in _QUANTITIES), mass=0.0, mount="unknown")
 
 
 @dataclass(frozen=True)
@@ -79,7 +74,7 @@ def _blocks(means: WindowMeans) -> Blocks:
     noise = unbiased_noise(means.noise, means.spare)
     rows: list[dict[str, object]] = []
     for g in np.flatnonzero(means.count > 0):
-        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g], "dof": means.spare}
-        rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES, "windows": means.count[g]})
+        row = {"run": g, "omega": 1.0, "z": means.mean[g], "noise": noise / means.count[g]}
+        rows.append(row | {"present": np.ones(4, dtype=bool), "along": _AXES})
     names = [str(g) for g in range(len(means.count))]
     return stacked([OperatingPoint(0.0, excitation=1.0)], names, 4, rows)
