@@ -103,3 +103,12 @@ def small_campaign(campaign_of) -> Path:
     )
     text = '=HYPERLINK("http://example.invalid")<script>alert(1)</script>'
     return campaign_of(rocker_rig(3, plan=plan, campaign="small <b>&", description=text), name="small")
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder where the checkout's relative paths hold but nothing is written into the checkout."""
+    folder = tmp_path_factory.mktemp("desk")
+    for name in ("rigdata", "model"):
+        (folder / name).symlink_to(ROOT / name, target_is_directory=True)
+    return folder

@@ -32,15 +32,6 @@ VERDICTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    """A folder where the checkout's relative paths hold; the README's commands follow each other there."""
-    folder = tmp_path_factory.mktemp("desk")
-    for name in ("rigdata", "model"):
-        (folder / name).symlink_to(ROOT / name, target_is_directory=True)
-    return folder
-
-
 @pytest.mark.slow
 def test_the_readme_s_commands_run_and_say_first_the_verdict_and_last_the_next_command(desk, monkeypatch):
     monkeypatch.chdir(desk)

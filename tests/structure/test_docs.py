@@ -35,15 +35,6 @@ def of(*languages):
     return [p for p in BLOCKS if p.values[0] in languages]
 
 
-@pytest.fixture(scope="module")
-def desk(tmp_path_factory):
-    """A folder where the checkout's relative paths hold but nothing is written into the checkout."""
-    folder = tmp_path_factory.mktemp("desk")
-    for name in ("rigdata", "model"):
-        (folder / name).symlink_to(ROOT / name, target_is_directory=True)
-    return folder
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_links_lead_somewhere(page):
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)

@@ -9,18 +9,16 @@ half or twice its distance from one; of the prior each further fault has half or
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tests.studies.diagnosis.mixtures import SKIPPED, hidden, said
-from tests.studies.diagnosis.strangers import KINDS, Stranger, draw, stranger
+from tests.studies.diagnosis.strangers import KINDS, Stranger, asked_parser, draw, every_row
 from tests.studies.diagnosis.tables import all_there, no_false
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import table, write_section
 from tpjb_ident.diagnosis.comparison.search import Comparison, _Search
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.workers import workers
@@ -95,23 +93,8 @@ def _answer(row: dict[str, Any]) -> tuple[str, list[str]]:
 
 def main() -> None:
     """Search, judge with every constant, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bearings", type=int, default=12)
-    parser.add_argument("--count", type=int, default=6)
-    parser.add_argument("--seed", type=int, default=302)
-    parser.add_argument("--rows", type=Path, default=Path("constants.jsonl"))
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
-    stored = Rows(asked.rows, "bearing", "seed")
-    for number in range(asked.bearings):
-        seeds = [asked.seed + k for k in range(asked.count)]
-        missing = [seed for seed in seeds if (number, seed) not in stored.known]
-        one = stranger(number, asked.rows.parent) if missing else None
-        for seed in missing:
-            row = run(one, number, seed) if one is not None else None
-            if row is not None:
-                stored.add(row)
-    text = report([*stored.known.values()])
+    asked = asked_parser(__doc__, "constants.jsonl", bearings=12, count=6, seed=302).parse_args()
+    text = report(every_row(asked, run))
     if asked.write:
         write_section("constants", "python -m tests.studies.diagnosis.constants --write", text)
     else:

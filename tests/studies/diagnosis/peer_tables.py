@@ -24,7 +24,7 @@ from typing import Any
 
 from model.bearing import Pad
 from tests.studies.peers import Case, peer_case
-from tests.studies.results import table, write_section
+from tests.studies.results import study_parser, table, write_section
 from tpjb_ident.diagnosis.campaign import Baseline, diagnose_table
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -164,10 +164,9 @@ def diagnosed(hidden: Hidden, asked: argparse.Namespace, number: int) -> list[ob
 
 def main() -> None:
     """Solve, diagnose, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--python", default=sys.executable, help="an interpreter that can import ross")
     parser.add_argument("--folder", type=Path, default=Path("peer-tables"))
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     lines = []

@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,7 +32,7 @@ from model.setup import Mesh, Setup
 from tests.studies.diagnosis.emulated import emulate
 from tests.studies.diagnosis.mixtures import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
 from tests.studies.diagnosis.tables import all_there, no_false, tables
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, study_parser, table, write_section
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import ACCURACY, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
@@ -340,15 +340,35 @@ def run_clean(folder: Path) -> str:
     return clean_table([*stored.known.values()])
 
 
+def asked_parser(described: str | None, rows: str, bearings: int, count: int, seed: int) -> argparse.ArgumentParser:
+    """What a study of strangers can be asked: how many bearings, campaigns of each, from which seed on."""
+    parser = study_parser(described)
+    for name, value in (("--bearings", bearings), ("--count", count), ("--seed", seed)):
+        parser.add_argument(name, type=int, default=value)
+    parser.add_argument("--rows", type=Path, default=Path(rows))
+    return parser
+
+
+def every_row(
+    asked: argparse.Namespace, diagnosed: Callable[[Stranger, int, int], dict[str, Any] | None]
+) -> list[dict[str, Any]]:
+    """Rows of all campaigns that were asked for, those of the file and those that it lacks."""
+    stored = Rows(asked.rows, "bearing", "seed")
+    for number in range(asked.bearings):
+        seeds = [asked.seed + k for k in range(asked.count)]
+        missing = [seed for seed in seeds if (number, seed) not in stored.known]
+        one = stranger(number, asked.rows.parent) if missing else None
+        for seed in missing:
+            row = diagnosed(one, number, seed) if one is not None else None
+            if row is not None:
+                stored.add(row)
+    return [*stored.known.values()]
+
+
 def main() -> None:
     """Draw, diagnose, and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bearings", type=int, default=8)
-    parser.add_argument("--count", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--rows", type=Path, default=Path("strangers.jsonl"))
+    parser = asked_parser(__doc__, "strangers.jsonl", bearings=8, count=30, seed=0)
     parser.add_argument("--clean", action="store_true", help="single tolerances on a bearing as drawn instead")
-    parser.add_argument("--write", action="store_true", help="replace the tables of RESULTS.md")
     asked = parser.parse_args()
     if asked.clean:
         text = run_clean(asked.rows.parent)
@@ -356,17 +376,8 @@ def main() -> None:
             write_section("clean", "python -m tests.studies.diagnosis.strangers --clean --write", text)
         print(text)
         return
-    stored = Rows(asked.rows, "bearing", "seed")
     settings = DiagnoseSettings(workers=1, skip=SKIPPED)
-    for number in range(asked.bearings):
-        seeds = [asked.seed + k for k in range(asked.count)]
-        missing = [seed for seed in seeds if (number, seed) not in stored.known]
-        one = stranger(number, asked.rows.parent) if missing else None
-        for seed in missing:
-            row = run(one, number, seed, settings) if one is not None else None
-            if row is not None:
-                stored.add(row)
-    text = tables([*stored.known.values()])
+    text = tables(every_row(asked, lambda one, number, seed: run(one, number, seed, settings)))
     if asked.write:
         write_section("strangers", "python -m tests.studies.diagnosis.strangers --write", text)
     else:

@@ -13,7 +13,6 @@ that are there are not drawn again, so that a run that was stopped goes on where
 
 from __future__ import annotations
 
-import argparse
 import functools
 import math
 import os
@@ -37,7 +36,7 @@ from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, Timing
 from tests.studies.diagnosis import mixtures, strangers
 from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, hidden, said
 from tests.studies.diagnosis.tables import tables
-from tests.studies.results import Rows, write_section
+from tests.studies.results import Rows, study_parser, write_section
 from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance, Shift
@@ -185,13 +184,12 @@ def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) ->
 
 def main() -> None:
     """Draw, write, diagnose, and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__)
     parser.add_argument("--bearing", default="stranger", help="or rocker, spherical")
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=80000)
     parser.add_argument("--rows", type=Path, default=Path("volts.jsonl"))
     parser.add_argument("--keep", type=Path, help="folder for the vectors of observations")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
     parser.add_argument("--core", type=int, help="run on this core only")
     asked = parser.parse_args()
     if asked.core is not None:
