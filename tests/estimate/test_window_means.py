@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from tests.dynamic.phasor_cases import complex_normal, hermitian
+from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.window_means import aligned, window_means
 
 RUNS, WINDOWS, CHANNELS = 5, 12, 4
 RUN = np.repeat(np.arange(RUNS), WINDOWS)
 TIME = np.tile(0.5 * np.arange(WINDOWS), RUNS)
 DEVICES = ("probes", "probes", "cells", "cells")
-TRUE = complex_normal(np.random.default_rng(1), RUNS, CHANNELS) + 2
+H = np.array([[1.0 + 0.5j, 0.2], [-0.3j, 2.0 + 1.0j]])
+ALL = np.vstack([np.eye(2), H])  # what a motion makes of displacements and forces
+TRUE = (complex_normal(np.random.default_rng(1), RUNS, 2) + 2) @ ALL.T
 NOISE = 1e-4 * hermitian(np.random.default_rng(2), CHANNELS)
 
 
@@ -21,10 +24,10 @@ def windows(seed, noise=NOISE):
     return TRUE[RUN] + complex_normal(rng, len(RUN), CHANNELS) @ np.linalg.cholesky(noise).T
 
 
-def meant(z, weights=None, present=None):
+def meant(z, weights=None, present=None, devices=DEVICES):
     weights = np.ones(len(RUN)) if weights is None else weights
     present = np.ones((RUNS, CHANNELS), dtype=bool) if present is None else present
-    return window_means(z, RUN, TIME, DEVICES, weights, present)
+    return window_means(z, RUN, TIME, devices, weights, present, np.eye(CHANNELS))
 
 
 def test_without_noise_means_are_exact():
@@ -103,3 +106,45 @@ def test_a_clock_shows_as_a_slope_of_its_device_and_not_as_noise(rate):
     np.testing.assert_allclose(slope[:, 2:], 1j * rate, atol=6e-3)
     np.testing.assert_allclose(slope[:, :2], 0.0, atol=6e-3)
     np.testing.assert_allclose(np.diag(found.noise), np.diag(NOISE), rtol=0.5)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_motion_from_window_to_window_is_no_noise(share):
+    """A drive that wanders and a line close by: the film answers such motion as it answers the drive."""
+    rng = np.random.default_rng(6)
+    motion = share * complex_normal(rng, len(RUN), 2)
+    still, moving = (meant(windows(6) + part, devices=("",) * CHANNELS) for part in (0.0, motion @ ALL.T))
+    equation = np.hstack([-H, np.eye(2)])
+    left = equation @ still.noise @ equation.conj().T
+    np.testing.assert_allclose(equation @ moving.noise @ equation.conj().T, left, atol=0.3 * np.abs(left).max())
+    assert np.trace(moving.noise).real < 100 * np.trace(NOISE).real
+    moved = np.trace(share**2 * ALL @ ALL.conj().T).real
+    assert np.trace(moving.motion).real == pytest.approx(moved, rel=0.3)
+    assert not still.motion.any()
+
+
+def test_motion_is_told_by_displacements_and_oil_forces():
+    """What accelerometers show need not go with the motion of the means: the housing answers every frequency anew."""
+    rng = np.random.default_rng(7)
+    film = np.diag([1.0, 1.0, 1.0, 1.0, 0.0])
+    film[2, 4] = 3.0  # inertia along X
+    inertia = complex_normal(rng, 300)
+    residual = complex_normal(rng, 300, 2) @ ALL.T
+    residual = np.column_stack([residual, inertia])
+    residual[:, 2] -= 3.0 * inertia
+    noise = 1e-4 * complex_normal(rng, 300, 5)
+    means = np.column_stack([TRUE, np.zeros(RUNS)])
+    left = residual + noise - motion_in(residual + noise, np.ones(300), means, film)
+    np.testing.assert_allclose(left[:, 4], inertia + noise[:, 4], atol=1e-12)
+    assert np.abs(left[:, :2]).max() < 1e-2
+    assert np.abs((left @ film.T)[:, 2]).max() < 2e-2
+
+
+def test_noise_of_the_channels_own_is_no_motion():
+    rng = np.random.default_rng(8)
+    noise = complex_normal(rng, 300, CHANNELS) * [1.0, 2.0, 0.5, 3.0]
+    assert not motion_in(noise, np.ones(300), TRUE, np.eye(CHANNELS)).any()
+    exact = motion_in(0 * noise, np.ones(300), TRUE, np.eye(CHANNELS))
+    assert not exact.any()
+    few = motion_in(noise[:1], np.ones(1), TRUE, np.eye(CHANNELS))
+    assert np.isfinite(few).all()

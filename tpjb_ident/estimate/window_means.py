@@ -13,6 +13,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import totals
+from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.robust_constants import trimming_limits, trimming_weight
 
 #: |sum| over sum of moduli of a run's windows below which its phase counts as wandering.
@@ -35,6 +36,7 @@ class WindowMeans:
     count: FloatArray  #: (g,): effective number of windows
     spread: FloatArray  #: (g,), s^2: sum of squared distances of the windows from their middle
     noise: ComplexArray  #: (m, m): covariance of a single window
+    motion: ComplexArray  #: (m, m): covariance of what moves from window to window
     spare: float  #: degrees of freedom of the noise
     weights: FloatArray  #: (n,): of the windows
     wandering: int
@@ -47,11 +49,12 @@ def window_means(
     devices: Sequence[str],
     weights: FloatArray,
     present: BoolArray,
+    film: FloatArray,
 ) -> WindowMeans | None:
     """Means of a point's windows; None where no window has a phasor of every channel that its run has.
 
     `z` (n, m) [SI], NaN where a window gives none, `run` (n,), `time` (n,) [s], `weights` (n,) of the robust start,
-    `present` (g, m): channels of every run.
+    `present` (g, m): channels of every run, `film` (m, m): displacements and oil forces of the channels.
     """
     z = np.where(present[run], z, 0.0)
     whole = np.asarray(np.isfinite(z).all(axis=1))
@@ -61,8 +64,9 @@ def window_means(
     z = np.where(whole[:, None], z, 0.0)
     scale = np.max(np.abs(z[whole]), axis=0) + 1e-300
     turned, wandering = aligned(z / scale, run, good)
+    film = film * scale / scale[:, None]
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
-    state = _pooled(turned, run, time, devices, good, present)
+    state = _pooled(turned, run, time, devices, good, present, film)
     for _ in range(_ROUNDS):
         distance = _distances(state, state.noise)
         size = totals(run, good, len(state.mean))[run]
@@ -70,7 +74,7 @@ def window_means(
         trimmed = np.where(whole & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
         lost = totals(run, trimmed, len(state.mean)) < 1.0
         good = np.where(lost[run], good, trimmed)
-        state = _pooled(turned, run, time, devices, good, present)
+        state = _pooled(turned, run, time, devices, good, present, film)
     noise = state.noise / shrinkage * np.outer(scale, scale)
     return WindowMeans(
         state.mean * scale,
@@ -79,6 +83,7 @@ def window_means(
         state.count,
         state.spread,
         noise,
+        state.motion * np.outer(scale, scale),
         state.spare,
         good,
         wandering,
@@ -93,6 +98,7 @@ class _State:
     count: FloatArray
     spread: FloatArray
     noise: ComplexArray
+    motion: ComplexArray
     spare: float
     residual: ComplexArray  #: (n, m)
 
@@ -104,6 +110,7 @@ def _pooled(
     devices: Sequence[str],
     weights: FloatArray,
     present: BoolArray,
+    film: FloatArray,
 ) -> _State:
     """Weighted mean and slope of every run, and the covariance of a window about them."""
     g = len(present)
@@ -117,6 +124,10 @@ def _pooled(
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, devices)
     residual = z - mean[run] - drift[run] * away[:, None]
+    whole = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
+    runs = np.sqrt(total[whole])[:, None] * mean[whole]
+    motion = motion_in(residual, weights, runs, film) * present[run]
+    residual = residual - motion
     # the mean, and one complex rate a device of several channels
     taken = 1.0 + 0.5 * ((total >= _DRIFT_WINDOWS) & (spread > 0))
     each = np.maximum(total - taken, 0.0)
@@ -126,7 +137,8 @@ def _pooled(
     root = np.sqrt(1 / told)
     noise = (weights[:, None] * residual).T @ residual.conj() * np.outer(root, root)
     noise = noise + (1e-24 + _FLOOR * float(np.trace(noise).real)) * np.eye(z.shape[1])
-    return _State(mean, slope, middle, total, spread, noise, spare, residual)
+    moved = (weights[:, None] * motion).T @ motion.conj() / max(spare, 1.0)
+    return _State(mean, slope, middle, total, spread, noise, moved, spare, residual)
 
 
 def _sums(rows: ComplexArray, run: IntArray, g: int) -> ComplexArray:

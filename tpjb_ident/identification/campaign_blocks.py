@@ -82,7 +82,7 @@ def campaign_blocks(
                 "noise": noises[p] / w.count[g],
                 "dof": freedoms[p],
                 "slope": w.slope[g],
-                "slope_noise": noises[p] / max(float(w.spread[g]), 1e-12),
+                "slope_noise": (noises[p] + w.motion) / max(float(w.spread[g]), 1e-12),
                 "windows": w.count[g],
                 "time": w.time[g],
                 "temperature": temperatures.get(digest.run, np.nan),

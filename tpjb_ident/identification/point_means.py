@@ -17,6 +17,7 @@ from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_con
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
+from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.sensors import alive
 from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_means
 from tpjb_ident.phasors.shaft import shaft_order
@@ -68,21 +69,33 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     table = phasor_table(D, F, data.run_index)
     errors = _load_errors(data)
     weights, start, status = _robust_start(table)
-    means = window_means(z, data.run_index, time, [s.device for s in task.sensors], weights, present)
+    devices, film = [sensor.device for sensor in task.sensors], _film(task, data.mass)
+    means = window_means(z, data.run_index, time, devices, weights, present, film)
     condition = displacement_condition(table.D, weights[table.valid])
     attenuation = np.full(2, np.nan) if means is None else _attenuation(means, task)
     shaft, conditions = _shaft(data, means, task)
-    residual = _residual_density(data, task)
+    residual = _residual_density(data, task, means, film)
     usable = np.asarray(np.isfinite(np.where(present[data.run_index], z, 0.0)).all(axis=1))
     more = (status, shaft, conditions)
     return PointMeans(start, means, channels, errors, condition, attenuation, residual, usable, *more)
 
 
-def _residual_density(data: PointData, task: MeansTask) -> tuple[ComplexArray, float]:
+def _film(task: MeansTask, mass: float) -> FloatArray:
+    """Displacements and oil forces as the sensors see them, of their readings, (m, m)."""
+    of = {q: [j for j, sensor in enumerate(task.sensors) if sensor.quantity == q] for q in QUANTITIES}
+    film = np.diag([float(sensor.quantity != "acceleration") for sensor in task.sensors])
+    if len(of["acceleration"]) > 1:
+        inertia = mass * task.along[of["force"]] @ np.linalg.pinv(task.along[of["acceleration"]])
+        film[np.ix_(of["force"], of["acceleration"])] = inertia
+    return film
+
+
+def _residual_density(
+    data: PointData, task: MeansTask, means: WindowMeans | None, film: FloatArray
+) -> tuple[ComplexArray, float]:
     """Noise of a phasor times the length of its fit (m, m), by what lines leave of the records, and its freedom."""
     m = len(task.sensors)
-    total: ComplexArray = np.zeros((m, m), complex)
-    freedom = 0.0
+    rows: list[ComplexArray] = [np.zeros((0, m), complex)]
     for run, line in zip(data.runs, data.lines):
         if line >= len(run.residual) or not len(run.residual[line]):
             continue
@@ -90,10 +103,12 @@ def _residual_density(data: PointData, task: MeansTask) -> tuple[ComplexArray, f
         if any(sensor.name not in places for sensor in task.sensors):
             continue
         bins = run.residual[line][:, [places[sensor.name] for sensor in task.sensors]]
-        bins = bins[np.isfinite(bins).all(axis=1)]
-        total += len(run.start) * run.length * (bins.T @ bins.conj())
-        freedom += len(bins)
-    return np.asarray(total / max(freedom, 1.0), complex), freedom
+        rows.append(np.sqrt(len(run.start) * run.length) * bins[np.isfinite(bins).all(axis=1)])
+    bins = np.concatenate(rows)
+    if means is not None:
+        bins = bins - motion_in(bins, np.ones(len(bins)), means.mean, film)
+    freedom = float(len(bins))
+    return np.asarray(bins.T @ bins.conj() / max(freedom, 1.0), complex), freedom
 
 
 def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple[ComplexArray, tuple[Condition, ...]]:

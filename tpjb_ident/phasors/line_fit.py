@@ -238,12 +238,15 @@ def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArra
 
 
 def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:
-    """What the coefficients make of a window's mean, (n_columns,): a line that does not turn once in it is part of it.
+    """What the coefficients make of a window's mean, (n_columns,).
 
-    A constant and such a line can be told apart by their sum alone.
+    A line that does not turn once in the window, beside a constant or beside another line, is part of it: such columns
+    are told by their sum alone.
     """
     weights = np.asarray(design.mean(axis=0))
-    weights[: 2 * len(frequencies)][np.repeat(frequencies * duration >= 1.0, 2)] = 0.0
+    at = np.append(frequencies, 0.0)
+    gaps = np.abs(np.subtract.outer(frequencies, at)) + np.where(np.eye(len(frequencies), len(at)), np.inf, 0.0)
+    weights[: 2 * len(frequencies)][np.repeat(gaps.min(axis=1) * duration >= 1.0, 2)] = 0.0
     return weights
 
 
