@@ -240,13 +240,14 @@ def _phasors(coefficients: FloatArray, frequencies: FloatArray, start: FloatArra
 def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> FloatArray:
     """What the coefficients make of a window's mean, (n_columns,).
 
-    A line that does not turn once in the window, beside a constant or beside another line, is part of it: such columns
-    are told by their sum alone.
+    A line that does not turn once in the window is part of it, and so is one that is no turn apart from such a line:
+    their columns are told from a constant by their sum alone.
     """
     weights = np.asarray(design.mean(axis=0))
-    at = np.append(frequencies, 0.0)
-    gaps = np.abs(np.subtract.outer(frequencies, at)) + np.where(np.eye(len(frequencies), len(at)), np.inf, 0.0)
-    weights[: 2 * len(frequencies)][np.repeat(gaps.min(axis=1) * duration >= 1.0, 2)] = 0.0
+    turns = np.sort(frequencies) * duration
+    apart = turns[np.diff(turns, prepend=0.0) >= 1.0]
+    told = frequencies * duration >= apart.min(initial=np.inf)
+    weights[: 2 * len(frequencies)][np.repeat(told, 2)] = 0.0
     return weights
 
 

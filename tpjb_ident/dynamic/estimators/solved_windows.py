@@ -46,8 +46,8 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     """Solve from a start of H (2, 2) with window weights (n,); None where repeats are too few for a noise."""
     z = np.concatenate([table.D, table.F], axis=1)
     present = np.ones((table.n_directions, 4), dtype=bool)
-    # a table has no times: its windows tell of no drift
-    means = window_means(z, table.direction, np.zeros(len(z)), [""] * 4, weights, present, np.eye(4))
+    # a table has no times: its windows tell of no drift, nor what of their scatter is motion
+    means = window_means(z, table.direction, np.zeros(len(z)), [""] * 4, weights, present, np.zeros((4, 4)))
     if means is None or means.spare < _MIN_SPARE_REPEATS:
         return None
     blocks = _blocks(means)
