@@ -7,7 +7,7 @@ import pytest
 
 from tests.dynamic.phasor_cases import complex_normal, hermitian
 from tpjb_ident.estimate.motion import motion_in
-from tpjb_ident.estimate.window_means import aligned, window_means
+from tpjb_ident.estimate.window_means import Readings, aligned, window_means
 
 RUNS, WINDOWS, CHANNELS = 5, 12, 4
 RUN = np.repeat(np.arange(RUNS), WINDOWS)
@@ -27,7 +27,7 @@ def windows(seed, noise=NOISE):
 def meant(z, weights=None, present=None, devices=DEVICES):
     weights = np.ones(len(RUN)) if weights is None else weights
     present = np.ones((RUNS, CHANNELS), dtype=bool) if present is None else present
-    return window_means(z, RUN, TIME, devices, weights, present, np.eye(CHANNELS))
+    return window_means(z, RUN, TIME, Readings(devices, np.eye(CHANNELS)), weights, present)
 
 
 def test_without_noise_means_are_exact():

@@ -7,7 +7,7 @@ scatter loses its weight. Noise is their covariance about each device's own drif
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,14 @@ _DRIFT_WINDOWS = 4
 _ROUNDS = 3
 #: Part of the noise's own mean variance that every direction has at least: keeps exact data solvable.
 _FLOOR = 1e-12
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What is known of a point's m channels beside their phasors."""
+
+    devices: Sequence[str]
+    film: FloatArray  #: (m, m): displacements and oil forces of the channels
 
 
 @dataclass(frozen=True)
@@ -46,15 +54,14 @@ def window_means(
     z: ComplexArray,
     run: IntArray,
     time: FloatArray,
-    devices: Sequence[str],
+    readings: Readings,
     weights: FloatArray,
     present: BoolArray,
-    film: FloatArray,
 ) -> WindowMeans | None:
     """Means of a point's windows; None where no window has a phasor of every channel that its run has.
 
     `z` (n, m) [SI], NaN where a window gives none, `run` (n,), `time` (n,) [s], `weights` (n,) of the robust start,
-    `present` (g, m): channels of every run, `film` (m, m): displacements and oil forces of the channels.
+    `present` (g, m): channels of every run.
     """
     z = np.where(present[run], z, 0.0)
     whole = np.asarray(np.isfinite(z).all(axis=1))
@@ -64,9 +71,9 @@ def window_means(
     z = np.where(whole[:, None], z, 0.0)
     scale = np.max(np.abs(z[whole]), axis=0) + 1e-300
     turned, wandering = aligned(z / scale, run, good)
-    film = film * scale / scale[:, None]
+    readings = replace(readings, film=readings.film * scale / scale[:, None])
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
-    state = _pooled(turned, run, time, devices, good, present, film)
+    state = _pooled(turned, run, time, readings, good, present)
     for _ in range(_ROUNDS):
         distance = _distances(state, state.noise)
         size = totals(run, good, len(state.mean))[run]
@@ -74,7 +81,7 @@ def window_means(
         trimmed = np.where(whole & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
         lost = totals(run, trimmed, len(state.mean)) < 1.0
         good = np.where(lost[run], good, trimmed)
-        state = _pooled(turned, run, time, devices, good, present, film)
+        state = _pooled(turned, run, time, readings, good, present)
     noise = state.noise / shrinkage * np.outer(scale, scale)
     return WindowMeans(
         state.mean * scale,
@@ -107,10 +114,9 @@ def _pooled(
     z: ComplexArray,
     run: IntArray,
     time: FloatArray,
-    devices: Sequence[str],
+    readings: Readings,
     weights: FloatArray,
     present: BoolArray,
-    film: FloatArray,
 ) -> _State:
     """Weighted mean and slope of every run, and the covariance of a window about them."""
     g = len(present)
@@ -122,11 +128,11 @@ def _pooled(
     spread = totals(run, weights * away**2, g)
     slope = _sums((weights * away)[:, None] * z, run, g) / np.maximum(spread, 1e-12)[:, None]
     slope[total < _DRIFT_WINDOWS] = 0.0
-    drift = _drift(mean, slope, devices)
+    drift = _drift(mean, slope, readings.devices)
     residual = z - mean[run] - drift[run] * away[:, None]
     whole = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
     runs = np.sqrt(total[whole])[:, None] * mean[whole]
-    motion = motion_in(residual, weights, runs, film) * present[run]
+    motion = motion_in(residual, weights, runs, readings.film) * present[run]
     residual = residual - motion
     # the mean, and one complex rate a device of several channels
     taken = 1.0 + 0.5 * ((total >= _DRIFT_WINDOWS) & (spread > 0))

@@ -19,7 +19,7 @@ from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.sensors import alive
-from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_means
+from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, window_means
 from tpjb_ident.phasors.shaft import shaft_order
 from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
@@ -69,8 +69,9 @@ def point_means(task: MeansTask, source: PointSource) -> PointMeans:
     table = phasor_table(D, F, data.run_index)
     errors = _load_errors(data)
     weights, start, status = _robust_start(table)
-    devices, film = [sensor.device for sensor in task.sensors], _film(task, data.mass)
-    means = window_means(z, data.run_index, time, devices, weights, present, film)
+    film = _film(task, data.mass)
+    readings = Readings([sensor.device for sensor in task.sensors], film)
+    means = window_means(z, data.run_index, time, readings, weights, present)
     condition = displacement_condition(table.D, weights[table.valid])
     attenuation = np.full(2, np.nan) if means is None else _attenuation(means, task)
     shaft, conditions = _shaft(data, means, task)

@@ -19,7 +19,7 @@ from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import Shape
 from tpjb_ident.estimate.solve import Solver
-from tpjb_ident.estimate.window_means import WindowMeans, attenuation, window_means
+from tpjb_ident.estimate.window_means import Readings, WindowMeans, attenuation, window_means
 
 #: Fewer spare repeats than this cannot give a 4x4 complex covariance worth using.
 _MIN_SPARE_REPEATS = 8.0
@@ -47,7 +47,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
     z = np.concatenate([table.D, table.F], axis=1)
     present = np.ones((table.n_directions, 4), dtype=bool)
     # a table has no times: its windows tell of no drift, nor what of their scatter is motion
-    means = window_means(z, table.direction, np.zeros(len(z)), [""] * 4, weights, present, np.zeros((4, 4)))
+    means = window_means(z, table.direction, np.zeros(len(z)), Readings([""] * 4, np.zeros((4, 4))), weights, present)
     if means is None or means.spare < _MIN_SPARE_REPEATS:
         return None
     blocks = _blocks(means)
