@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from tpjb_ident.phasors import line_fit
+from rigdata.problem import RigDataError
+from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import oil_force
+from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
 from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
@@ -147,3 +150,13 @@ def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
         assert np.allclose(fit.z[i, :, k], exact[0:6:2] + 1j * exact[1:6:2], rtol=1e-9)
         assert fit.lost[i, k] == pytest.approx(1 - used.mean())
         assert not residual[k, i][~used].any()
+
+
+def test_a_time_column_in_the_wrong_unit_is_named_with_file_channel_and_cure():
+    """Milliseconds called seconds make a record of one sample a second."""
+    time = SimpleNamespace(name="clock", quantity="time")
+    run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, channels={"clock": time}, length=4000)
+    inspection = object.__new__(run_phasors._Inspection)
+    inspection.run, inspection.settings = run, PhasorSettings()
+    with pytest.raises(RigDataError, match=r"r1.csv, channel clock: 1 samples per second .* 35 Hz.*ms called s"):
+        inspection._lines((35.0,), 20.0, ())
