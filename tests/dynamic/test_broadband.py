@@ -429,10 +429,26 @@ def test_one_phase_set_is_told_from_several():
     rng = np.random.default_rng(9)
     first = _complex(rng, (1, 60, 2))
     late = np.exp(1j * 0.2 * np.arange(60))[:, None]
-    same = [spectra(first * turn, first) for turn in (1.0, late, -1.0)]
+    same = [spectra(first * turn, first, period=10.0) for turn in (1.0, late, -1.0)]
     assert one_phase_set(same)
-    other = [spectra(_complex(rng, (1, 60, 2)), first) for _ in range(3)]
+    other = [spectra(_complex(rng, (1, 60, 2)), first, period=10.0) for _ in range(3)]
     assert not one_phase_set(other)
+
+
+def test_two_tones_make_nothing_of_each_other_and_three_may():
+    """15 + 28 Hz fall on 43 Hz, in every run of one phase set alike; nothing falls on 30 or 37 Hz."""
+    rng = np.random.default_rng(9)
+
+    def run(*tones):
+        D = 1e-3 * _complex(rng, (8, 60, 2))
+        D[:, list(tones)] += np.exp(1j * rng.uniform(0, 6, len(tones)))[:, None] * [1.0, 0.3]
+        one = spectra(D, D, period=1.0)
+        lines = LineSet(tuple(Line("excitation", float(k)) for k in range(60)), (), (), 22.0)
+        return replace(one, phasors=replace(one.phasors, lines=lines))
+
+    assert not one_phase_set([run(30, 37) for _ in range(3)])
+    once = run(15, 28, 43)
+    assert one_phase_set([once, once, once])
 
 
 @pytest.mark.parametrize(

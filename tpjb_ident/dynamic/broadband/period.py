@@ -30,6 +30,8 @@ _CHANCE = 1e-3
 _FIRST_MOVE, _LAST_MOVE = 1 / 8, 1 / 64
 #: Points of a cycle at the top of the band from which splines leave nothing of note [share].
 _POINTS, _NOTHING = 32, 1e-5
+#: Share of the bins' degrees of freedom that two windows leave to a difference of variances.
+_WINDOWED = 0.4
 #: Bins on either side of a line that tell the noise there, and so many at least for one line or some together.
 _BESIDE = 4
 #: Phase [rad] by which the top of the band may run off over the record before it is resampled.
@@ -48,21 +50,20 @@ def find_period(samples: Samples, band: tuple[float, float], lines: tuple[Line, 
     window = np.hanning(n)  # under which the lines of an excitation end with the band
     spectra = np.where(keep, np.fft.rfft(clean.signals() * window, 2 * n, axis=1), 0.0)
     rows = np.fft.irfft(spectra, axis=1)[:, :n]
-    least, longest = int(samples.rate / band[0]), n // _MIN_PERIODS
+    first = int(samples.rate / band[0])
     finer = math.ceil(_POINTS * band[1] / samples.rate)
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
-    part = alike[::finer][least : longest + 1]
-    lags = np.flatnonzero((part[1:-1] > 0) & (part[1:-1] >= part[:-2]) & (part[1:-1] >= part[2:])) + 1 + least
+    part = alike[::finer][first : n // _MIN_PERIODS + 1]
+    lags = np.flatnonzero((part[1:-1] > 0) & (part[1:-1] >= part[:-2]) & (part[1:-1] >= part[2:])) + 1 + first
     if not len(lags):
         return None
     periods, left = _combed((alike, power), lags, samples.rate / band[1], finer)
-    weight = window**4
-    freedom = keep.sum() * weight.mean() ** 2 / np.mean(weight**2) * (1 - periods / n)
-    best = int(np.argmin(left))
-    more = np.maximum(freedom - freedom[best], 1.0)
-    allowed = (freedom[best] + more * fdtri(more, freedom[best], 1 - _CHANCE)) / (freedom[best] + more)
-    k = int(np.argmax((left <= left[best] * allowed) & (freedom >= freedom[best])))
+    freedom = _WINDOWED * keep.sum() * (1 - periods / n)
+    least = freedom[np.argmin(left)]
+    more = np.maximum(freedom - least, 1.0)
+    allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
+    k = int(np.argmax(left <= left.min() * allowed))
     if left[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
         return None
     return float(periods[k])
