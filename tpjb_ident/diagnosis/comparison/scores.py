@@ -94,9 +94,11 @@ def _score(path: Path, at: slice, levels: _Levels, strain: Strain) -> Score:
     errors, width = levels.errors, path.fault.width
     product = levels.product(at)
     pull, square = product[:, 0, 1:], product[:, 1:, 1:]
-    tried = np.unique(np.vstack([path.tried(*pair) for pair in zip(pull[::_EVERY], square[::_EVERY], strict=True)]), axis=0)
+    grids = [path.tried(*pair) for pair in zip(pull[::_EVERY], square[::_EVERY], strict=True)]
+    tried = np.unique(np.vstack(grids), axis=0)
     weights, slopes = path.weights(tried), path.slopes(tried) * width
-    change = 2.0 * pull @ weights.T - np.sum((weights @ square) * weights, axis=2) - np.sum((tried / width) ** 2, axis=1)
+    prior = np.sum((tried / width) ** 2, axis=1)
+    change = 2.0 * pull @ weights.T - np.sum((weights @ square) * weights, axis=2) - prior
     inner = np.swapaxes(slopes, 1, 2) @ square[:, None] @ slopes + np.eye(len(width))
     log_det = np.linalg.slogdet(inner)[1] + errors.log_norm[:, None]
     half_det = np.log(np.diagonal(levels.lower, axis1=1, axis2=2)).sum(axis=1)

@@ -97,8 +97,8 @@ class _Search:
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
-        nothing = np.zeros(len(self.problem.nuisances))
-        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)), rough=True)
+        stated = self._stated
+        self._fit(Proposal((), stated.theta, stated.jacobian), rough=True)
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
@@ -135,8 +135,7 @@ class _Search:
         """Ask for every path to both of its ends, where no fit got past the jumps that may lie on them."""
         self.whole = True
         for end in (-1.0, 1.0):
-            ends = [end * float(path.fault.width[0]) for path in self.paths]
-            self.paths = lengthened(self.run, self.problem, self.paths, ends)
+            self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
         self._propose_alone()
 
     def _promising(self, proposal: Proposal, leader: Fit) -> bool:
@@ -177,7 +176,8 @@ class _Search:
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
             return
-        self.fits[proposal.labels], self.estimates[proposal.labels] = fit, math.inf if proposal.coarse else proposal.estimate
+        self.fits[proposal.labels] = fit
+        self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
 
@@ -213,7 +213,7 @@ class _Search:
         """Ask for more of the paths that lead, towards where they lead."""
         labels = list(dict.fromkeys(score.path.fault.label for score in leading))[: Deciding.followed]
         sizes = {id(score.path): float(score.amplitudes[0]) for score in leading if score.path.fault.label in labels}
-        self.paths = lengthened(self.run, self.problem, self.paths, [sizes.get(id(path), 0.0) for path in self.paths])
+        self._lengthen([sizes.get(id(path), 0.0) for path in self.paths])
 
     @property
     def _stated(self) -> Point:
