@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -198,6 +199,7 @@ class ScaledPivot:
         return self.law.vibration_stiffness(load) * self.stiffness_factor
 
 
+@lru_cache(maxsize=64)
 def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
     """The printed formula for a contact geometry, Eq. (16) or (17)."""
     modulus = pivot.youngs_modulus / (1.0 - pivot.poissons_ratio**2)

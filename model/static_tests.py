@@ -16,7 +16,6 @@ from model.predict import predict_setup
 from model.prediction import Prediction
 from model.setup import Setup
 from model.statics.equilibrium import Equilibrium
-from model.statics.warm_start import extrapolated_state
 from rigdata.arrays import FloatArray
 
 
@@ -69,24 +68,11 @@ def sweep(
 ) -> list[Prediction]:
     """Predict many operating points, each started from the one before."""
     out: list[Prediction] = []
-    behind: Equilibrium | None = None
-    for at, (load, direction, speed, excitation) in enumerate(points):
-        guess = start
-        if behind is not None and start is not None:
-            guess = extrapolated_state(behind, start, _step_share(points[at - 2], points[at - 1], points[at]))
-        prediction = predict_setup(setup, load, direction, speed, excitation, guess)
+    for load, direction, speed, excitation in points:
+        prediction = predict_setup(setup, load, direction, speed, excitation, start)
         out.append(prediction)
-        behind, start = start if at else None, prediction.equilibrium if prediction.converged else None
+        start = prediction.equilibrium if prediction.converged else None
     return out
-
-
-def _step_share(*points: tuple[float, float, float, FloatArray]) -> float:
-    """The last step of three points over the first, where one of load, direction, speed alone changes; else 0."""
-    shares = []
-    for before, last, new in zip(*(p[:3] for p in points), strict=True):
-        if not before == last == new:
-            shares.append((new - last) / (last - before) if last != before else math.inf)
-    return shares[0] if len(shares) == 1 and abs(shares[0]) <= 2.0 else 0.0
 
 
 def locus(setup: Setup, load: float, directions: FloatArray, speed: float) -> FloatArray:

@@ -23,6 +23,7 @@ from model.film.energy import heat_step
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running, set_viscosity
 from model.film.reynolds import FilmForces, solve_film
+from model.interpolation import largest
 from rigdata.arrays import FloatArray
 
 _MESH = (20, 4)
@@ -155,7 +156,7 @@ def walk(
             break
         _keep(work, numbers, rises, row, (curvature, wedge, load))
         high = row + 1
-        hottest = np.max(rises[row])
+        hottest = largest(rises[row].reshape(-1))
         if load > depth or curvature > _DEEPEST or hottest > _HOTTEST:
             break
     if high == middle:

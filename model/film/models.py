@@ -22,12 +22,13 @@ def solve_by(
     sharp: bool,
     supplied: float,
 ) -> FilmForces:
-    """Pressure of one film; where it is None when a search is compiled, the search has no code of the other models.
+    """Pressure of one film; sharp: its derivatives once more, with the pressure that `work` holds.
 
-    `supplied`: oil there is at the leading edge [kg/s/m].
+    Where the model is None when a search is compiled, the search has no code of the others. `supplied`: oil there is
+    at the leading edge [kg/s/m].
     """
     if model is None:
-        return solve_film(grid, work, wedge, speed, sharp)
+        return solve_film(grid, work, wedge, speed, sharp, None, sharp)
     if model == _JFO:
         return solve_film_jfo(grid, work, wedge, speed, sharp, (1.0, supplied))
-    return solve_film(grid, work, wedge, speed, sharp, True)
+    return solve_film(grid, work, wedge, speed, sharp, True, sharp)

@@ -65,6 +65,7 @@ def solve_film(
     speed: float,
     sharp: bool,
     turbulent: bool | None = None,
+    solved: bool = False,
 ) -> FilmForces:
     """Pressure of one film and its derivatives.
 
@@ -80,6 +81,8 @@ def solve_film(
     sharp : bool
         Let the perturbed pressure vanish at the rupture line itself, not at the next node: second order in the
         mesh, for one more factorisation. Newton steps do without.
+    solved : bool, optional
+        `work` holds this film's pressure: only its derivatives are asked for, sharp.
     turbulent : bool, optional
         True: by `model.film.turbulence`; `work.gained` is set to the heat beyond that of a laminar film [W].
 
@@ -100,7 +103,7 @@ def solve_film(
     if turbulent is not None:
         powers = resist(grid, work, wedge, speed, (gx, gz))
     source = _source(grid, work, clearance, a, b, speed)
-    steps = _active_set(grid, work, gx, gz, source)
+    steps = 1 if solved else _active_set(grid, work, gx, gz, source)
     weight = grid.area
     if steps > 0:
         if sharp:

@@ -64,9 +64,8 @@ def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> lis
     reynolds = largest_reynolds(films, surface_speed)
     if reynolds > _LAMINAR and setup.options.turbulence == "none":
         names.append(named("film not laminar: Re {number:.0f}", number=reynolds))
-    carrying = [f for f in films if f.forces is not None]
-    low = min((float(f.work.temperature.min()) for f in carrying), default=_OIL_DATA[0])
-    high = max((float(f.work.temperature.max()) for f in carrying), default=_OIL_DATA[1])
+    warmth = np.array([f.work.temperature for f in films if f.forces is not None])
+    low, high = (float(warmth.min()), float(warmth.max())) if len(warmth) else _OIL_DATA
     if low < _OIL_DATA[0] or high > _OIL_DATA[1]:
         names.append(named("oil beyond its data: {number:.0f} degC", number=low if low < _OIL_DATA[0] else high))
     return names

@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from model.conditions import has_answer
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
+
+
+class Begun(NamedTuple):
+    """Where the curves of its pads put a bearing: neighbours differ by nearly what they differ in here."""
+
+    position: FloatArray  #: (2,): NaN where some pad has no curve.
+    tilt: FloatArray  #: (n,): As of the equilibrium; of pads that carry nothing there NaN.
+    deflection: FloatArray  #: (n,)
+    temperature: FloatArray  #: (n, nt + 1, nz + 1)
 
 
 @dataclass(frozen=True)
@@ -23,7 +33,8 @@ class Equilibrium:
     temperature_residual: float
     journal_temperature: float
     status: tuple[Condition, ...]
-    surface_speed: float = math.nan
+    surface_speed: float
+    begun: Begun
 
     @property
     def converged(self) -> bool:

@@ -61,6 +61,8 @@ def starved(films: Sequence[PadFilm]) -> list[int]:
     """Numbers of the pads that ask for more oil than their grooves give: that carry, or cannot for want of it."""
     short = []
     for film in films:
+        if math.isinf(film.supplied):
+            continue
         if film.forces is not None:
             asked = edge_flows(film.grid, film.work, math.inf)[0]
         else:

@@ -47,7 +47,7 @@ from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
 from model.statics.compiled.start import first_position, pivot_curve, warm_film
 from model.statics.cross_heat import settle_cross_temperatures
-from model.statics.equilibrium import Equilibrium
+from model.statics.equilibrium import Begun, Equilibrium
 from model.statics.heat_paths import couples_heat, stacked_conduction
 from model.statics.pad_film import oil_constants, pad_films
 from model.statics.pad_flow import starved, through_flow
@@ -74,7 +74,6 @@ class Search:
             film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
         self.rises: list[tuple[int, FloatArray]] = []
-        self.warm = False
         self.case = self._case()
         self.shapes = self._shapes()
         self.pads = self._pads()
@@ -204,12 +203,12 @@ class Search:
         pads, alike = self.pads, dict[tuple[int, float, int], int]()
         for m, film in enumerate(self.films):
             clearance, law = float(pads.clearance[m]), self.setup.pivots[m]
-            curve = attitudes(film.grid, clearance, running, case.supply, load)
-            first = alike.setdefault((id(curve), clearance, id(law)), m)
+            first = alike.setdefault((id(film.grid), clearance, id(law)), m)
             if first < m:
                 pads.rows[m], pads.attitudes[m] = pads.rows[first], pads.attitudes[first]
                 self.rises.append(self.rises[first])
                 continue
+            curve = attitudes(film.grid, clearance, running, case.supply, load)
             unit = viscosity * self.surface_speed * size / clearance**2
             gives = np.empty(0)
             if pads.laws[m, 0] == OTHER:
@@ -226,6 +225,12 @@ class Search:
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
         self.load_pads(loaded)
+        begun = (state.position, state.tilt, state.deflection, self.works.temperature)
+        self.begun = Begun(*(values.copy() for values in begun))
+        for values in self.begun[1:]:
+            values[~loaded] = math.nan
+        if np.any(pads.rows < 2):  # the place is of none that carries without a curve
+            self.begun.position[:] = math.nan
 
     def idle_by_curves(self) -> int:
         """How many pads carry nothing where the curves carry the load."""
@@ -242,8 +247,9 @@ class Search:
             return
         for m in np.flatnonzero(loaded).tolist():
             (low, rises), film = self.rises[m], self.films[m]
-            temperature = film.work.temperature
-            warm_film(rises, self.pads, self.state, m, (low, film.grid.first), temperature)
+            temperature, table = film.work.temperature, self.pads.attitudes[m, 0, : self.pads.rows[m]]
+            reach, whole = film.rigid_approach(self.state.position), film.grid.first == 1
+            warm_film(rises, low, table, reach, float(self.state.inlet[m]), whole, temperature)
             if film.cross is not None:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
@@ -287,22 +293,31 @@ class Search:
         return len(normals) > 0 and self.case.hold.flexure == 0.0 and np.linalg.matrix_rank(normals, tol=1e-6) < 2
 
     def start_from(self, start: Equilibrium) -> bool:
-        """Take over a neighbour's state; False if it has none or its mesh does not fit."""
+        """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
         if len(start.films) != len(self.films) or not start.converged:
             return False
         coupled, state = couples_heat(self.setup), self.state
         if any(f.work.pressure.shape != o.work.pressure.shape for f, o in zip(self.films, start.films, strict=True)):
             return False
+        self.stand()
+        # where a pad has no curve, here or there, nothing is moved; pads that friction holds stay where they are held
+        known = not np.isnan(self.begun.position - start.begun.position).any()
+        moved = self.begun if known and not self.setup.friction else start.begun
+        shift = Begun(*(np.nan_to_num(new - old) for new, old in zip(moved, start.begun, strict=True)))
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 state.passed[m] = through_flow(other)[1]
-            state.tilt[m], state.deflection[m], state.idle[m] = other.tilt, other.deflection, other.idle
+            if known and state.idle[m] != other.idle == math.isnan(start.begun.tilt[m]):
+                continue  # the neighbour's pad does as its curve says: so does this one
+            state.idle[m] = other.idle
+            state.tilt[m], state.deflection[m] = other.tilt + shift.tilt[m], other.deflection + shift.deflection[m]
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
                 state.inlet[m] = other.inlet
-            if self.case.thermal != ISOTHERMAL:  # there the film is as warm as its own supply
-                film.work.temperature[:] = other.work.temperature
-                for own, known in zip(film.heat_state, other.heat_state, strict=False):
-                    own[:] = known
+            if self.case.thermal != ISOTHERMAL:
+                film.work.temperature[:] = other.work.temperature + shift.temperature[m]
+            if film.cross is not None and other.cross is not None:
+                film.cross.temperature[:] = other.cross.temperature + shift.temperature[m, :, :, None]
+                film.cross.face[:] = other.cross.face + shift.temperature[m]
             film.work.ruptured[:] = other.work.ruptured
             film.work.pressure[1:] = other.work.pressure[1:]
             if self.setup.flexible_pads:
@@ -311,7 +326,7 @@ class Search:
             if self.case.axial:
                 film.work.extra[:] += (other.axial_tilt - state.axial[m]) * axial_shape(film.grid)
                 state.axial[m] = other.axial_tilt
-        state.position[:], self.warm = start.position, True
+        state.position[:] = start.position + shift.position
         if coupled:
             state.figures[JOURNAL] = start.journal_temperature
         if self.setup.growth is not None:
@@ -323,7 +338,7 @@ class Search:
     def run(self) -> Equilibrium:
         """Iterate from where the search stands."""
         size = vector_size(self.state, self.case)
-        memory = fresh_memory(size, self.warm or self.case.thermal == ACROSS)
+        memory = fresh_memory(size)
         code = ASKS_OIL
         while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):
             code = iterate(self.shapes, self.pads, self.works, self.state, self.case, memory)
@@ -423,7 +438,7 @@ class Search:
         trail = memory.trail
         return Equilibrium(
             self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
-            float(figures[JOURNAL]), tuple(names), self.surface_speed,
+            float(figures[JOURNAL]), tuple(names), self.surface_speed, self.begun,
         )  # fmt: skip
 
     def _restless(self) -> list[Condition]:

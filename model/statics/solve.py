@@ -40,13 +40,13 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
             return warm
         search = Search(setup, load, speed)
     search.stand()
-    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
     result = _settled(search, search.run())
-    if not result.converged and near:  # they may find no rest where they carry
+    if not result.converged:
         search = Search(setup, load, speed)
         search.stand()
+        near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
         search.let_idle(near)
-        other = _settled(search, search.run())
+        other = _settled(search, search.run()) if near else result  # they may find no rest where they carry
         result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and warm is not None and warm.converged:
         return warm
@@ -102,10 +102,14 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
         pad = max(doubtful, key=lambda m: float(above[m]))
         trial = Search(search.setup, search.load, search.speed, search.heat)
         trial.start_from(result)
+        trial.case = trial.case._replace(tried=pad)
         trial.load_pads(np.arange(len(trial.films)) == pad)
         other = trial.run()
         fewer = sum(f.idle for f in other.films) < sum(f.idle for f in result.films)
         refused.add(pad)
+        if trial.state.idle[pad] and above[pad] < 0.0 and near == _NEAR:
+            # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
+            refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
         if other.converged and not other.films[pad].idle and (fewer or not _left_above(trial, other, near)):
             search, result, above = trial, other, trial.margins()
     return _named(search, result, near, held)

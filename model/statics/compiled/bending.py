@@ -11,6 +11,7 @@ from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes
+from model.interpolation import largest
 from model.pad.bending import PadDeformation
 from model.statics.compiled.case import Case
 from model.statics.compiled.elimination import solve
@@ -96,19 +97,13 @@ def bend_pads(
     asked = np.zeros((count, state.bent[0].size))
     if len(bodies.which) > 0:
         _ask_bodies(bodies, works, state, asked)
-    share, across, change = 0.0, state.bent.shape[2], np.empty(state.bent.shape[1:])
+    share = 0.0
     for m in range(count):
-        if not state.solved[m]:
-            continue
-        largest = 0.0
-        for q in range(asked.shape[1]):
-            i, j = q // across, q % across
-            change[i, j] = asked[m, q] - state.bent[m, i, j]
-            if not largest >= abs(change[i, j]) and largest == largest:  # a NaN is not to be lost
-                largest = abs(change[i, j])
-        film = (grid_of(grids, m), work_of(works, m))
-        tilted = _close_loop(film, pads, state, bodies, case, m, change)
-        share = max(share, max(largest, tilted) / state.least[m])
+        if state.solved[m]:
+            change = asked[m] - state.bent[m].reshape(-1)
+            film = (grid_of(grids, m), work_of(works, m))
+            tilted = _close_loop(film, pads, state, bodies, case, m, change)
+            share = max(share, max(largest(change), tilted) / state.least[m])
     return share
 
 
@@ -116,14 +111,12 @@ def bend_pads(
 def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     count = len(state.tilt)
-    unknowns, coarse, across = works.unknown.shape[1], bodies.to_coarse.shape[1], state.bent.shape[2]
+    unknowns, coarse = works.unknown.shape[1], bodies.to_coarse.shape[1]
     rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
     for m in range(count):
         if state.solved[m]:
-            for q in range(rise.shape[1]):
-                rise[m, q] = state.faces[m, q // across, q % across] - bodies.supply
-            for q in range(unknowns):
-                given[m, q] = works.unknown[m, q] + state.shift[m, q]
+            rise[m] = state.faces[m].reshape(-1) - bodies.supply
+            given[m, :unknowns] = works.unknown[m] + state.shift[m]
     same = np.empty(count, dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
         some = 0
@@ -138,24 +131,27 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: Floa
 
 @inner
 def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
-    """Product of a matrix with some rows of `given`, four at a time for every row of the matrix that is read."""
+    """Product of a matrix with some rows of `given`, five at a time for every row of the matrix that is read."""
     some = len(rows)
-    for start in range(0, some, 4):
+    for start in range(0, some, 5):
         one, two = given[rows[start]], given[rows[min(start + 1, some - 1)]]
         three, four = given[rows[min(start + 2, some - 1)]], given[rows[min(start + 3, some - 1)]]
+        five = given[rows[min(start + 4, some - 1)]]
         for i in range(matrix.shape[0]):
             row = matrix[i]
-            a = b = c = d = 0.0
+            a = b = c = d = e = 0.0
             for q in range(len(row)):
                 value = np.float64(row[q])
                 a += value * one[q]
                 b += value * two[q]
                 c += value * three[q]
                 d += value * four[q]
+                e += value * five[q]
             out[rows[start], i] = a
             out[rows[min(start + 1, some - 1)], i] = b
             out[rows[min(start + 2, some - 1)], i] = c
             out[rows[min(start + 3, some - 1)], i] = d
+            out[rows[min(start + 4, some - 1)], i] = e
 
 
 @inner
@@ -173,22 +169,23 @@ def _close_loop(
     body = bodies.which[m] if len(bodies.which) > 0 else -1
     bending = bodies.shapes.shape[3] if body >= 0 else 0
     count, unknowns = bending + (1 if case.axial else 0), len(work.unknown)
-    shapes = np.empty((change.shape[0], change.shape[1], count))
+    rows, columns = work.pressure.shape
+    shapes = np.empty((rows, columns, count))
     response, weights = np.empty((count, unknowns)), np.empty((2, unknowns))
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
     if body >= 0:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
         for r in range(bending):
             matrix[r, r] = 1.0
-            for q in range(change.size):
-                right[r, 0] += bodies.amplitudes[body, r, q] * change[q // change.shape[1], q % change.shape[1]]
+            for q in range(len(change)):
+                right[r, 0] += bodies.amplitudes[body, r, q] * change[q]
     if case.axial:
         right[bending, 0], matrix[bending, bending] = _axial_moment(grid, work, state, case, m, response[bending])
-        for i in range(change.shape[0]):
-            for j in range(change.shape[1]):
+        for i in range(rows):
+            for j in range(columns):
                 shapes[i, j, bending] = grid.cos[i] * grid.z[j]
     asked = right[:, 0].copy()
-    _force_weights(grid, change.shape, weights)
+    _force_weights(grid, work.pressure.shape, weights)
     a, b = state.wedge[m, 0], state.wedge[m, 1]
     slopes = shape_slopes(grid, work, conductances(grid, work, pads.clearance[m], a, b), shapes)
     felt = np.zeros((2, count))
@@ -210,16 +207,15 @@ def _close_loop(
             state.felt_stiffness[m, axis, 1] += felt[axis, r] * right[r, 2]
     for r in range(bending):
         state.amplitude[m, r] = right[r]
-    for i in range(change.shape[0]):
-        for j in range(change.shape[1]):
-            total = change[i, j]
-            for r in range(bending):
-                total -= shapes[i, j, r] * asked[r]
-            state.mismatch[m, i, j] = total
+    mismatch, flat = state.mismatch[m].reshape(-1), shapes.reshape((len(change), count))
+    for q in range(len(change)):
+        mismatch[q] = change[q]
+        for r in range(bending):
+            mismatch[q] -= flat[q, r] * asked[r]
     if not case.axial:
         return 0.0
     state.axial_step[m] = right[bending]
-    return abs(right[bending, 0]) * np.max(np.abs(shapes[:, :, bending]))
+    return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
 
 
 @inner

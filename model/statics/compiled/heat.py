@@ -27,6 +27,7 @@ from model.film.energy import between, dissipate, heat_step, march
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.film.slopes import pressure_change
+from model.interpolation import largest
 from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, rigid_approach
 from model.statics.compiled.elimination import solve
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
@@ -113,22 +114,14 @@ def exchange_heat(
         state.inlet[m], state.heating[m] = inlets[m], 0.0
         if not state.solved[m]:
             continue
-        asked = answers[m, 0]
-        largest = 0.0
-        for i in range(asked.shape[0]):
-            for j in range(asked.shape[1]):
-                asked[i, j] += inlets[m] * answers[m, 1, i, j] - works.temperature[m, i, j]
-                if case.journal:
-                    asked[i, j] += journal * answers[m, 2, i, j]
-                if not largest >= abs(asked[i, j]) and largest == largest:
-                    largest = abs(asked[i, j])
-        share = relaxation * min(1.0, HEATING_STEP / max(largest, 1e-30))
-        for i in range(asked.shape[0]):
-            for j in range(asked.shape[1]):
-                works.temperature[m, i, j] += share * asked[i, j]
-        state.heating[m] = largest
-        if not change >= largest:
-            change = largest
+        asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
+        if case.journal:
+            asked += journal * answers[m, 2]
+        hotter = largest(asked.reshape(-1))
+        works.temperature[m] += relaxation * min(1.0, HEATING_STEP / max(hotter, 1e-30)) * asked
+        state.heating[m] = hotter
+        if not change >= hotter:
+            change = hotter
         more = pressure_change(
             grid_of(grids, m), work_of(works, m), case.running.speed, case.running.oil, state.shift[m]
         )
@@ -163,26 +156,11 @@ def _answer(
     conducts = len(bodies.which) > 0
     if conducts:
         # what the pad takes at the present temperature is known; its answer to the change is solved for
-        rise, heat = np.empty(rows * columns), np.empty(rows * columns)
-        for q in range(len(rise)):
-            rise[q] = work.temperature[q // columns, q % columns] - case.supply
-        _into_pad(grid, bodies, bodies.which[m], rise, heat)
-        for q in range(len(rise)):
-            sources[0, q // columns, q % columns] -= heat[q]
+        sources[0] -= _into_pad(grid, bodies, bodies.which[m], work.temperature.reshape(-1) - case.supply)
     backflow = march(grid, work, case.running, loss, fields, between(sources))
     state.figures[BACKFLOW] = max(state.figures[BACKFLOW], backflow)
-    if conducts and _bounded(fields):
+    if conducts and largest(fields.reshape(-1)) < BOUNDLESS:
         _conduct(grid, work, bodies, state, case, (m, loss), fields)
-
-
-@inner
-def _bounded(fields: FloatArray) -> bool:
-    for m in range(fields.shape[0]):
-        for i in range(fields.shape[1]):
-            for j in range(fields.shape[2]):
-                if not abs(fields[m, i, j]) < BOUNDLESS:
-                    return False
-    return True
 
 
 @inner
@@ -199,44 +177,34 @@ def _conduct(
 
     The answer to its sources as a correction, which vanishes at the equilibrium, and with it what stays unsolved.
     """
-    count, columns = fields.shape[0], fields.shape[2]
     journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else case.supply
     hot = (1.0, state.inlet[film[0]], journal)
-    size = work.temperature.size
-    missing, answer = np.empty(size), np.empty(size)
-    for q in range(size):
-        i, j = q // columns, q % columns
-        missing[q] = -work.temperature[i, j]
-        for k in range(count):
-            missing[q] += hot[k] * fields[k, i, j]
-    _krylov(grid, work, bodies, case, film, missing, answer)
-    for q in range(size):
-        missing[q] = work.temperature[q // columns, q % columns] + answer[q]
-    right = np.empty(size)
-    for k in range(1, count):
-        for q in range(size):
-            right[q] = fields[k, q // columns, q % columns]
-        _krylov(grid, work, bodies, case, film, right, answer)
-        for q in range(size):
-            fields[k, q // columns, q % columns] = answer[q]
-            missing[q] -= hot[k] * answer[q]
-    for q in range(size):
-        fields[0, q // columns, q % columns] = missing[q]
+    temperature = work.temperature.reshape(-1)
+    answers = fields.reshape((len(fields), len(temperature)))
+    missing = -temperature
+    for k in range(len(answers)):
+        missing += hot[k] * answers[k]
+    missing = temperature + _krylov(grid, work, bodies, case, film, missing)
+    for k in range(1, len(answers)):
+        answers[k] = _krylov(grid, work, bodies, case, film, answers[k])
+        missing -= hot[k] * answers[k]
+    answers[0] = missing
 
 
 @inner
-def _into_pad(grid: FilmGrid, bodies: Conduction, k: int, rise: FloatArray, heat: FloatArray) -> None:
-    """What a pad takes from its film at every station, (nodes,) [W], for the rise (nodes,) of its face [K]."""
-    to_coarse, flux, columns = bodies.to_coarse[k], bodies.flux[k], len(grid.height)
-    coarse = np.zeros(to_coarse.shape[0])
+def _into_pad(grid: FilmGrid, bodies: Conduction, k: int, rise: FloatArray) -> FloatArray:
+    """What a pad takes from its film at every station, (nt + 1, nz + 1) [W], for the rise (nodes,) of its face [K]."""
+    to_coarse, flux = bodies.to_coarse[k], bodies.flux[k]
+    coarse, heat = np.zeros(to_coarse.shape[0]), np.zeros((len(grid.angle), len(grid.height)))
     for c in range(len(coarse)):
         for q in range(len(rise)):
             coarse[c] += to_coarse[c, q] * rise[q]
-    for q in range(len(rise)):
-        heat[q] = 0.0
-        for c in range(len(coarse)):
-            heat[q] += flux[q, c] * coarse[c]
-        heat[q] *= grid.dx * grid.height[q % columns]
+    for i in range(heat.shape[0]):
+        for j in range(heat.shape[1]):
+            for c in range(len(coarse)):
+                heat[i, j] += flux[i * heat.shape[1] + j, c] * coarse[c]
+            heat[i, j] *= grid.dx * grid.height[j]
+    return heat
 
 
 @inner
@@ -247,51 +215,39 @@ def _krylov(
     case: Case,
     film: tuple[int, FloatArray],
     right: FloatArray,
-    answer: FloatArray,
-) -> None:
+) -> FloatArray:
     """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
     m, loss = film
-    nodes, columns = len(right), loss.shape[1]
-    size = math.sqrt(_product(right, right))
-    answer[:] = 0.0
+    size, answer = math.sqrt(_product(right, right)), np.zeros(len(right))
     if not size > 0.0:
-        return
-    basis, images = np.zeros((_KRYLOV_STEPS, nodes)), np.zeros((_KRYLOV_STEPS, nodes))
-    taken, fields = np.zeros((1, loss.shape[0], columns)), np.zeros((1, loss.shape[0], columns))
-    heat, left, weights = np.empty(nodes), np.empty(nodes), np.zeros((_KRYLOV_STEPS, 1))
-    for q in range(nodes):
-        basis[0, q] = right[q] / size
+        return answer
+    basis, images = np.zeros((_KRYLOV_STEPS, len(right))), np.zeros((_KRYLOV_STEPS, len(right)))
+    taken, fields = np.zeros((1, loss.shape[0], loss.shape[1])), np.zeros((1, loss.shape[0], loss.shape[1]))
+    weights = np.zeros((_KRYLOV_STEPS, 1))
+    basis[0] = right / size
     for k in range(_KRYLOV_STEPS):
-        _into_pad(grid, bodies, bodies.which[m], basis[k], heat)
-        for q in range(nodes):
-            taken[0, q // columns, q % columns] = -heat[q]
+        taken[0] = -_into_pad(grid, bodies, bodies.which[m], basis[k])
         fields[0, 0] = 0.0
         march(grid, work, case.running, loss, fields, between(taken))
-        for q in range(nodes):
-            images[k, q] = basis[k, q] - fields[0, q // columns, q % columns]
+        images[k] = basis[k] - fields[0].reshape(-1)
         if not _product(images[k], images[k]) < BOUNDLESS:
             answer[:] = math.nan
-            return
+            return answer
         _least_squares(images, k + 1, right, weights)
-        for q in range(nodes):
-            answer[q], left[q] = 0.0, -right[q]
-            for r in range(k + 1):
-                answer[q] += weights[r, 0] * basis[r, q]
-                left[q] += weights[r, 0] * images[r, q]
-        if k == _KRYLOV_STEPS - 1 or math.sqrt(_product(left, left)) < _CONDUCTION_TOLERANCE * size:
-            return
-        new = basis[k + 1]
-        for q in range(nodes):
-            new[q] = images[k, q]
+        answer[:], left = 0.0, -right
         for r in range(k + 1):
-            share = _product(basis[r], new)
-            for q in range(nodes):
-                new[q] -= share * basis[r, q]
-        length = math.sqrt(_product(new, new))
+            answer += weights[r, 0] * basis[r]
+            left += weights[r, 0] * images[r]
+        if k == _KRYLOV_STEPS - 1 or math.sqrt(_product(left, left)) < _CONDUCTION_TOLERANCE * size:
+            return answer
+        basis[k + 1] = images[k]
+        for r in range(k + 1):
+            basis[k + 1] -= _product(basis[r], basis[k + 1]) * basis[r]
+        length = math.sqrt(_product(basis[k + 1], basis[k + 1]))
         if not length > 1e-12 * size:
-            return
-        for q in range(nodes):
-            new[q] /= length
+            return answer
+        basis[k + 1] /= length
+    return answer
 
 
 @inner

@@ -62,11 +62,11 @@ class Memory(NamedTuple):
     before: FloatArray
 
 
-def fresh_memory(size: int, warm: bool) -> Memory:
-    """Of an iteration that has not begun, over a state of a size; a warm one does not relax its first step."""
+def fresh_memory(size: int) -> Memory:
+    """Of an iteration that has not begun, over a state of a size; films begin warm, and nothing is relaxed."""
     trail = np.zeros(TRAIL)
     trail[[RESIDUAL, HEAT, _BEST, _LEFT, _BEST_LEFT]] = math.inf
-    trail[RELAXED] = 1.0 if warm else _RELAXATION
+    trail[RELAXED] = 1.0
     images = np.empty((2 * DEPTH + 3, size))
     return Memory(trail, images[: DEPTH + 1], images[DEPTH + 1 : -1], images[-1])
 
@@ -79,7 +79,7 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
         if trail[_STAGE] == _BEGIN:
-            if trail[ITERATION] >= _MAX_ITERATIONS:
+            if trail[ITERATION] >= _MAX_ITERATIONS or (case.tried >= 0 and state.idle[case.tried]):
                 return NOT_CONVERGED
             trail[ITERATION] += 1
             trail[_STAGE] = _PRESSURE

@@ -15,9 +15,9 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.attitudes import BETWEEN
-from model.interpolation import row_below
+from model.interpolation import least, row_below
 from model.statics.compiled.laws import deflection
-from model.statics.compiled.stack import PadStack, PadState
+from model.statics.compiled.stack import PadStack
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
@@ -173,7 +173,7 @@ def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatA
             stiff = max(stiff, pads.attitudes[m, 3, last] / pads.clearance[m])
     if math.isinf(room):
         return False
-    room = max(room, 0.05 * np.min(pads.clearance))
+    room = max(room, 0.05 * least(pads.clearance))
     size = math.hypot(load[0], load[1])
     if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
         position[0], position[1] = 0.4 * room * load[0] / size, 0.4 * room * load[1] / size
@@ -205,17 +205,16 @@ def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatA
 
 @compiled
 def warm_film(
-    rises: FloatArray, pads: PadStack, state: PadState, m: int, first: tuple[int, int], temperature: FloatArray
+    rises: FloatArray, first: int, table: FloatArray, reach: float, inlet: float, whole: bool, temperature: FloatArray
 ) -> None:
     """Temperatures of a film on its loaded attitude, from those of a curve's rows: `rises` (rows, coarse mesh) [K].
 
-    `first`: point of the curve where the table begins, and `FilmGrid.first`. Across, either mesh is graded alike; a
-    whole film is symmetric.
+    `table` (n,): r of the attitudes, from the curve's point `first` on. Across, either mesh is graded alike; a whole
+    film is symmetric.
     """
-    table, reach = pads.attitudes[m, 0], _reach(pads, m, state.position)
-    low, whole, inlet = row_below(table, pads.rows[m], reach), first[1] == 1, state.inlet[m]
+    low = row_below(table, len(table), reach)
     part = min(max((reach - table[low]) / (table[low + 1] - table[low]), 0.0), 1.0)
-    part = (first[0] + low + part) / BETWEEN
+    part = (first + low + part) / BETWEEN
     row = min(int(part), rises.shape[0] - 2)
     part -= row
     rows, columns = temperature.shape

@@ -10,6 +10,7 @@ from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
+from model.interpolation import least
 from model.statics.compiled.bending import Shapes, bend_pads, change_shape
 from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, along, rigid_approach
 from model.statics.compiled.elimination import PadEquations, eliminate
@@ -152,7 +153,7 @@ def move(
 ) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
     grids = shapes.grids
-    scale = min(damping, _LONGEST_STEP * np.min(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
+    scale = min(damping, _LONGEST_STEP * least(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
     extra, bending = np.empty((0, 0)), state.bent.size > 0
     closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
     for m in range(len(state.tilt)):
