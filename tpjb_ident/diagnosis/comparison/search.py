@@ -153,7 +153,8 @@ class _Search:
         if not rough and self._near(fit, fit.posterior.promised, self.settings.worth_derivatives if right else 0.0):
             fit = self._renewed(fit)
         begun_fine = not (rough or proposal.coarse)
-        if begun_fine and fit.needs_more(self.settings) and self._near(fit, fit.posterior.promised, 0.0):
+        broken = fit.posterior.promised > fit.posterior.total + Deciding.better  # a jump lies in every step's way
+        if begun_fine and (broken or fit.needs_more(self.settings)) and self._near(fit, fit.posterior.promised, 0.0):
             fit = self._past_jumps(fit)
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
