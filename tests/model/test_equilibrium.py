@@ -229,16 +229,38 @@ def test_a_hot_ring_without_preload_carries_on_all_pads():
 
 
 @pytest.mark.slow
-def test_where_no_set_of_pads_finds_rest_that_is_named():
-    # three pads without preload, the load almost on one of them: one carries all, and nothing holds it on the way
+def test_a_heated_film_carries_on_a_wedge_that_opens():
+    # three pads without preload, the load almost on one of them: heat alone balances the other
     pads = tuple(
         Pad(2.0 * math.pi / 3.0 * k, 1.745329, 0.5, 85.13593e-6, 85.13593e-6, 0.0415, 0.0, 0.0415, 0.5, 3e-4)
         for k in range(3)
     )
     oil = Oil(0.0324235, 0.034, 860.0, 7e-4, 2000.0, 0.13, 38.791)
     ring = Bearing("ring", 0.207696, 0.215088, pads, Pivot(), oil)
-    p = predict(ring, 13473.0, 1.79937, 577.7065, pivots=1.948773e8, mesh=(40, 4))
-    assert not p.converged
-    assert "no set of pads finds rest" in p.status
+    p, fine, heavier = (
+        predict(ring, load, 1.79937, 577.7065, pivots=1.948773e8, mesh=mesh)
+        for load, mesh in ((13473.0, (40, 4)), (13473.0, (80, 8)), (20210.0, (40, 4)))
+    )
+    assert p.idle_pads == fine.idle_pads == (3,)
+    film = p.equilibrium.films[0]
+    assert film.forces.force[0] > 4000.0
+    assert film.tangent @ p.equilibrium.position + film.pivot_radius * film.tilt < 0.0  # the wedge
+    np.testing.assert_allclose(p.h, fine.h, atol=1e-4 * np.abs(p.h).max())
+    warm = predict(ring, 13473.0, 1.79937, 577.7065, pivots=1.948773e8, mesh=(40, 4), start=heavier)
+    np.testing.assert_allclose(warm.h, p.h, atol=1e-6 * np.abs(p.h).max())
     between = predict(ring, 13473.0, math.pi / 3.0, 577.7065, pivots=1.948773e8, mesh=(40, 4))
     assert between.converged
+
+
+@pytest.mark.slow
+def test_where_no_set_of_pads_finds_rest_that_is_named():
+    # four pads without preload: where one idles the journal comes so near that it would carry, and carrying pushes off
+    pads = tuple(
+        Pad(math.pi / 2.0 * k, 1.223715, 0.5, 74.85854e-6, 74.85854e-6, 0.0254127, 0.0, 0.0254127, 0.5, 3e-4)
+        for k in range(4)
+    )
+    oil = Oil(0.02813447, 0.034, 860.0, 7e-4, 2000.0, 0.13, 45.716114)
+    ring = Bearing("ring", 0.12706343, 0.12509399, pads, Pivot(), oil)
+    p = predict(ring, 18524.038, -2.0754574, 1316.3273, pivots=2.755724547e9, mesh=(40, 4))
+    assert not p.converged
+    assert "no set of pads finds rest" in p.status

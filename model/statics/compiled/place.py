@@ -13,6 +13,9 @@ from model.statics.compiled.stack import PadStack, PadState
 from model.tilt_hold import held_moment
 from rigdata.arrays import BoolArray, FloatArray
 
+#: Share of the load below which a film that opens carries nothing that is told from none: from other starts some stand
+#: at up to 7e-7 of it where the pad idles, and those that heat holds carry 0.07 and more.
+_NOTHING = 1e-4
 #: How often a search puts a pad back on its loaded attitude that has lost it on the way.
 _RESCUES = 12
 
@@ -64,12 +67,17 @@ def margin(pads: PadStack, state: PadState, m: int) -> float:
 
 
 @inner
+def _warms(case: Case) -> bool:
+    """Whether a film's temperature follows, and what that adds to its stiffness is known."""
+    return case.thermal == ALONE or case.thermal == COUPLED
+
+
+@inner
 def is_doubtful(case: Case, pads: PadStack, state: PadState, m: int) -> bool:
     """Whether the frozen film leaves a pad's stability in doubt, or its wedge is flatter than that of its fold."""
     if case.hold.flexure > 0.0:
         return False
-    heated = case.thermal == ALONE or case.thermal == COUPLED
-    flat = heated and pads.rows[m] >= 2 and state.wedge[m, 1] < pads.attitudes[m, 2, 0]
+    flat = _warms(case) and state.wedge[m, 1] < pads.attitudes[m, 2, 0]
     return flat or not is_stable(case, pads, state, m, state.stiffness[m])
 
 
@@ -80,10 +88,11 @@ def is_stable(case: Case, pads: PadStack, state: PadState, m: int, k: FloatArray
     The determinant of the pad's own two equations is positive: kbb (1 + c kaa) > c kba kab, c the pivot's compliance,
     with what holds the tilt back added to the film's moment. What counts is the film whose heat follows: the branch
     that comes back from the fold is unstable by it, and near a fold the frozen one calls unstable what is not. An
-    unloaded film leaves a wedge that opens, or a load that is not told from none.
+    unloaded film leaves a load that is not told from none, and, where no heat carries it, a wedge that opens.
     """
-    none = case.accuracy * math.hypot(case.load[0], case.load[1])
-    if case.hold.slip == 0.0 and (state.wedge[m, 1] <= pads.flattest[m] or state.force[m, 0] <= none):
+    opens = state.wedge[m, 1] <= pads.flattest[m]
+    none = (_NOTHING if opens else case.accuracy) * math.hypot(case.load[0], case.load[1])
+    if case.hold.slip == 0.0 and (state.force[m, 0] <= none or (opens and not _warms(case))):
         return False
     load, radius = state.force[m, 0], pads.pivot_radius[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
