@@ -42,6 +42,12 @@ def unsupported(setup: Setup, load: FloatArray) -> bool:
     return bool(missing > 1e-9)
 
 
+def held_along_one_line(films: Sequence[PadFilm]) -> bool:
+    """Whether nothing holds the journal across its load: all pads with films push along one line."""
+    normals = np.array([f.normal for f in films if f.forces is not None])
+    return len(normals) > 0 and np.linalg.matrix_rank(normals, tol=1e-6) < 2
+
+
 def overloaded_pads(films: Sequence[PadFilm]) -> list[Condition]:
     """The pads whose film is too thin, whose pressure too high or whose oil too hot for a pad to live."""
     pads = [

@@ -283,15 +283,6 @@ class Search:
                 even.append(film.number)
         return even
 
-    def dry_pads(self) -> frozenset[int]:
-        """Pads (from 0) that idle where a full gap at their leading edge would take more oil than there is."""
-        return frozenset(k - 1 for k in starved(self.films) if self.films[k - 1].idle)
-
-    def not_held(self) -> bool:
-        """Whether nothing holds the journal across its load: all pads with films push along one line."""
-        normals = np.array([f.normal for f in self.films if f.forces is not None])
-        return len(normals) > 0 and self.case.hold.flexure == 0.0 and np.linalg.matrix_rank(normals, tol=1e-6) < 2
-
     def start_from(self, start: Equilibrium) -> bool:
         """Take over a neighbour's state, moved as the curves are; False if it has none or its mesh does not fit."""
         if len(start.films) != len(self.films) or not start.converged:

@@ -10,9 +10,10 @@ import numpy as np
 
 from model.conditions import named, pads_of
 from model.setup import Setup
-from model.statics.conditions import HOTTEST_FILM
+from model.statics import conditions
 from model.statics.equilibrium import Equilibrium
 from model.statics.heat_paths import couples_heat
+from model.statics.pad_flow import starved
 from model.statics.search import Search
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
@@ -146,7 +147,7 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
     if search.other.any() and not restless:
         idling = np.flatnonzero(~search.other) + 1
         names.append(named("another equilibrium exists", idling.tolist()))
-    if search.not_held():
+    if search.case.hold.flexure == 0.0 and conditions.held_along_one_line(films):
         names.append(named("nothing holds the journal across its load"))
     return replace(result, status=(*names, *result.status)) if names else result
 
@@ -157,7 +158,8 @@ def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilib
     search.stand()
     result, held = search.run(), frozenset[int]()
     for _ in search.films:
-        held |= search.dry_pads()
+        # those that idle where a full gap at their leading edge would take more oil than there is
+        held |= frozenset(k - 1 for k in starved(search.films) if search.films[k - 1].idle)
         if result.converged:
             return _settled(search, result, held)
         swinging = [
@@ -180,7 +182,7 @@ def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibriu
     """
     found, reached = _raise(setup, load, speed, "heat")
     hottest = max(float(f.work.temperature.max()) for f in failed.films)
-    if found is not None or not reached or hottest < HOTTEST_FILM:
+    if found is not None or not reached or hottest < conditions.HOTTEST_FILM:
         return found or failed
     return replace(failed, status=(named("heat runs away", number=100 * reached), *failed.status))
 
