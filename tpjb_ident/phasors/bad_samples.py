@@ -27,6 +27,8 @@ _MARGIN = 3
 _MAX_LOST = 0.5
 #: Change of a residual over the usual one at which least absolute deviations have settled.
 _SETTLED = 0.02
+#: Samples of a long window that are multiplied at once.
+AT_ONCE = 256
 _LAD_ROUNDS = 15
 _ROUNDS = 12
 
@@ -121,4 +123,10 @@ def _verdicts(full: FloatArray, y: FloatArray, usual: float) -> tuple[FloatArray
 def _quick_solution(design: FloatArray, values: FloatArray, weights: FloatArray) -> FloatArray:
     """Weighted least squares by normal equations: good enough for the verdict on samples, and several times quicker."""
     weighted = design * weights[:, None]
-    return np.asarray(np.linalg.pinv(weighted.T @ design, rcond=1e-12, hermitian=True) @ (weighted.T @ values))
+    return np.asarray(np.linalg.pinv(products(weighted, design), rcond=1e-12, hermitian=True) @ (weighted.T @ values))
+
+
+def products(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Inner products of all columns, part by part: a tall product at once is shared out among threads, at a loss."""
+    stretches = [slice(k, k + AT_ONCE) for k in range(0, len(first), AT_ONCE)]
+    return np.asarray(np.sum([first[part].T @ second[part] for part in stretches], axis=0))

@@ -12,9 +12,11 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from tpjb_ident.phasors.bad_samples import (
+    AT_ONCE,
     BAD_LIMIT,
     SCALE_LIMIT,
     is_present,
+    products,
     robust_deviation,
     robust_fit,
     with_flanks,
@@ -26,8 +28,6 @@ _FEW = 0.1
 _FEW_ROUNDS = 8
 #: Samples of a block.
 BLOCK = 256
-#: Samples of a long window that are multiplied at once.
-_AT_ONCE = 256
 
 
 class WaveBlocks:
@@ -114,7 +114,7 @@ class LineFitter:
         self.frequencies = np.asarray(frequencies, dtype=float)
         self.design = even_design(length, rate, self.frequencies, drift_order)
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
-        self._gram_inverse = np.linalg.pinv(_products(self.design, self.design), rcond=1e-12, hermitian=True)
+        self._gram_inverse = np.linalg.pinv(products(self.design, self.design), rcond=1e-12, hermitian=True)
         self._level = _level(self.design, self.frequencies, length / rate)
         in_blocks = length >= 2 * BLOCK and drift_order == 1
         self._blocks = WaveBlocks(length, rate, self.frequencies) if in_blocks else None
@@ -134,14 +134,18 @@ class LineFitter:
         offset = _mean_of_present(stack[:, :: self._stride])
         residual = stack - offset
         coefficients = self._solve_and_subtract(residual)
+        missing = np.zeros(q * n)
+        for row in np.flatnonzero(~np.isfinite(coefficients).all(axis=1)):
+            coefficients[row], residual[row], missing[row] = self._of_present(stack[row] - offset[row])
         scale = 1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1).reshape(q, n)
         usual = usual_scale(scale.T) if usual is None else usual
-        lost = np.zeros((q, n))
+        lost = missing.reshape(q, n)
         bad = self._unclean(residual, scale, usual, np.abs(coefficients).sum(axis=1))
         coefficients, offset = coefficients.reshape(q, n, -1), offset.reshape(q, n)
         residual = residual.reshape(q, n, -1)
         for k, i in np.argwhere(bad):
-            robust = self._without_few(residual[k, i], coefficients[k, i], scale[k, i], float(usual[k]))
+            gaps = ~is_present(rows[k, i])
+            robust = self._without_few(residual[k, i], gaps, coefficients[k, i], scale[k, i], float(usual[k]))
             if robust is None:
                 fit = robust_fit(self.design, rows[k, i] - offset[k, i], float(usual[k]))
                 robust = fit.coefficients, fit.scale, fit.lost
@@ -169,30 +173,43 @@ class LineFitter:
     def _solve_and_subtract(self, rows: FloatArray) -> FloatArray:
         """Coefficients of every row, (k, n_columns); the rows become residuals."""
         if self._blocks is None:
-            coefficients = _products(rows.T, self.design) @ self._gram_inverse
-            for first in range(0, self.length, _AT_ONCE):
-                part = slice(first, first + _AT_ONCE)
+            coefficients = products(rows.T, self.design) @ self._gram_inverse
+            for first in range(0, self.length, AT_ONCE):
+                part = slice(first, first + AT_ONCE)
                 rows[:, part] -= coefficients @ self.design[part].T
         else:
             coefficients = self._blocks.project(rows) @ self._gram_inverse
             self._blocks.subtract(rows, coefficients)
         return coefficients
 
+    def _of_present(self, values: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Fit of a row (length,) whose few gaps are taken off the normal equations, its residual, and their share.
+
+        The residual is zero in the gaps; NaN where they are many.
+        """
+        gaps = ~is_present(values)
+        if gaps.mean() > _FEW:
+            return np.full(self.design.shape[1], np.nan), np.full(len(values), np.nan), 0.0
+        filled, rows = np.where(gaps, 0.0, values), self.design[gaps]
+        gram = np.linalg.inv(self._gram_inverse) - rows.T @ rows
+        coefficients = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ (filled @ self.design)
+        return coefficients, np.where(gaps, 0.0, filled - self.design @ coefficients), float(gaps.mean())
+
     def _without_few(
-        self, residual: FloatArray, coefficients: FloatArray, scale: float, usual: float
+        self, residual: FloatArray, gaps: BoolArray, coefficients: FloatArray, scale: float, usual: float
     ) -> tuple[FloatArray, float, float] | None:
         """Leave the few outlying samples out of a window's fit until no verdict changes; None where it cannot.
 
         Their rows are taken off the normal equations: no need to go through all samples again.
 
-        `residual` (length,), `coefficients` (n_columns,).
+        `residual` (length,), `gaps` (length,) where it has no value, `coefficients` (n_columns,).
         """
         if not scale <= SCALE_LIMIT * usual:
             return None
         gram = np.linalg.inv(self._gram_inverse)
         size, solution, left_out = np.abs(residual), coefficients, None
         for _ in range(_FEW_ROUNDS):
-            previous, left_out = left_out, np.flatnonzero(with_flanks(size > BAD_LIMIT * scale))
+            previous, left_out = left_out, np.flatnonzero(gaps | with_flanks(size > BAD_LIMIT * scale))
             if previous is not None and np.array_equal(previous, left_out):
                 return solution, scale, len(left_out) / self.length
             if len(left_out) > _FEW * self.length:
@@ -207,12 +224,6 @@ class LineFitter:
             size = np.abs(residual + self.design @ change)
             scale = robust_deviation(size)
         return None
-
-
-def _products(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Inner products of all columns, part by part: a tall product at once is shared out among threads, at a loss."""
-    stretches = [slice(k, k + _AT_ONCE) for k in range(0, len(first), _AT_ONCE)]
-    return np.asarray(np.sum([first[part].T @ second[part] for part in stretches], axis=0))
 
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:

@@ -27,6 +27,8 @@ _NOTHING = 1e-9
 _FREEDOM = 65.0
 #: Phase sets that show the distortion of a multi-sine, and likeness from which two are one.
 _SETS, _ALIKE = 3, 0.6
+#: A line is driven from this share of the largest on.
+_DRIVEN = 0.05
 #: Chance below which noise alone does not make a response.
 _CHANCE = 1e-4
 
@@ -88,19 +90,34 @@ def driven_command(spectra: RunSpectra) -> ComplexArray:
 
 def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
     """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
-    means = [run.D.mean(axis=0) for run in runs]
-    waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
     different: list[ComplexArray] = []
-    for wave in waves:
-        if all(_likeness(wave, other) < _ALIKE for other in different):
-            different.append(wave)
+    for run in runs:
+        mean = run.D.mean(axis=0)
+        wave = mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1]
+        made = _made(np.round(run.frequencies * (run.period or 0.0)).astype(int), wave)
+        if not np.linalg.norm(made) > _NOTHING:
+            return False
+        made = made / np.linalg.norm(made)
+        if all(np.abs(np.vdot(made, other)) < _ALIKE for other in different):
+            different.append(made)
     return len(different) < _SETS
 
 
-def _likeness(wave: ComplexArray, other: ComplexArray) -> float:
-    """Share in which phases (n,) differ by no more than a time, 0 to 1."""
-    product = wave * other.conj()
-    return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
+def _made(places: IntArray, wave: ComplexArray) -> ComplexArray:
+    """What lines (n,) make of one another, two and three at a time, against their own phases, (2 n,).
+
+    It is the same whenever the run begins, and zero where no others' sums fall on a line, as with two tones.
+    """
+    wave = np.where(np.abs(wave) > _DRIVEN * np.abs(wave).max(initial=0.0), wave, 0.0)
+    wave = wave / max(float(np.linalg.norm(wave)), 1e-300)
+    n = 4 * (int(places.max()) + 1)
+    spectrum = np.zeros(n // 2 + 1, complex)
+    spectrum[places] = wave
+    signal = np.fft.irfft(spectrum, n) * (n / 2)
+    square, cube = (np.fft.rfft(signal**power)[places] * (2 / n) for power in (2, 3))
+    # a line beside any other twice stands for itself: the film's change of H, whatever the phases
+    cube = cube - 0.75 * wave * (2 - np.abs(wave) ** 2)
+    return np.concatenate([square, cube]) * np.tile(wave.conj(), 2)
 
 
 def _regressed(z: ComplexArray, u: ComplexArray, nuisance: ComplexArray) -> LineResponse:
