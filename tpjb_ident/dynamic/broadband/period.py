@@ -5,8 +5,9 @@ need not hold a whole number of samples; the record is then resampled, all chann
 
 What a period leaves is what the record changes from any stretch to its repeats. Beats of few tones all but repeat
 sooner, and multiples leave no more: the period is the smallest that leaves no more than the best does but by chance (F
-test of nested models). Noise repeats by chance: a period's lines must stand above the bins beside them (F test
-along the band, joined by Fisher's sum of logarithms), at a chance that all lags looked at share.
+test of nested models). Every other that is no multiple must be as much less likely (Akaike), else noise hides which it
+is. Noise repeats by chance: a period's lines must stand above the bins beside them (F test along the band; the highest,
+or all by Fisher's sum of logarithms), at a chance that all lags looked at share.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from tpjb_ident.phasors.lines import Line
 _MIN_PERIODS = 3
 #: Chance that a record without period shows one, and that its noise hides a period behind a multiple of it.
 _CHANCE = 1e-3
+#: Part of a cycle at the top of the band within which lags are one.
+_ONE_LAG = 1 / 4
 #: Part of a cycle at the top of the band by which lags are first moved, and of the last multiple's in the end.
 _FIRST_MOVE, _LAST_MOVE = 1 / 8, 1 / 64
 #: Points of a cycle at the top of the band from which splines leave nothing of note [share].
@@ -64,9 +67,13 @@ def find_period(samples: Samples, band: tuple[float, float], lines: tuple[Line, 
     more = np.maximum(freedom - least, 1.0)
     allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
     k = int(np.argmax(left <= left.min() * allowed))
-    if left[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
+    ratio = np.maximum(periods / periods[k], periods[k] / periods)
+    apart = np.abs(ratio - np.round(ratio)) * np.minimum(periods, periods[k]) > _ONE_LAG * samples.rate / band[1]
+    odds = freedom[k] * np.log(left / left[k]) + 0.5 * (freedom[k] - freedom)
+    if left[k] > most or (odds[apart] < -2 * math.log(_CHANCE)).any():
         return None
-    return float(periods[k])
+    chance = _chance_of_noise(clean, float(periods[k]), band, lines)
+    return float(periods[k]) if chance < _CHANCE / len(part) else None
 
 
 def _correlation(first: FloatArray, second: FloatArray, finer: int) -> FloatArray:
@@ -122,7 +129,8 @@ def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], l
     sums = [np.bincount(block, weights) for weights in (own, beside, own * power, beside * power)]
     held, spare, high, noise = np.array(sums)[:, (sums[0] > 0) & (sums[1] > 0)]
     chances = betainc(spare, held, noise / np.maximum(noise + high, 1e-300))
-    return float(gammaincc(max(len(chances), 1e-9), -np.log(np.maximum(chances, 1e-300)).sum()))
+    joined = gammaincc(max(len(chances), 1e-9), -np.log(np.maximum(chances, 1e-300)).sum())
+    return float(2 * min(joined, len(chances) * chances.min(initial=1.0)))
 
 
 def resampled(samples: Samples, period: float, top: float) -> Samples:
