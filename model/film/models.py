@@ -7,9 +7,9 @@ from model.film.cavitation import solve_film_jfo
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, solve_film
 
-_JFO, _TURBULENT = range(2)
+_JFO, TURBULENT = range(2)
 #: Names, and by what compiled loops know them.
-FILM_MODELS = {"swift-stieber": None, "jfo": _JFO, "turbulent": _TURBULENT}
+FILM_MODELS = {"swift-stieber": None, "jfo": _JFO, "turbulent": TURBULENT}
 
 
 @inner

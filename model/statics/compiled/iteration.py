@@ -20,7 +20,7 @@ from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_
 from model.statics.compiled.heat import Conduction, exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
 from model.statics.compiled.stack import BACKFLOW, GROWN, GridStack, PadStack, PadState
-from model.statics.compiled.step import grow_and_bend, move, newton, solve_pressures
+from model.statics.compiled.step import carries_on, grow_and_bend, make_last_step, move, newton, solve_pressures
 from rigdata.arrays import FloatArray
 
 _MAX_ITERATIONS = 80
@@ -114,6 +114,8 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
             trail[_COUNT] = 0
             if trail[STABLE] == 0.0 and _doubts(case, pads, state):
                 return ASKS_STABLE
+            if carries_on(state, case):
+                make_last_step(shapes, pads, works, state, case, shift)
             sharp, trail[_STAGE] = True, _PRESSURE
             continue
         _go_on(shapes, pads, works, state, case, memory, shift)

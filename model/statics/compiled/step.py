@@ -8,7 +8,7 @@ import numpy as np
 
 from model.compilation import inner
 from model.film.mesh import FilmGrid, FilmWork
-from model.film.models import solve_by
+from model.film.models import TURBULENT, solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.interpolation import least
 from model.statics.compiled.bending import Shapes, bend_pads, change_shape
@@ -40,7 +40,7 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
         grid, work = grid_of(shapes.grids, m), work_of(works, m)
         state.supplied[m] = case.fresh + case.mixing * state.passed[pads.order[k - 1]] / case.length
         while not state.idle[m]:
-            if not sharp and case.thermal != ACROSS:
+            if case.thermal != ACROSS and (not sharp or carries_on(state, case)):
                 set_viscosity(work, case.running.oil)
             a = rigid_approach(pads, state, m) - state.deflection[m]
             b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
@@ -185,6 +185,33 @@ def move(
             state.axial[m] += scale * axial[m]
     state.figures[GROWING] = 0.0
     return scale == 1.0
+
+
+@inner
+def carries_on(state: PadState, case: Case) -> bool:
+    """Whether the last step is made to first order: the known derivatives of a film's pressure say all that it does."""
+    return state.bent.size == 0 and case.thermal != ACROSS and (case.rupture is None or case.rupture == TURBULENT)
+
+
+@inner
+def make_last_step(
+    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, shift: FloatArray
+) -> None:
+    """Make the step that settles a search: pressures follow by their derivatives, and no film is solved again.
+
+    Left out, it would leave K and C a share of it off, and that share would be another one from another start.
+    """
+    closing, first = case.closing * state.figures[GROWING], shapes.grids.first
+    move(shapes, pads, works, state, case, shift, 1.0)
+    for m in range(len(state.tilt)):
+        if state.solved[m]:
+            da = rigid_approach(pads, state, m) - state.deflection[m] - state.wedge[m, 0] + closing
+            db = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m] - state.wedge[m, 1]
+            pressure, unknown, slopes = works.pressure[m], works.unknown[m], works.slopes[m]
+            width = pressure.shape[1] - 1 - first
+            for q in range(len(unknown)):
+                unknown[q] += state.shift[m, q] + slopes[q, 0] * da + slopes[q, 1] * db
+                pressure[1 + q // width, first + q % width] = unknown[q]
 
 
 @inner
