@@ -28,8 +28,8 @@ from tests.report.plot_cases import (
     polygon,
 )
 from tpjb_ident.report import plots
-from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.drawing.residual_frame import residual_frame
+from tpjb_ident.report.drawing.picture import LIGHT
+from tpjb_ident.report.plots.residuals import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0
