@@ -298,7 +298,8 @@ class Search:
         for m, (film, other) in enumerate(zip(self.films, start.films, strict=True)):
             if self.case.mixing and math.isfinite(self.case.fresh):
                 state.passed[m] = through_flow(other)[1]
-            if known and state.idle[m] != other.idle == math.isnan(start.begun.tilt[m]):
+            as_curves_say = other.idle == math.isnan(start.begun.tilt[m])
+            if known and as_curves_say and state.idle[m] != other.idle:
                 continue  # the neighbour's pad does as its curve says: so does this one
             state.idle[m] = other.idle
             state.tilt[m], state.deflection[m] = other.tilt + shift.tilt[m], other.deflection + shift.deflection[m]

@@ -138,7 +138,7 @@ class _Search:
         return again if again.posterior.total > fit.posterior.total - Deciding.better else fit
 
     def _past_jumps(self, fit: Fit) -> Fit:
-        """A fit that leads and is surely wrong, begun coarsely where that makes it better."""
+        """A fit that leads and is surely wrong, or stopped at a jump, begun coarsely where that makes it better."""
         again = fitted(self.run, self.problem, Start(fit.faults, fit.point.theta, fit.point.jacobian, coarse=True))
         return fit if again is None or again.posterior.total <= fit.posterior.total else again
 
