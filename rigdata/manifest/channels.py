@@ -14,10 +14,12 @@ from rigdata.calibration import (
     UNCALIBRATED,
     VECTOR_QUANTITIES,
     Channel,
+    ChannelResponse,
+    parse_filter,
+    parse_response_table,
     reading_gain,
     reading_zero,
 )
-from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
 from rigdata.manifest.fields import CHANNEL, RUNS_OF, Findings, Table, nearest
 from rigdata.problem import RigDataError, shown
 from rigdata.units import UnitError, is_signal

@@ -19,8 +19,7 @@ from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.motion import answer
-from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
-from rigdata.virtual_rig.sensing import converter_step, felt_direction
+from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
 from rigdata.virtual_rig.truth import VirtualRigError
 
 Progress = Callable[[int, int, str], None]

@@ -1,27 +1,249 @@
-"""A virtual rig: truth, plan, instruments, noise and faults put together; runs are simulated one by one."""
+"""A virtual rig: truth, plan, instruments, noise and faults put together; runs are simulated one by one.
+
+From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the converter, faults of the record.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+from scipy.fft import irfft, next_fast_len
+
+from rigdata.arrays import FloatArray
 from rigdata.virtual_rig.faults import Fault, check_faults
-from rigdata.virtual_rig.instruments import Instruments
+from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
-from rigdata.virtual_rig.noise import Noise, stream
+from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
 from rigdata.virtual_rig.plan import PlannedRun, RigPlan
-from rigdata.virtual_rig.sensing import (
-    Glitch,
-    Readings,
-    add_glitches,
-    analogue_readings,
-    converted,
-    draw_glitches,
-    faulty_instruments,
-    spoil_record,
-)
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
+
+
+@dataclass(frozen=True)
+class Glitch:
+    """One burst: a channel is off by `size` (SI) over some samples."""
+
+    channel: str
+    first: int
+    count: int
+    size: float
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What the recorder gets: one array (n,) per channel in the channel's own unit, and the times (n,) [s]."""
+
+    time: FloatArray = field(repr=False)
+    columns: dict[str, FloatArray] = field(repr=False)
+    rate: float
+
+
+def analogue_readings(
+    motion: Motion, instruments: Instruments, noise: Noise, seed: int, run: str
+) -> dict[str, FloatArray]:
+    """Readings of all sensors before the converter, each (n,) in its own unit."""
+    time = motion.time
+    disturbance = channel_noise(instruments.sensors, noise, time, seed, run)
+    vectors: dict[tuple[str, float], FloatArray] = {}
+    columns = {}
+    for sensor, added in zip(instruments.sensors, disturbance):
+        key = (sensor.quantity, sensor.error.delay)
+        if sensor.axis is not None and key not in vectors:
+            # sampled at the delayed time instead of shifted: exact for any fraction of a sample
+            vectors[key] = motion.at(sensor.quantity, time - sensor.error.delay)
+        value = _sensed(sensor, instruments, motion, vectors.get(key))
+        error = sensor.error
+        columns[sensor.name] = (
+            sensor.polarity * sensor.scale * (error.gain * value + error.offset + added) + sensor.zero
+        )
+    return columns
+
+
+def _sensed(sensor: Sensor, instruments: Instruments, motion: Motion, vector: FloatArray | None) -> FloatArray:
+    """Quantity (n,) [SI, degC for temperatures] that a sensor feels, from the vector (n, 2) at its delayed time."""
+    n = len(motion.time)
+    if sensor.quantity == "temperature":
+        return np.full(n, motion.temperature[(sensor.pad or 1) - 1])
+    if sensor.quantity == "speed" or vector is None or sensor.axis is None:
+        return np.full(n, abs(motion.speed))
+    value = vector @ felt_direction(sensor, instruments)
+    if sensor.quantity == "displacement":
+        late = motion.time - sensor.error.delay
+        value = value + motion.runout(sensor.axis + sensor.error.angle, late)
+    return value
+
+
+def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:
+    """Vector (2,) whose product with the quantity gives what the sensor feels: its axis, and cross-talk."""
+    direction = sensor.direction()
+    if sensor.error.cross:
+        pairs = instruments.of(sensor.quantity)
+        partner = pairs[[s.name for s in pairs].index(sensor.name) ^ 1]
+        direction = direction + sensor.error.cross * partner.direction()
+    return direction
+
+
+def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: int, run: str) -> tuple[Glitch, ...]:
+    """Draw the glitches of a run."""
+    rules = noise.glitches
+    channels = [s for s in instruments.sensors if s.quantity in ("displacement", "force")]
+    rng = stream(seed, run, "glitches")
+    glitches: list[Glitch] = []
+    while channels and len(glitches) < 4 and rng.uniform() < rules.share:
+        sensor = channels[rng.integers(len(channels))]
+        largest = rules.displacement if sensor.quantity == "displacement" else rules.force
+        count = min(int(rng.integers(rules.shortest, rules.longest, endpoint=True)), samples)
+        size = float(rng.uniform(0.4, 1.0) * largest * rng.choice([-1.0, 1.0]))
+        glitches.append(Glitch(sensor.name, int(rng.integers(0, samples - count + 1)), count, size))
+    return tuple(glitches)
+
+
+def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:
+    """Put bursts into the readings, in place."""
+    for glitch in glitches:
+        sensor = instruments.named(glitch.channel)
+        burst = slice(glitch.first, glitch.first + glitch.count)
+        columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
+
+
+def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArray:
+    """Reading after the converter: limited to its span and rounded to its steps."""
+    if bits is None:
+        return reading
+    step = converter_step(sensor, bits)
+    codes = np.clip(np.rint(reading / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    return codes * step
+
+
+def converter_step(sensor: Sensor, bits: int) -> float:
+    """One step of the converter, in the reading's unit."""
+    return 2 * sensor.span / 2**bits
+
+
+def channel_noise(sensors: tuple[Sensor, ...], noise: Noise, time: FloatArray, seed: int, run: str) -> FloatArray:
+    """Noise of each sensor over `time` (n,) [s] -> (n_sensors, n), in the SI unit of its quantity."""
+    kinds: list[ChannelNoise] = [getattr(noise, sensor.quantity) for sensor in sensors]
+    white, pink, mains, drift = np.array([astuple(kind) for kind in kinds]).T[..., None]
+    n = len(time)
+    rate = (n - 1) / (time[-1] - time[0]) if n > 1 else 1.0
+    rng = stream(seed, run, "noise")
+    out = white * rng.standard_normal((len(sensors), n))
+    out += pink * flicker(rng, len(sensors), n, rate)
+    out += drift * slow_drift(rng, len(sensors), time)
+    if np.any(mains):
+        out += mains * _pick_up(noise, [s.name for s in sensors], time, seed, run)
+    return out
+
+
+def flicker(rng: np.random.Generator, rows: int, n: int, rate: float) -> FloatArray:
+    """1/f noise (rows, n) of amplitude density 1 per sqrt(Hz) at 1 Hz.
+
+    Shaped in the frequency domain over twice the length and cut, because one period of a periodic series would
+    end where it began, which drift does not.
+    """
+    length = next_fast_len(2 * n, real=True)
+    frequency = np.arange(1, length // 2 + 1) * rate / length
+    # one-sided density S(f) = 1/f; a line of the rfft has E|Z|^2 = S rate length / 2
+    size = np.sqrt(rate * length / frequency) / 2
+    spectrum = np.zeros((rows, length // 2 + 1), dtype=complex)
+    spectrum[:, 1:] = size * (rng.standard_normal((rows, len(size), 2)) @ np.array([1.0, 1j]))
+    return irfft(spectrum, n=length)[:, :n]
+
+
+def slow_drift(rng: np.random.Generator, rows: int, time: FloatArray) -> FloatArray:
+    """Slow monotone drift (rows, n), zero in the mean, with a standard deviation of 1 from start to end."""
+    share = np.linspace(-0.5, 0.5, len(time))
+    size = rng.standard_normal((rows, 1))
+    bend = rng.uniform(-1.0, 1.0, (rows, 1))
+    return size * (share + bend * (share**2 - np.mean(share**2)))
+
+
+def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: str) -> FloatArray:
+    """Mains pick-up (n_sensors, n) of amplitude about 1.
+
+    How the channels pick it up belongs to the cabling, the same in the whole campaign; the phase of the mains
+    at the start of a record is chance.
+    """
+    rng = stream(seed, run, "mains")
+    frequency = noise.mains_frequency + noise.mains_scatter * rng.standard_normal()
+    start = rng.uniform(0, 2 * np.pi)
+    out = np.zeros((len(names), len(time)))
+    for row, name in enumerate(names):
+        cabling = stream(seed, name, "mains")
+        strength = cabling.uniform(0.9, 1.1)
+        for order, share in enumerate((1.0, *noise.mains_harmonics), 1):
+            phase = order * start + cabling.uniform(0, 2 * np.pi)
+            out[row] += strength * share * np.cos(2 * np.pi * order * frequency * time + phase)
+    return out
+
+
+def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
+    """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
+    sensors = list(instruments.sensors)
+    for fault in faults:
+        for i, sensor in enumerate(sensors):
+            if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
+                sensors[i] = _faulty_sensor(sensor, fault.kind, fault.value)
+    return replace(instruments, sensors=tuple(sensors))
+
+
+def _faulty_sensor(sensor: Sensor, kind: str, value: float) -> Sensor:
+    names = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
+    error = getattr(sensor.error, names[kind])
+    return sensor.with_error(**{names[kind]: error * value if kind == "scaled" else error + value})
+
+
+def spoil_record(
+    readings: Readings,
+    instruments: Instruments,
+    faults: Iterable[Fault],
+    rng: np.random.Generator,
+) -> Readings:
+    """Readings with the record faults of their run; the given ones stay as they are."""
+    columns = dict(readings.columns)
+    time = readings.time
+    for fault in faults:
+        if fault.place != "record":
+            continue
+        if fault.kind == "time_gap":
+            recorded = ~_window(fault, time)
+            time, columns = time[recorded], {name: v[recorded] for name, v in columns.items()}
+        elif fault.kind == "time_jitter":
+            spread = 0.2 if fault.value is None else fault.value
+            time = time + np.clip(spread * rng.standard_normal(len(time)), -0.45, 0.45) / readings.rate
+        elif fault.kind == "swapped" and fault.channel is not None and fault.other is not None:
+            columns[fault.channel], columns[fault.other] = columns[fault.other], columns[fault.channel]
+        else:
+            for name in columns:
+                if fault.is_in(name):
+                    columns[name] = _spoilt(columns[name], fault, instruments.named(name), time)
+    return Readings(time, columns, readings.rate)
+
+
+def _window(fault: Fault, time: FloatArray) -> np.ndarray:
+    return (time >= fault.start) & (time < fault.start + fault.length)
+
+
+def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
+    """Readings (n,) of one channel with a fault of its record."""
+    inside = _window(fault, time)
+    if fault.kind == "dead":
+        return np.full_like(v, fault.value or 0.0)
+    if fault.kind == "stuck":
+        return np.where(inside, v[np.argmax(inside)], v)
+    if fault.kind == "clipped":
+        low, high = float(v.min()), float(v.max())
+        middle = 0.5 * (low + high)
+        reach = 0.5 * (high - low) * (0.6 if fault.value is None else fault.value)
+        return np.clip(v, middle - reach, middle + reach)
+    if fault.kind == "inverted":
+        # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
+        return 2 * sensor.zero - v
+    if fault.kind == "nan_gap":
+        return np.where(inside, np.nan, v)
+    return v + sensor.polarity * sensor.scale * (fault.value or 0.0) * inside  # a glitch
 
 
 @dataclass(frozen=True)

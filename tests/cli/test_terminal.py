@@ -85,7 +85,7 @@ def test_notes_of_one_sort_are_counted():
 
 
 def test_a_verdict_leads_to_a_command():
-    from tpjb_ident.report.diagnosis_words import next_command
+    from tpjb_ident.report.diagnosis_page import next_command
 
     named = SimpleNamespace(effects=("x",), verdict="named")
     consistent = SimpleNamespace(effects=(), verdict="consistent")

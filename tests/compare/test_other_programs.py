@@ -21,8 +21,7 @@ from tpjb_ident.compare.comparison import (
     locus_distance,
     locus_frame,
 )
-from tpjb_ident.compare.from_table import compare_table
-from tpjb_ident.compare.other_programs import read_predictions, with_predictions
+from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
@@ -201,7 +200,7 @@ def test_a_table_stands_beside_a_campaign_with_a_locus(tmp_path):
 
 def test_every_table_has_a_line_and_marker_of_its_own(tmp_path, measured):
     pytest.importorskip("matplotlib")
-    from tpjb_ident.report.plots.coefficient import coefficient
+    from tpjb_ident.report.plots.coefficients import coefficient
 
     text = "static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m\n2500,22,25,1e8\n5000,22,25,2e8\n"
     figure = coefficient(compared(measured, *(written(tmp_path, text, f"{n}.csv") for n in "abcde")), "kyy")

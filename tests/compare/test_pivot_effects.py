@@ -13,7 +13,7 @@ from rigdata.campaign import load_campaign
 from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig, written
 from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
-from tpjb_ident.compare.measured_pivots import (
+from tpjb_ident.compare.predictions import (
     beside_measured,
     counted_twice,
     counts_from_measured,

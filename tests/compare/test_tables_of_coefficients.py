@@ -11,8 +11,8 @@ import pytest
 from model.bearing_file import load_bearing
 from tests.command_line import tpjb
 from tpjb_ident.compare.comparison import CompareSettings, comparison_frame
-from tpjb_ident.compare.from_table import compare_table
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.tables import compare_table
 from tpjb_ident.diagnosis.observations.observe import observe_table
 
 HEAD = "static_load_N,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m,cyy_Ns_per_m_se"

@@ -297,8 +297,8 @@ def record_target(folder: Path) -> Target:
     from tpjb_ident.cli.commands.rerun import _typed
     from tpjb_ident.cli.commands.verify import files_of, recorded
     from tpjb_ident.errors import BadInputError, NotTrustedError
-    from tpjb_ident.runtime.documents import read_document
     from tpjb_ident.runtime.output_folder import contradiction
+    from tpjb_ident.runtime.provenance import read_document
 
     older = Path(__file__).resolve().parents[1] / "runtime" / "older"
     (folder / "clearance.csv").write_bytes((older / "clearance.csv").read_bytes())

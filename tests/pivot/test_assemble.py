@@ -15,7 +15,7 @@ from rigdata.record import VectorRecord
 from tpjb_ident.conditions import sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refuse_flat_channels
-from tpjb_ident.pivot.blocks import Blocks, PivotSettings, pad_axes
+from tpjb_ident.pivot.blocks import Blocks, Hold, PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
     PadDirection,
@@ -24,12 +24,12 @@ from tpjb_ident.pivot.dry_record import (
     load_direction,
     read_dry_run,
 )
-from tpjb_ident.pivot.fit import assemble_curve
-from tpjb_ident.pivot.fit_data import (
+from tpjb_ident.pivot.fit import (
     GROUPS_ON_RAMP,
     MODEL_ERROR,
     REFERENCE_SHARE,
     UNKNOWN_ZERO,
+    assemble_curve,
     bad_blocks,
     fit_data,
     sticking,
@@ -37,7 +37,6 @@ from tpjb_ident.pivot.fit_data import (
 from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_behind
-from tpjb_ident.pivot.steps import Hold
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LEVELS = np.arange(500.0, 5001.0, 500.0)

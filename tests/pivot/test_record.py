@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.phasors.slow_samples import good_samples
-from tpjb_ident.pivot.blocks import MOST_BLOCKS, Samples, cut_blocks
-from tpjb_ident.pivot.steps import Hold, find_holds
+from tpjb_ident.pivot.blocks import MOST_BLOCKS, Hold, Samples, cut_blocks, find_holds
 
 RATE = 500.0
 

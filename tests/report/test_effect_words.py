@@ -10,8 +10,14 @@ import pytest
 from model.effects import kind_of, known_effects
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, words_of
 from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, RankedCandidate, Remainder, Verdict
-from tpjb_ident.report.diagnosis_page import _evidence_sections, _other_explanations, _row
-from tpjb_ident.report.diagnosis_words import in_words, place, verdict_sentences
+from tpjb_ident.report.diagnosis_page import (
+    _evidence_sections,
+    _other_explanations,
+    _row,
+    in_words,
+    place,
+    verdict_sentences,
+)
 from tpjb_ident.rounding import signed
 
 

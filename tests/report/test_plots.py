@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -28,8 +30,8 @@ from tests.report.plot_cases import (
     polygon,
 )
 from tpjb_ident.report import plots
-from tpjb_ident.report.drawing.colours import LIGHT
-from tpjb_ident.report.drawing.residual_frame import residual_frame
+from tpjb_ident.report.drawing.picture import LIGHT
+from tpjb_ident.report.plots.residuals import residual_frame
 
 #: Root mean square difference of grey levels, out of 255, that another freetype or anti-aliasing may make.
 TOLERANCE = 5.0
@@ -180,12 +182,18 @@ def test_a_figure_shows_itself_in_a_notebook():
     assert dict(matplotlib.rcParams) == before
 
 
-def test_a_plot_is_a_function_by_the_name_of_its_file():
+def test_every_function_that_gives_a_figure_is_handed_on_by_its_name():
     assert ti.plots is plots
     files = {path.stem for path in Path(plots.__file__).parent.glob("*.py")} - {"__init__"}
-    assert files == set(plots.__all__)
-    for name in files:
-        assert (getattr(plots, name).__module__, getattr(plots, name).__name__) == (f"{plots.__name__}.{name}", name)
+    drawing = set()
+    for file in files:
+        module = importlib.import_module(f"{plots.__name__}.{file}")
+        for name, value in vars(module).items():
+            is_plot = inspect.isfunction(value) and value.__annotations__.get("return") == "Figure"
+            if is_plot and value.__module__ == module.__name__ and not name.startswith("_"):
+                drawing.add(name)
+                assert (getattr(plots, name), value.__name__) == (value, name)
+    assert drawing == set(plots.__all__)
 
 
 def test_differences_reach_the_closest_prediction_that_has_the_coefficient():

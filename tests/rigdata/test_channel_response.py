@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rigdata.channel_response import ChannelResponse, parse_filter, parse_response_table
+from rigdata.calibration import ChannelResponse, parse_filter, parse_response_table
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.run import speed_from_pulses

@@ -22,7 +22,7 @@ from rigdata.virtual_rig import (
     locus_points,
     operating_points,
 )
-from rigdata.virtual_rig.sensing import channel_noise, converter_step, draw_glitches, flicker, slow_drift
+from rigdata.virtual_rig.rig import channel_noise, converter_step, draw_glitches, flicker, slow_drift
 from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 

@@ -13,8 +13,7 @@ import pytest
 
 from tests.runtime.test_executors import dies_once
 from tpjb_ident.runtime import executors
-from tpjb_ident.runtime.executors import LostJobsError, local_workers, map_ordered
-from tpjb_ident.runtime.workers import ClusterError, dask_workers
+from tpjb_ident.runtime.executors import ClusterError, LostJobsError, dask_workers, local_workers, map_ordered
 
 ROOT = Path(__file__).resolve().parents[2]
 

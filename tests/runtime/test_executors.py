@@ -23,9 +23,9 @@ from tpjb_ident.runtime.executors import (
     background_job,
     local_workers,
     map_ordered,
+    open_workers,
 )
 from tpjb_ident.runtime.threads import _loaded, limit_threads, one_thread_each
-from tpjb_ident.runtime.workers import open_workers
 
 
 def doubled(x):

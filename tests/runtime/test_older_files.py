@@ -15,8 +15,8 @@ from model.effects import load_effects
 from model.pivots import load_pivots
 from rigdata.manifest.manifest import parse_manifest
 from tests.command_line import tpjb
-from tpjb_ident.runtime.documents import read_document, schema
 from tpjb_ident.runtime.output_folder import contradiction, former_runs
+from tpjb_ident.runtime.provenance import read_document, schema
 from tpjb_ident.runtime.table_reader import read_table
 
 OLDER = Path(__file__).with_name("older")

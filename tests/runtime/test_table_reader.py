@@ -12,9 +12,8 @@ from tests.command_line import tpjb
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.exports.formats import ExportError
 from tpjb_ident.exports.write import export
-from tpjb_ident.runtime.documents import read_document, schema
 from tpjb_ident.runtime.output_folder import contradiction, record_text
-from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.provenance import read_document, schema, sha256
 from tpjb_ident.runtime.table_reader import column_of, read_table
 from tpjb_ident.runtime.tables import write_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS

@@ -11,12 +11,11 @@ import fnmatch
 import functools
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 from tests.structure.sources import ROOT, trees
 
 HANDED_ON = ("tpjb_ident/__init__.py", "model/__init__.py", "rigdata/__init__.py", "docs/api.md")
-#: File and name of what a user's own piece implements or is handed; "=" is the name of the file.
+#: File and name of what a user's own piece implements or is handed.
 EXTENSION_POINTS = {
     "an effect": ("model/effects/kind.py:EffectKind", "model/setup.py:Setup"),
     "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
@@ -26,7 +25,7 @@ EXTENSION_POINTS = {
     "a term": ("tpjb_ident/estimate/term.py:Term",),
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "Chosen", "Export")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
-    "a plot": ("tpjb_ident/report/plots/*.py:=",),
+    "a plot": ("tpjb_ident/report/plots/*.py:[!_]*",),
     "what a face returns": (
         "model/bearing.py:Pad",
         "model/bearing.py:Oil",
@@ -63,8 +62,7 @@ def is_face(path: str, name: str) -> bool:
         return True
     for points in EXTENSION_POINTS.values():
         for place, pattern in (point.split(":") for point in points):
-            wanted = Path(path).stem if pattern == "=" else pattern
-            if fnmatch.fnmatch(path, place) and fnmatch.fnmatch(name, wanted):
+            if fnmatch.fnmatch(path, place) and fnmatch.fnmatch(name, pattern):
                 return True
     return False
 
@@ -112,10 +110,5 @@ def test_every_name_is_somewhere():
     for piece, points in EXTENSION_POINTS.items():
         for point in points:
             place, pattern = point.split(":")
-            hits = [
-                name
-                for path, name in names
-                if fnmatch.fnmatch(path, place)
-                and fnmatch.fnmatch(name, Path(path).stem if pattern == "=" else pattern)
-            ]
+            hits = [name for path, name in names if fnmatch.fnmatch(path, place) and fnmatch.fnmatch(name, pattern)]
             assert hits, f"{piece}: {point}"

@@ -45,7 +45,7 @@ MAY_IMPORT = {
 }  # fmt: skip
 #: What a result may import inside the methods that show it: its picture, its table, its sentences.
 SHOWS = ("plot", "to_dataframe", "to_frame", "summary")
-SHOWN_BY = ("tpjb_ident/report/plots/", "tpjb_ident/report/diagnosis_words.py",
+SHOWN_BY = ("tpjb_ident/report/plots/", "tpjb_ident/report/diagnosis_page.py",
             "tpjb_ident/compare/summary.py", "tpjb_ident/pivot/tables.py")  # fmt: skip
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -19,8 +19,7 @@ from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.watch.landing import NewFiles
-from tpjb_ident.watch.measured import Measuring
-from tpjb_ident.watch.watcher import Watcher
+from tpjb_ident.watch.watcher import Measuring, Watcher
 
 pytestmark = pytest.mark.slow
 DYNAMIC = [f"d-05000-25-0{i}" for i in (1, 2, 3)]

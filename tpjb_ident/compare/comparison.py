@@ -15,11 +15,13 @@ from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import TableRow, TableSource
-from tpjb_ident.compare.measured_pivots import beside_measured, counted_twice, measured_laws
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     PointPrediction,
     Progress,
+    beside_measured,
+    counted_twice,
+    measured_laws,
     point_columns,
     predict_points,
 )

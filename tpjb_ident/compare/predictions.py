@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +14,62 @@ from model.bearing import Bearing
 from model.effects import Effect
 from model.mirror import as_it_turns
 from model.options import Options
-from model.pivots import pivot_laws
+from model.pivots import PivotLaw, measured_pivots, pivot_laws
 from model.predict import predict
 from model.prediction import Prediction
+from model.toml_text import parse_toml
 from rigdata.operating_point import OperatingPoint
+from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from tpjb_ident.pivot import PivotCurve
+
+
+def measured_laws(curves: Sequence[PivotCurve], n_pads: int, source: str = "") -> tuple[PivotLaw, ...]:
+    """Turn measured curves into pivot laws, pad #1 first."""
+    from tpjb_ident.pivot.tables import pad_table
+
+    if not curves:
+        raise ValueError("curves must hold at least one PivotCurve")
+    return measured_pivots([pad_table(curve) for curve in curves], source or "the dry tests", n_pads)
+
+
+#: Effects that say how far pivots give way under load: a dry test measures just that.
+_PIVOT_EFFECTS = frozenset({"pivot_flexibility", "soft_pivot"})
+#: Key of an effects file whose pivot effects are sizes beside measured pivots, as a diagnosis that began there writes.
+_COUNTED_FROM = "counted_from"
+_MEASURED = "measured pivots"
+
+
+def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Names of the effects that measured pivots hold already."""
+    return tuple(dict.fromkeys(e.name for e in effects if e.name in _PIVOT_EFFECTS))
+
+
+def beside_measured(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects without those that measured pivots hold already."""
+    return tuple(e for e in effects if e.name not in _PIVOT_EFFECTS)
+
+
+def counts_from_measured(path: Path | None) -> bool:
+    """Whether an effects file says that its sizes are meant beside measured pivots."""
+    if path is None:
+        return False
+    return bool(parse_toml(path.read_text(encoding="utf-8-sig")).get(_COUNTED_FROM) == _MEASURED)
+
+
+def refuse_counted_twice(pivots: Any, effects: Sequence[Effect], path: Path | None) -> None:
+    """Refuse measured pivots together with effects that count from the printed formula."""
+    twice = counted_twice(effects)
+    if not (isinstance(pivots, Path) or pivots == "measured") or not twice or counts_from_measured(path):
+        return
+    raise BadInputError(
+        f"--effects {path.name if path else ''}: {', '.join(twice)} would count twice: measured pivots give way as far "
+        "as they do already. Use --pivots kirk with these effects, or take them out of the file with measured pivots."
+    )
 
 
 #: Called with what is being done, how many are done, of how many.

@@ -15,7 +15,7 @@ from model.pivots import NAMED_LAWS, pivot_laws
 from model.setup import Setup
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from tpjb_ident.compare.comparison import ComparisonError
-from tpjb_ident.compare.measured_pivots import measured_laws
+from tpjb_ident.compare.predictions import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose, median_deviations
@@ -75,7 +75,7 @@ class CampaignDiagnosis(Presented):
 
     def summary(self) -> str:
         """What was found, and what it rests on."""
-        from tpjb_ident.report.diagnosis_words import verdict_sentences
+        from tpjb_ident.report.diagnosis_page import verdict_sentences
 
         name = self.identification.campaign if self.identification is not None else "table"
         off = median_deviations(self.to_dataframe())

@@ -18,7 +18,7 @@ from tpjb_ident.exports.formats import (
     chosen_rows,
     turning_counter_clockwise,
 )
-from tpjb_ident.exports.ross_bearing import write_ross_bearing
+from tpjb_ident.exports.rotor_programs import write_ross_bearing
 from tpjb_ident.runtime.output_folder import contradiction
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import STATIC_KEY

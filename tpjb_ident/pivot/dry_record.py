@@ -24,8 +24,7 @@ from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
 from tpjb_ident.phasors.slow_samples import slow_samples
-from tpjb_ident.pivot.blocks import Blocks, PivotSettings, Samples, cut_blocks, pad_axes
-from tpjb_ident.pivot.steps import Hold, find_holds
+from tpjb_ident.pivot.blocks import Blocks, Hold, PivotSettings, Samples, cut_blocks, find_holds, pad_axes
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel

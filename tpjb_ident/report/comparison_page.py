@@ -15,7 +15,7 @@ from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
-from tpjb_ident.report.drawing.colours import VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (

@@ -15,8 +15,7 @@ from tpjb_ident.columns import per, place_of, size, spinning, symbol
 from tpjb_ident.compare.difference import Difference, difference_sentences, shown
 from tpjb_ident.condition_kinds import KINDS
 from tpjb_ident.conditions import Condition
-from tpjb_ident.report.drawing.colours import INK, LIGHT
-from tpjb_ident.report.drawing.picture import add_legend, label, new_pictures
+from tpjb_ident.report.drawing.picture import INK, LIGHT, add_legend, label, new_pictures
 from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with_errors
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, set_points

@@ -24,7 +24,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from PIL import Image
 
-from tpjb_ident.report.drawing.colours import LIGHT
+from tpjb_ident.report.drawing.picture import LIGHT
 from tpjb_ident.rounding import significant
 from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text

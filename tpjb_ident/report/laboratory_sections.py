@@ -16,11 +16,9 @@ from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
-from tpjb_ident.report.plots.coherence import coherence
-from tpjb_ident.report.plots.coherence_spectrum import coherence_spectrum
-from tpjb_ident.report.plots.frf import frf
-from tpjb_ident.report.plots.orbit import orbit
-from tpjb_ident.report.plots.spectra import spectra
+from tpjb_ident.report.plots.coefficients import frf
+from tpjb_ident.report.plots.records import coherence_spectrum, orbit, spectra
+from tpjb_ident.report.plots.windows import coherence
 from tpjb_ident.rounding import counted, fixed
 from tpjb_ident.schema import DAMPING, STIFFNESS
 

@@ -12,16 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.report.drawing.colours import BLUE, INK, RULE
-from tpjb_ident.report.drawing.picture import FONT_SIZE
+from tpjb_ident.report.drawing.picture import BLUE, FONT_SIZE, INK, RULE
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series
 from tpjb_ident.report.figure import Panel, panel, save_panels
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
-from tpjb_ident.report.plots.coefficient import coefficient
-from tpjb_ident.report.plots.isolability import isolability
-from tpjb_ident.report.plots.load_deflection import load_deflection
-from tpjb_ident.report.plots.pad_projection import pad_projection
-from tpjb_ident.report.plots.pivot_stiffness import Formula, pivot_stiffness
+from tpjb_ident.report.plots.coefficients import coefficient
+from tpjb_ident.report.plots.pivots import Formula, load_deflection, pad_projection, pivot_stiffness
+from tpjb_ident.report.plots.residuals import isolability
 from tpjb_ident.runtime.tables import printable
 from tpjb_ident.schema import KINDS
 

@@ -14,7 +14,7 @@ from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Page, Section, Table, panels_of, render_page
-from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
+from tpjb_ident.report.plots.coefficients import direct_coefficients
 from tpjb_ident.rounding import significant, with_interval
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.runtime.documents import read_document, schema
-from tpjb_ident.runtime.provenance import sha256
+from tpjb_ident.runtime.provenance import read_document, schema, sha256
 from tpjb_ident.runtime.tables import write_text
 
 #: Full: the disk, the user's share of it, or the largest file that the system allows.

@@ -1,4 +1,4 @@
-"""Where a result comes from: versions of everything that computed it, fingerprints of what it was computed from."""
+"""Where a result comes from: versions and fingerprints, and the JSON files that we wrote and read back."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import functools
 import hashlib
 import json
 import platform
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from tpjb_ident.errors import BadInputError
 
 _PACKAGES = ("tpjb-ident", "numpy", "scipy", "pandas", "statsmodels", "h5py", "numba", "matplotlib")
 
@@ -45,3 +49,52 @@ def source_stamp(packages: tuple[str, ...] = ("rigdata", "tpjb_ident")) -> str:
             for source in sorted(Path(folder).rglob("*.py")):
                 digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()
+
+
+Document = dict[str, Any]
+#: Larger documents are refused before they are read [bytes].
+_LARGEST = 2**26
+
+
+def _run_from_1(document: Document) -> Document:
+    """Version 1 did not tell the options as they were typed from the settings that they became."""
+    commands = document.get("commands")
+    for entry in commands.values() if isinstance(commands, dict) else ():
+        settings = entry.get("settings") if isinstance(entry, dict) else None
+        if isinstance(settings, dict) and isinstance(places := entry.get("inputs_at"), dict):
+            # a file without a place of its own is one that the campaign carries: nobody typed it
+            typed = {k: v for k, v in settings.items() if k in places or not str(v).endswith(".toml")}
+            entry.setdefault("options", typed)
+    return document
+
+
+#: Kind of document: one step per version before today's, so that today's version is their number plus one.
+_STEPS: dict[str, tuple[Callable[[Document], Document], ...]] = {"tpjb-run": (_run_from_1,), "tpjb-check": ()}
+#: Version of all tables: stated in run.json and in the metadata of Parquet files.
+TABLE_SCHEMA = "tpjb-tables/1"
+
+
+def schema(kind: str) -> str:
+    """Today's schema of a kind of document."""
+    return f"{kind}/{len(_STEPS[kind]) + 1}"
+
+
+def read_document(path: Path, kind: str) -> Document:
+    """Content of a JSON file as of today's version; refused where it is none, or of a newer one."""
+    remedy = f"Give the folder as tpjb wrote it, or run the command again; {schema(kind)} is read"
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise BadInputError(f"{path}: is larger than {_LARGEST >> 20} MB. {remedy}.")
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read ({error.strerror}). {remedy}.") from error
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"{path}: is no JSON ({type(error).__name__}). {remedy}.") from error
+    stated = document.get("schema") if isinstance(document, dict) else None
+    steps = _STEPS[kind]
+    versions = [f"{kind}/{number}" for number in range(1, len(steps) + 2)]
+    if stated not in versions:
+        raise BadInputError(f"{path}: its schema is {str(stated)[:40]!r}. {remedy} and what is older.")
+    for step in steps[versions.index(stated) :]:
+        document = step(document)
+    return dict(document)

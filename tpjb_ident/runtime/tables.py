@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.runtime.documents import TABLE_SCHEMA
+from tpjb_ident.runtime.provenance import TABLE_SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd

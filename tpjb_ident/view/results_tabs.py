@@ -14,15 +14,14 @@ from tpjb_ident.columns import amount, per, size, symbol
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import measured_table
-from tpjb_ident.report.drawing.colours import VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Section, Table, render_section
-from tpjb_ident.report.plots.coefficient import coefficient
-from tpjb_ident.report.plots.direct_coefficients import direct_coefficients
-from tpjb_ident.report.plots.residual_map import residual_map
-from tpjb_ident.report.plots.window_weights import window_weights
+from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
+from tpjb_ident.report.plots.residuals import residual_map
+from tpjb_ident.report.plots.windows import window_weights
 from tpjb_ident.rounding import counted, percent
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY, coefficient_column
 

@@ -14,8 +14,17 @@ from rigdata.calibration import OVERFLOW
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.readers.base import MAX_SAMPLES, RecordFile
 from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, time_columns
-from rigdata.readers.text.byte_stream import all_lines, is_ascii_based, open_numbers
-from rigdata.readers.text.cells import MISSING, is_missing, is_number, is_stamp, number_pattern, stamp_seconds
+from rigdata.readers.text.cells import (
+    MISSING,
+    all_lines,
+    is_ascii_based,
+    is_missing,
+    is_number,
+    is_stamp,
+    number_pattern,
+    open_numbers,
+    stamp_seconds,
+)
 from rigdata.readers.text.head import Head, find_head, plain_name, split_line
 
 #: Lines longer than this are rejected [bytes].

@@ -16,8 +16,16 @@ from dataclasses import dataclass
 from rigdata.problem import RigDataError
 from rigdata.readers.base import RecordFile
 from rigdata.readers.series import is_time
-from rigdata.readers.text.byte_stream import HEAD, head_lines, text_encoding
-from rigdata.readers.text.cells import is_date, is_missing, is_number, is_stamp, looks_like
+from rigdata.readers.text.cells import (
+    HEAD,
+    head_lines,
+    is_date,
+    is_missing,
+    is_number,
+    is_stamp,
+    looks_like,
+    text_encoding,
+)
 
 _DELIMITERS = (";", "\t", ",", "|", " ")
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")

@@ -13,8 +13,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import refuse
 from rigdata.readers.series import Series, equidistant
-from rigdata.readers.text.byte_stream import all_lines, text_encoding
-from rigdata.readers.text.cells import stamp_seconds
+from rigdata.readers.text.cells import all_lines, stamp_seconds, text_encoding
 
 _MAGIC, _END = "LabVIEW Measurement", "***End_of_Header***"
 _CHANNELS, _X, _COMMENT = "Channels", "X_Value", "Comment"

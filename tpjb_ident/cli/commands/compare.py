@@ -10,7 +10,7 @@ import typer
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.common.model_inputs import model_settings, open_source, parse_share, refuse_impossible
+from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, refuse_impossible
 from tpjb_ident.cli.common.options import (
     DEMO,
     BearingOption,
@@ -80,8 +80,8 @@ def compare(
     c.options["pivots"] = variants = _variants(pivots)
     model = model_settings(c, "kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, comparison_frame, model_side
-    from tpjb_ident.compare.measured_pivots import counts_from_measured
-    from tpjb_ident.compare.other_programs import read_predictions, with_predictions
+    from tpjb_ident.compare.predictions import counts_from_measured
+    from tpjb_ident.compare.tables import read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
@@ -117,7 +117,7 @@ def _compared_table(
     c: Command, path: Path, drawing: Bearing, settings: CompareSettings, reading_error: str | None
 ) -> Comparison:
     """Predictions held against a table of coefficients."""
-    from tpjb_ident.compare.from_table import compare_table
+    from tpjb_ident.compare.tables import compare_table
 
     share = parse_share(reading_error, "--reading-error")
     with c.progress("comparing") as show:

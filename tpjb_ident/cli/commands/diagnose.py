@@ -11,7 +11,7 @@ import typer
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.common.model_inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
+from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
 from tpjb_ident.cli.common.options import (
     DEMO,
     BearingOption,
@@ -73,7 +73,7 @@ def diagnose(
         load_library(c.file(library))
     start = pivots if pivots == "measured" else pivot_choice(c, pivots)
     model = model_settings(c, "kirk", thermal, effects)
-    from tpjb_ident.compare.measured_pivots import refuse_counted_twice
+    from tpjb_ident.compare.predictions import refuse_counted_twice
     from tpjb_ident.diagnosis.campaign import Baseline, diagnose_campaign, diagnose_table
 
     refuse_counted_twice(start, model.effects, effects)
@@ -97,8 +97,7 @@ def diagnose(
         if result.identification is not None:
             write_identification(c, result.identification)
         _write_verdict(folder, baseline, result.diagnosis.verdict)
-        from tpjb_ident.report.diagnosis_page import write_diagnosis_report
-        from tpjb_ident.report.diagnosis_words import next_command
+        from tpjb_ident.report.diagnosis_page import next_command, write_diagnosis_report
 
         typed = campaign or f"--coefficients {coefficients}"
         following = next_command(str(typed), str(bearing or ""), result.diagnosis.verdict, str(c.target))
@@ -137,7 +136,7 @@ def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
 def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: str) -> None:
     """Print the verdict, the effects with their intervals, and the gap, in the units that people read."""
     from tpjb_ident.diagnosis.diagnose import before_and_after, median_deviations
-    from tpjb_ident.report.diagnosis_words import parameter_rows, verdict_sentences
+    from tpjb_ident.report.diagnosis_page import parameter_rows, verdict_sentences
 
     verdict = result.diagnosis.verdict
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))

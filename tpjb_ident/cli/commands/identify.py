@@ -17,6 +17,7 @@ from tpjb_ident.cli.common.identification import (
     show_identification,
     write_identification,
 )
+from tpjb_ident.cli.common.inputs import parse_amount, parse_values
 from tpjb_ident.cli.common.options import (
     DEMO,
     CampaignPath,
@@ -28,7 +29,6 @@ from tpjb_ident.cli.common.options import (
     WorkerCount,
     refuse_unknown,
 )
-from tpjb_ident.cli.common.quantities import parse_amount, parse_values
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
 
@@ -85,7 +85,7 @@ def identify(
     phasors = _phasor_settings(lines, delay or ())
     settings = replace(identify_settings(c, source, method, norm), phasors=phasors, keep_weights=False)
     from tpjb_ident.identification.identify import identify as run_identification
-    from tpjb_ident.runtime.workers import open_workers
+    from tpjb_ident.runtime.executors import open_workers
 
     count, start = _worker_count(source, workers, scheduler)
     with c.results() as folder:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import operating_points, pivot_choice, rotation_choice
+from tpjb_ident.cli.common.inputs import operating_points, pivot_choice, rotation_choice
 from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Rotation, Speeds
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed

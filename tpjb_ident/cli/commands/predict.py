@@ -9,9 +9,10 @@ import typer
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import (
+from tpjb_ident.cli.common.inputs import (
     model_settings,
     operating_points,
+    parse_value,
     pivot_choice,
     refuse_impossible,
     rotation_choice,
@@ -28,7 +29,6 @@ from tpjb_ident.cli.common.options import (
     Thermal,
     refuse_unknown,
 )
-from tpjb_ident.cli.common.quantities import parse_value
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -108,7 +108,7 @@ def predict(
     pivot_model = pivot_choice(c, pivots)
     settings = model_settings(c, pivot_model, thermal, effects)
     settings = replace(settings, options=parse_physics(physics, housing_temperature))
-    from tpjb_ident.compare.measured_pivots import refuse_counted_twice
+    from tpjb_ident.compare.predictions import refuse_counted_twice
 
     refuse_counted_twice(pivot_model, settings.effects, effects)
     drawing = c.bearing(bearing)

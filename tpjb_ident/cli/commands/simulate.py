@@ -9,7 +9,7 @@ import typer
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.model_inputs import (
+from tpjb_ident.cli.common.inputs import (
     model_settings,
     operating_points,
     pivot_choice,

@@ -89,7 +89,7 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
 
 def _tables(c: Command, folder: Path) -> dict[str, Any]:
     """Tables of a results folder, and the problems that `check` found."""
-    from tpjb_ident.runtime.documents import read_document
+    from tpjb_ident.runtime.provenance import read_document
     from tpjb_ident.runtime.table_reader import read_table
 
     tables: dict[str, Any] = {}
@@ -119,7 +119,7 @@ def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str
     pads = set(range(1, len(bearing.pads) + 1))
     if {run.pad for run in campaign.of_kind("dry_pivot")} < pads:
         return {}
-    from tpjb_ident.compare.measured_pivots import measured_laws
+    from tpjb_ident.compare.predictions import measured_laws
     from tpjb_ident.pivot import fit_pivots
 
     try:

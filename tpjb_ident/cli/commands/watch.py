@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.common.inputs import parse_amount
 from tpjb_ident.cli.common.interrupts import heard
 from tpjb_ident.cli.common.options import BearingOption
-from tpjb_ident.cli.common.quantities import parse_amount
 from tpjb_ident.columns import Column, place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -108,8 +108,7 @@ def _open_watcher(
     from tpjb_ident.dynamic.runs.run_store import RunStore
     from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.watch.landing import NewFiles
-    from tpjb_ident.watch.measured import Measuring
-    from tpjb_ident.watch.watcher import Watcher
+    from tpjb_ident.watch.watcher import Measuring, Watcher
 
     campaign = c.open(folder)
     angles: tuple[float, ...] = ()

@@ -30,9 +30,8 @@ from tpjb_ident.cli.common.interrupts import heard, interrupt_behind
 from tpjb_ident.cli.common.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
-from tpjb_ident.runtime.documents import TABLE_SCHEMA
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
-from tpjb_ident.runtime.provenance import sha256, versions
+from tpjb_ident.runtime.provenance import TABLE_SCHEMA, sha256, versions
 from tpjb_ident.runtime.tables import write_csv, write_table, write_text
 
 if TYPE_CHECKING:

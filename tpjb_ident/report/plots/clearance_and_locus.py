@@ -13,8 +13,16 @@ from matplotlib.patches import Ellipse
 from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import per, symbol
-from tpjb_ident.report.drawing.colours import GREY, INK, LIGHT, VARIANT_LABEL, VARIANT_STYLE
-from tpjb_ident.report.drawing.picture import FONT_SIZE, add_legend, new_picture
+from tpjb_ident.report.drawing.picture import (
+    FONT_SIZE,
+    GREY,
+    INK,
+    LIGHT,
+    VARIANT_LABEL,
+    VARIANT_STYLE,
+    add_legend,
+    new_picture,
+)
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus

@@ -1,0 +1,232 @@
+"""Pictures of dry pivot tests: steps and laws, their projection on the pads, stiffness (the paper's Fig. 10 to 12)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.columns import per, symbol
+from tpjb_ident.report.drawing.picture import (
+    FONT_SIZE,
+    GREY,
+    INK,
+    PAPER,
+    add_legend,
+    from_zero,
+    label,
+    mark_extrapolated,
+    new_picture,
+    new_pictures,
+    style_of_pad,
+)
+
+if TYPE_CHECKING:
+    from tpjb_ident.pivot import PivotCurve
+
+_LAW_POINTS = 200
+
+
+def load_deflection(
+    curves: PivotCurve | Sequence[PivotCurve],
+    *,
+    up_to: float | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw the settled steps of dry tests and the laws fitted to them (the paper's Fig. 11).
+
+    Steps that were left out are crossed; unloading steps are hollow. The law is drawn solid where it was measured with
+    full contact and dotted elsewhere (extrapolated); where the shaft comes down on the pad first, a thin line shows
+    what the readings do meanwhile.
+
+    Parameters
+    ----------
+    curves : PivotCurve or sequence of PivotCurve
+        One or several pads.
+    up_to : float, optional
+        Largest load [N]; default: the largest measured one.
+    title : str, optional
+    """
+    chosen = list(curves) if isinstance(curves, Sequence) else [curves]
+    if not chosen:
+        raise ValueError("curves must hold at least one PivotCurve")
+    figure, axes = new_picture(
+        f"radial deflection, {symbol('length')}", f"load on the pad, {symbol('load')}", title=title
+    )
+    for curve in chosen:
+        _draw_law(axes, curve, up_to or curve.valid_to)
+        _draw_steps(axes, curve)
+    axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+    from_zero(axes)
+    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    add_legend(axes, handles=[named[name] for name in sorted(named)])  # pad by pad, what was left out last
+    return figure
+
+
+def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
+    colour, _, marker = style_of_pad(curve.pad)
+    steps = curve.steps
+    deflection, load = per("length") * steps.deflection, per("load") * steps.load
+    for mask, face, name in (
+        ((steps.weight > 0) & (steps.branch > 0), colour, f"pad #{curve.pad}, {curve.law.name}"),
+        ((steps.weight > 0) & (steps.branch < 0), PAPER, f"pad #{curve.pad}, unloading"),
+    ):
+        if mask.any():
+            axes.errorbar(
+                deflection[mask], load[mask], xerr=1.96 * per("length") * steps.deflection_se[mask],
+                fmt=marker, color=colour, markerfacecolor=face, markersize=4.5, linewidth=0.9, capsize=0, label=name,
+                zorder=4,
+            )  # fmt: skip
+    bad = steps.weight == 0
+    if bad.any():
+        axes.plot(deflection[bad], load[bad], linestyle="none", marker="x", markersize=6,
+                  color=INK, label="step left out", zorder=5)  # fmt: skip
+
+
+def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
+    """The law, its band, and the way into contact."""
+    colour, _, _ = style_of_pad(curve.pad)
+    load = np.linspace(0.0, top, _LAW_POINTS)[1:]
+    reading, low, high = (per("length") * part for part in curve.reading_band(load))
+    measured = ~curve.is_extrapolated(load)
+    axes.fill_betweenx(load * per("load"), low, high, color=colour, alpha=0.25, linewidth=0)
+    deflection = per("length") * curve.deflection(load)
+    axes.plot(deflection, load * per("load"), color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
+    axes.plot(np.where(measured, deflection, np.nan), load * per("load"), color=colour, linewidth=1.5)
+    if curve.law.contact:
+        coming = load <= max(curve.onset_load, load[0])
+        axes.plot(reading[coming], load[coming] * per("load"), color=colour, linewidth=0.7)
+
+
+def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) -> Figure:
+    """Draw measured load and displacement vectors of every pad's test beside their projection (the paper's Fig. 10).
+
+    Hollow markers are what was measured, filled ones its projection on the pad's direction (dashed). Displacements
+    count from where each pad's curve has its zero. The angles between load or displacement and the pad stand at the
+    ends of the dashed lines, with their standard errors.
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+        As `fit_pivots` gives them.
+    title : str, optional
+
+    Returns
+    -------
+    Figure
+        Left the loads [kN], right the displacements [µm].
+    """
+    if not curves:
+        raise ValueError("curves must hold at least one PivotCurve")
+    figure, ((forces, places),) = new_pictures(1, 2, title=title, width=4.4, height=4.8)
+    for curve in curves:
+        steps = curve.steps
+        used = steps.weight > 0
+        load, across_load = steps.load[used] * per("load"), steps.across_load[used] * per("load")
+        move, across = per("length") * steps.deflection[used], per("length") * steps.across_deflection[used]
+        _draw_vectors(forces, curve, load, across_load, curve.load_direction.angle)
+        _draw_vectors(places, curve, move, across, curve.displacement_direction.angle)
+    label(forces, f"horizontal load, {symbol('load')}", f"vertical load, {symbol('load')}", "static load")
+    label(places, f"x, {symbol('length')}", f"y, {symbol('length')}", "displacement, shaft against housing")
+    for axes in (forces, places):
+        reach = 1.45 * max(float(np.max(np.abs(line.get_xydata()))) for line in axes.get_lines()) / 1.12
+        axes.set_xlim(-reach, reach)
+        axes.set_ylim(-reach, reach)
+        axes.set_aspect("equal", adjustable="box")
+    handles = [
+        Line2D([], [], marker="o", linestyle="none", color=INK, markerfacecolor="none", label="measured"),
+        Line2D([], [], marker="o", linestyle="none", color=INK, label="on the pad's direction"),
+    ]
+    for axes in (forces, places):
+        add_legend(axes, 2, handles)
+    return figure
+
+
+def _draw_vectors(axes: Axes, curve: PivotCurve, along: FloatArray, across: FloatArray, off: float) -> None:
+    """One pad's points, measured and projected, and its direction."""
+    colour, _, marker = style_of_pad(curve.pad)
+    axis = np.array([math.cos(curve.angle), math.sin(curve.angle)])
+    side = np.array([-axis[1], axis[0]])
+    projected = np.outer(along, axis)
+    measured = projected + np.outer(across, side)
+    end = 1.12 * float(np.max(along)) * axis
+    axes.plot([0.0, end[0]], [0.0, end[1]], color=GREY, linestyle=(0, (5, 3)), linewidth=0.9, zorder=1)
+    axes.plot(*measured.T, linestyle="none", marker=marker, markersize=5.5, markerfacecolor="none",
+              markeredgewidth=1.0, color=colour)  # fmt: skip
+    axes.plot(*projected.T, linestyle="none", marker=marker, markersize=3.0, color=colour)
+    text = f"#{curve.pad}\n{math.degrees(off):+.1f}°"
+    axes.annotate(
+        text, (end[0], end[1]), xytext=(12.0 * axis[0], 12.0 * axis[1]), textcoords="offset points", ha="center",
+        va="center", fontsize=FONT_SIZE - 1, color=INK,
+    )  # fmt: skip
+
+
+Formula = Callable[[int, float], tuple[float, float]]
+
+_STIFFNESS_POINTS = 120
+
+_LOWEST = 0.04  # of the largest load: Hertz's stiffness has no value at zero
+
+
+def pivot_stiffness(
+    curves: Sequence[PivotCurve],
+    formula: Formula | None = None,
+    *,
+    loads: ArrayLike | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw the stiffness of every pad's pivot over its load (the paper's Fig. 12).
+
+    Thick where it was measured with the shaft fully in contact; thin and dotted where it is extrapolated, below the
+    contact onset as well as beyond the largest load (shaded).
+
+    Parameters
+    ----------
+    curves : sequence of PivotCurve
+    formula : callable, optional
+        ``formula(pad, load)`` gives the printed formula's (secant, tangent) stiffness [N/m], as
+        `tpjb_ident.compare.predictions.printed_formula` makes it; drawn for the first curve's pad. What the
+        paper prints is the secant.
+    loads : (n,) array_like, optional
+        Pad loads [N]; default: up to the largest measured one.
+    title : str, optional
+    """
+    if not curves:
+        raise ValueError("curves must hold at least one PivotCurve")
+    top = max(curve.valid_to for curve in curves)
+    grid = np.linspace(_LOWEST * top, top, _STIFFNESS_POINTS) if loads is None else np.asarray(loads, dtype=float)
+    figure, axes = new_picture(
+        f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}", title=title
+    )
+    for curve in curves:
+        _draw_stiffness(axes, curve, grid)
+    if formula is not None:
+        printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
+        axes.plot(grid * per("load"), printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
+        axes.plot(grid * per("load"), printed[:, 0], color=INK, linewidth=1.3, linestyle=(0, (5, 2)),
+                  label="Kirk, printed")  # fmt: skip
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlim(0.0, float(grid[-1]) * per("load"))
+    mark_extrapolated(axes, top * per("load"))
+    add_legend(axes)
+    return figure
+
+
+def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
+    colour, dashes, _ = style_of_pad(curve.pad)
+    value, band = curve.stiffness(grid) * per("stiffness"), curve.stiffness_band(grid)
+    outside = curve.is_extrapolated(grid)
+    low, high = (np.where(outside, np.nan, b * per("stiffness")) for b in band)
+    axes.fill_between(grid * per("load"), low, high, color=colour, alpha=0.2, linewidth=0)
+    axes.plot(grid * per("load"), np.where(outside, np.nan, value), color=colour, linestyle=dashes, linewidth=1.7,
+              label=f"pad #{curve.pad}")  # fmt: skip
+    # one point of overlap, so that the two lines meet
+    extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
+    axes.plot(grid * per("load"), extrapolated, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)

@@ -1,0 +1,314 @@
+"""Pictures of residuals: over load or frequency, as a map, by observable; and what a plan could tell apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import SymLogNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike
+
+from rigdata.operating_point import ROTATIONS
+from tpjb_ident.columns import symbol
+from tpjb_ident.compare.comparison import Comparison, comparison_frame
+from tpjb_ident.compare.effect_words import label_in_words
+from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
+from tpjb_ident.report.drawing.picture import (
+    CHARACTER,
+    DIVERGING,
+    FONT_SIZE,
+    INK,
+    LEFT,
+    LIGHT,
+    PAPER,
+    RED,
+    RULE,
+    SEQUENTIAL,
+    VARIANT_LABEL,
+    add_colour_bar,
+    add_legend,
+    label,
+    new_picture,
+    new_pictures,
+    shrink,
+)
+from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, axis_of, longest_series, set_point_ticks
+from tpjb_ident.schema import POINT_KEY, coefficient_column
+
+if TYPE_CHECKING:
+    from tpjb_ident.diagnosis.diagnose import Diagnosis
+    from tpjb_ident.diagnosis.plan import CampaignPlan
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
+
+_COLUMNS = ("model", "entry", *POINT_KEY, "z")
+
+_TWO_SIDED_95 = 1.959964
+
+
+def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFrame:
+    """Give (measured - predicted) / sigma of every coefficient: a row per model, coefficient and point.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        Or a table of comparison.csv.
+    """
+    if isinstance(source, pd.DataFrame):
+        return source if {"model", "entry", "z"} <= set(source.columns) else _of_comparison(source)
+    if isinstance(source, Comparison):
+        return _of_comparison(comparison_frame(source))
+    return _of_diagnosis(source)
+
+
+def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
+    rows = []
+    models = [("before", diagnosis.problem.base)]
+    models += [("after", diagnosis.after)] if diagnosis.verdict.effects else []
+    for model, prediction in models:
+        z = residuals(diagnosis.observations, prediction)
+        for element, value in zip(diagnosis.observations.elements, z, strict=True):
+            if element.family == "h":
+                direction = round(math.degrees(element.place("direction")), 6)
+                speed, excitation = (round(element.place(name) / (2 * np.pi), 6) for name in ("speed", "excitation"))
+                point = (element.place("load"), direction, abs(speed), excitation, ROTATIONS[speed < 0.0])
+                rows.append((model, element.observable, *point, float(value)))
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
+
+
+def _of_comparison(table: pd.DataFrame) -> pd.DataFrame:
+    frames = []
+    for entry in COEFFICIENTS:
+        key = coefficient_column(entry)
+        sigma = (table[f"{key}_hi"] - table[f"{key}_lo"]) / (2 * _TWO_SIDED_95)
+        place = table[[name for name in POINT_KEY if name in table]]
+        residual = (table[key] - table[f"{key}_predicted"]) / sigma
+        frames.append(place.assign(model=table["pivots"], entry=entry, z=residual))
+    return pd.concat(frames, ignore_index=True)
+
+
+_ON_COLOUR = "#1b1f23"  # ink that stays dark on its coloured ground when the page turns dark
+
+_CELL, _SHORTEST = 0.42, 4.4  # width of a cell and of the whole picture [inches]
+
+_HEIGHT = 2.9
+
+_LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
+
+
+def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | None = None) -> Figure:
+    """Draw (measured - predicted) / sigma as a heat map: coefficients by rows, operating points by columns.
+
+    Operating points stand in order of load, then of excitation frequency. One panel per model: baseline and model with
+    the effects found, of a diagnosis; one per pivot law, of a comparison. The colours are the same in all panels;
+    they grow with the logarithm beyond 2 sigma.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        See `residual_frame`.
+    title : str, optional
+    """
+    frame = residual_frame(source)
+    models = list(dict.fromkeys(frame["model"]))
+    if not models:
+        raise ValueError("there are no residuals of coefficients to draw")
+    place = [name for name in ("static_load_N", "excitation_Hz", *POINT_KEY[1:3], "rotation") if name in frame]
+    points = frame[place].drop_duplicates().sort_values(place)
+    width = max(_SHORTEST, _CELL * len(points) + 1.9)
+    figure, grid = new_pictures(len(models), 1, title=title, width=width, height=_HEIGHT)
+    limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
+    norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
+    for (axes,), model in zip(grid, models, strict=True):
+        _draw_map(axes, frame[frame["model"] == model], points, norm, VARIANT_LABEL.get(model, str(model)))
+    return figure
+
+
+def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, name: str) -> None:
+    cells = frame.pivot_table(index="entry", columns=list(points), values="z", dropna=False)
+    table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
+    size = float(np.sqrt(np.nanmean(table**2)))
+    label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
+    image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+    axes.grid(False)
+    axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
+    set_point_ticks(axes, points)
+    axes.axhline(3.5, color=INK, linewidth=0.8)
+    for (i, j), z in np.ndenumerate(table):
+        if np.isfinite(z):
+            strong = abs(norm(z) - 0.5) > 0.3
+            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 1.0,
+                      color="white" if strong else _ON_COLOUR)  # fmt: skip
+    add_colour_bar(axes, image, "(measured - predicted) / sigma")
+    bar = axes.figure.axes[-1]
+    ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
+    bar.set_yticks(ticks, [str(t) for t in ticks])
+    bar.minorticks_off()
+
+
+def _short(z: float) -> str:
+    return f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
+
+
+_STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
+
+_DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
+
+
+def residual_series(
+    source: Diagnosis | Comparison | pd.DataFrame,
+    over: str = "load",
+    *,
+    entries: Sequence[str] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw (measured - predicted) / sigma over load or frequency, one line per coefficient and model.
+
+    The grey band holds two standard deviations: residuals inside say nothing.
+
+    Parameters
+    ----------
+    source : Diagnosis, Comparison or DataFrame
+        See `residual_frame`.
+    over : {"load", "frequency"}
+        The longest series over it is drawn.
+    entries : sequence of str, optional
+        Coefficients, four at most; default: the three that disagree most with the first model.
+    title : str, optional
+
+    Raises
+    ------
+    ValueError
+        When nothing varies over `over`.
+    """
+    frame = residual_frame(source)
+    column, scale, text = axis_of(over)
+    series = longest_series(frame, over)
+    if series is None:
+        raise ValueError(f"there are no two points that differ in {over} alone")
+    models = list(dict.fromkeys(frame["model"]))
+    chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
+    figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
+    axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
+    for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
+        for number, model in enumerate(models):
+            rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
+            last = number == len(models) - 1
+            axes.plot(
+                rows[column] / scale, rows["z"], color=LIGHT[colour],
+                linestyle=_DASHES[number % len(_DASHES)] if len(rows) >= CURVE else "none",
+                marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else PAPER, linewidth=1.3,
+                label=f"{entry}, {VARIANT_LABEL.get(model, str(model))}",
+            )  # fmt: skip
+    add_legend(axes)
+    return figure
+
+
+def _worst(frame: pd.DataFrame, count: int = 3) -> list[str]:
+    size = (frame["z"] ** 2).groupby(frame["entry"]).sum()
+    return [str(name) for name in size.sort_values(ascending=False).index[:count]]
+
+
+def gap(
+    source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
+    *,
+    title: str | None = None,
+) -> Figure:
+    """Draw the root mean square of (measured - predicted) / sigma per observable, before and after.
+
+    Observables that got worse have their name in brackets with a minus; those that no held-out point shows are
+    marked with an asterisk.
+
+    Parameters
+    ----------
+    source : Diagnosis, Verdict or mapping
+        Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
+    title : str, optional
+    """
+    gaps = _gaps(source)
+    if not gaps:
+        raise ValueError("there is no gap by observable to draw")
+    before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
+    words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
+    figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
+    shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
+    y = np.arange(len(words))
+    bars = [(before, "orange", "////", "baseline"), (after, "blue", None, "with the effects found")]
+    bars = bars[:1] if np.array_equal(before, after) else bars  # nothing was added: there is no after
+    for number, (values, colour, hatch, name) in enumerate(bars):
+        places = y + 0.4 * number - 0.2 * (len(bars) - 1)
+        axes.barh(places, values, 0.38, color=LIGHT[colour] if hatch is None else PAPER, hatch=hatch,
+                  edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
+    axes.set_yticks(y, words)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+    axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
+    handles = axes.get_legend_handles_labels()[0]
+    add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
+    return figure
+
+
+def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Mapping[str, Mapping[str, float]]:
+    if isinstance(source, Mapping):
+        return source
+    # a diagnosis holds a verdict, whose own `verdict` is a word
+    return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
+
+
+def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
+    star = "" if any(k.startswith("heldout") for k in gaps) else "*"
+    worse = " (worse)" if after > max(1.05 * before, 1.0) else ""
+    return f"{name.replace('_', ' ')}{star}{worse}"
+
+
+_SQUARE = 0.3  # [inches]
+
+_TALL = 2.0  # the colour bar needs it [inches]
+
+_CONFUSABLE = 3.0
+
+_VISIBLE = 6.0
+
+
+def isolability(
+    plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = None, *, title: str | None = None
+) -> Figure:
+    """Draw how far each effect stands from what every other one can imitate, in standard deviations.
+
+    Row A, column B: distance of A, at a size that is seen with 6 standard deviations, from all that B can do. Pairs
+    below 3 are framed: the campaign could not tell them apart. Blank rows are effects that it does not see at all.
+
+    Parameters
+    ----------
+    plan : CampaignPlan or (k, k) array_like
+        As `tpjb_ident.diagnosis.plan.plan` makes it, or its matrix.
+    names : sequence of str, optional
+        Of the k effects; default: the plan's own.
+    title : str, optional
+    """
+    matrix = np.asarray(getattr(plan, "separation", plan), dtype=float)
+    names = names or [c.label for c in getattr(plan, "candidates", ())]
+    k = len(matrix)
+    if matrix.shape != (k, k) or len(names) != k:
+        raise ValueError(f"the matrix must be square with one name per row, got shape {matrix.shape}")
+    words = [label_in_words(name) for name in names]
+    room = CHARACTER * max(len(word) for word in words)
+    # the panel's own margins and the colour bar come on top of cells and names
+    figure, ((axes,),) = new_pictures(
+        1, 1, title=title, width=_SQUARE * k + room + 2.0, height=max(_SQUARE * k, _TALL) + room + 1.0
+    )
+    label(axes, "could pass for (framed: closer than 3)", "effect at work")
+    shrink(axes, left=room - 0.1, bottom=room - 0.1)
+    image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE, aspect="auto", interpolation="nearest")
+    axes.grid(False)
+    axes.set_xticks(range(k), words, rotation=90, fontsize=FONT_SIZE - 1)
+    axes.set_yticks(range(k), words, fontsize=FONT_SIZE - 1)
+    for i, j in zip(*np.nonzero(matrix < _CONFUSABLE), strict=True):
+        axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=RED, linewidth=1.2))
+    add_colour_bar(axes, image, "distance, standard deviations")
+    return figure
