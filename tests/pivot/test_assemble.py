@@ -145,6 +145,14 @@ def test_two_pads_tell_no_centre():
     assert check_placement([]) == []
 
 
+def test_readings_set_to_zero_before_each_run_tell_no_place():
+    zeroed = []
+    for pad in range(1, 6):
+        out = vectors(float(ANGLES[pad - 1]), np.array([REACH]))[0]
+        zeroed.append(record(pad, shift=(1e-6 * pad, -2e-6) - out))
+    assert check_placement(zeroed) == []
+
+
 def signed(pad, size, name=None):
     return record(pad, pickup=PickupSignature(tuple(CHANNELS), np.array(size), np.full(4, 0.01)), name=name)
 

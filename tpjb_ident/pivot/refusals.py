@@ -140,7 +140,7 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     Exchanging two probes mirrors the plane. Along the mirror axis a mirrored movement looks right, but the
     mirrored position does not: with the probes' zero constant within a campaign, the first readings of all
     runs must lie around one centre, each toward its own pad, and none further to the side than a pad's flat
-    is wide.
+    is wide. Readings set to zero before each run tell no place: they lie no further apart than the pads give.
     """
     if len({record.pad for record in records}) < 3:
         return []
@@ -150,6 +150,8 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     places = [(record.blocks.deflection[k], record.blocks.across[k]) for record, k in zip(records, lowest, strict=True)]
     starts = np.einsum("ri,rij->rj", np.array(places), axes)
     centre, distance = _centre(starts, outward)
+    if distance <= np.median([np.ptp(record.blocks.deflection) for record in records]):
+        return []
     asides = np.sum((starts - centre) * tangent, axis=1)
     limit = max(_ASIDE * distance, _ASIDE_SPREAD * robust_deviation(asides))
     problems = []
