@@ -157,6 +157,35 @@ def test_one_coarse_channel_lets_its_quantity_stand_still():
     refuse_flat_channels(run)
 
 
+@dataclasses.dataclass(frozen=True)
+class Readings:
+    """Readings of a run's channels in memory."""
+
+    channels: dict
+    values: dict
+    id: str = "p-1"
+    file: str = "p.csv"
+    sample_rate: float = 100.0
+
+    def record(self, name):
+        return SimpleNamespace(values=self.values[name])
+
+
+@pytest.mark.parametrize(("dead", "left"), [(("X1C",), {"X1A", "X1B"}), ((), {"X1A", "X1B", "X1C"})])
+def test_a_dead_probe_is_left_out_where_two_others_tell_the_plane(dead, left):
+    axes = {"X1A": 0.25, "X1B": 0.75, "X1C": 0.5}
+    rng = np.random.default_rng(2)
+    channels = {}
+    for name, share in axes.items():
+        channels[name] = channel("displacement", share * math.pi)
+        channels[name].name = name
+    values = {name: np.full(400, 1.2) if name in dead else rng.standard_normal(400) for name in channels}
+    assert set(refuse_flat_channels(Readings(channels, values)).channels) == left
+    values["X1B"] = values["X1C"] = np.full(400, 1.2)  # then nothing else tells the plane
+    with pytest.raises(RigDataError, match="stands still"):
+        refuse_flat_channels(Readings(channels, values))
+
+
 def test_channels_of_other_quantities_may_stand_still():
     run = FirstPad()
     run.channels = CHANNELS | {"T1": channel("temperature", None)}

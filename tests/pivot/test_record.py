@@ -59,6 +59,16 @@ def test_a_converter_without_noise_is_known_to_half_a_step(steps, seen):
     assert good_samples(residue[:, None], longest=20)[1050] == (not seen)
 
 
+def test_text_that_rounds_a_coarse_converter_makes_no_glitches():
+    """Two converters of one step, turned into X: where both step they leave what their text rounds off."""
+    rng = np.random.default_rng(3)
+    step, signal = 24.0 / 2**16, np.cumsum(np.repeat([0.0, 2e-5], 1500))
+    read = [np.round((x + 1e-4 * rng.standard_normal(3000)) / step) * step for x in (9.0 + signal, 11.0 - signal)]
+    rounded = np.round(read, 6)
+    assert np.ptp(rounded[0] - read[0]) > 1e-7
+    assert good_samples(np.array([rounded[0] + rounded[1], rounded[0] - rounded[1]]).T).all()
+
+
 def test_few_samples_are_taken_as_they_are():
     values = np.array([0.0, 0.1, 0.0, 0.1, 900.0, 0.1, 0.0])[:, None]
     assert good_samples(values).all()

@@ -11,8 +11,8 @@ from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Severity
 from rigdata.run import Run
-from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
+from tpjb_ident.phasors.slow_samples import is_spare, stands_still
 
 #: Quantities without which a run of that kind says nothing.
 _NEEDED = {
@@ -26,19 +26,11 @@ _CELSIUS = 273.15
 #: Film and housing temperatures of a rig that is not on fire [K].
 _TEMPERATURES = (_CELSIUS - 50.0, _CELSIUS + 300.0)
 _MIN_CYCLES = 5.0
-#: Smaller singular value of the axes of channels that tell a plane, at least.
-_PLANE = 0.1
 
 
 def needed(run: Run, channel: Channel) -> bool:
     """Whether `run` cannot be used without `channel`."""
     return channel.quantity in _NEEDED[run.kind]
-
-
-def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
-    """Whether the others of a channel's quantity that are alive tell the plane without it."""
-    axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
-    return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
 
 
 def check_signal(
@@ -95,7 +87,7 @@ def _dead(report: Reporter, channel: Channel, seen: ChannelStatistics, grave: Se
 
 
 def _stuck(report: Reporter, channel: Channel, statistics: ChannelStatistics, grave: Severity) -> None:
-    if statistics.longest_flat < max(50, 10 * statistics.expected_flat()):
+    if not stands_still(statistics):
         return
     share = statistics.longest_flat / statistics.samples
     severity: Severity = grave if share > 0.25 else ("warning" if share > 0.05 else "note")

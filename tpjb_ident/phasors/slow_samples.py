@@ -8,7 +8,8 @@ ramp.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,10 +18,12 @@ from scipy import ndimage
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
+from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.bad_samples import robust_deviation
 
 if TYPE_CHECKING:
+    from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
@@ -29,6 +32,8 @@ _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
 _THRESHOLD = 7.0  # noise standard deviations beyond both medians
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
+#: Two directions whose smallest singular value is below this tell no plane.
+_PLANE = 0.1
 _NOISE_FREE = (
     0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
 )
@@ -39,11 +44,34 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
 
     Gives time (n,) and force, displacement (n, 2), good (n,) and the rate [Hz].
     """
-    refuse_flat_channels(run)
+    run = refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     slower = force if len(force) < len(displacement) else displacement
     load, place = force.at(slower.time), displacement.at(slower.time)
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
+
+
+def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
+    """Whether the others of a channel's quantity that are alive tell the plane without it."""
+    axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
+    return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
+
+
+def _statistics(run: Run) -> dict[str, ChannelStatistics]:
+    """Statistics of every force and displacement channel."""
+    statistics: dict[str, ChannelStatistics] = {}
+    for name, channel in run.channels.items():
+        if channel.quantity in ("force", "displacement"):
+            statistics[name] = ChannelStatistics()
+            statistics[name].add(np.asarray(run.record(name).values))
+    return statistics
+
+
+def _without_dead_spares(run: Run, statistics: Mapping[str, ChannelStatistics]) -> Run:
+    """The run without channels that read one value throughout, where others tell the plane without them."""
+    alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
+    channels = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
+    return run if len(channels) == len(run.channels) else replace(run, channels=channels)
 
 
 def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
@@ -95,37 +123,43 @@ def _outside_both_medians(x: FloatArray, longest: int) -> BoolArray:
 
 def _noise(x: FloatArray, median: FloatArray) -> float:
     """Robust standard deviation about the running median, never below the recording's resolution."""
-    spread = robust_deviation(x - median)
-    steps = np.abs(np.diff(x))
-    # two converters turned into X and Y leave rounding residues: those are no steps
-    steps = steps[steps > 1e-6 * np.ptp(x)]
-    resolution = float(np.min(steps)) if len(steps) else 0.0
+    spread, resolution = robust_deviation(x - median), converter_step(x)[0]
     return max(spread, resolution / 2.0, _SMALLEST * float(np.ptp(x)), _ROUNDING * float(np.max(np.abs(x))), _NOTHING)
 
 
-def refuse_flat_channels(run: Run) -> None:
-    """Refuse a run one of whose force or displacement channels stands still for a while.
+def converter_step(x: FloatArray) -> tuple[float, float]:
+    """Usual step between readings (n,) that differ, and the share that differs.
+
+    Two converters turned into X and Y leave rounding residues, and so does text that rounds: those are no steps.
+    """
+    moves = np.abs(np.diff(x))
+    steps = moves[moves > 1e-6 * np.ptp(x)]
+    return (float(np.median(steps)), len(steps) / len(moves)) if len(steps) else (0.0, 0.0)
+
+
+def refuse_flat_channels(run: Run) -> Run:
+    """The run without channels that nobody misses; refused where one of force or displacement stands still for a while.
 
     A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
     in the curve itself gives it away, but readings without noise do.
     """
+    statistics = _statistics(run)
+    run = _without_dead_spares(run, statistics)
     problems = []
     for quantity in ("force", "displacement"):
-        statistics: dict[str, ChannelStatistics] = {}
-        for name, channel in run.channels.items():
-            if channel.quantity == quantity:
-                statistics[name] = ChannelStatistics()
-                statistics[name].add(np.asarray(run.record(name).values))
-        if any(_repeated(s) > _NOISE_FREE for s in statistics.values() if not s.constant):
+        alike = {name: statistics[name] for name, c in run.channels.items() if c.quantity == quantity}
+        if any(_repeated(s) > _NOISE_FREE for s in alike.values() if not s.constant):
             # noise below the converter's step: standing still says nothing here
             continue
-        problems += [
-            _problem(run, name, s)
-            for name, s in statistics.items()
-            if s.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * s.expected_flat())
-        ]
+        problems += [_problem(run, name, s) for name, s in alike.items() if stands_still(s)]
     if problems:
         raise RigDataError(problems)
+    return run
+
+
+def stands_still(statistics: ChannelStatistics) -> bool:
+    """Whether the longest stretch of equal readings is longer than chance makes it."""
+    return statistics.longest_flat >= max(_SHORTEST, _TIMES_EXPECTED * statistics.expected_flat())
 
 
 def _repeated(statistics: ChannelStatistics) -> float:

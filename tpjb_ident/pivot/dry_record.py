@@ -23,7 +23,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import slow_samples
+from tpjb_ident.phasors.slow_samples import converter_step, slow_samples
 from tpjb_ident.pivot.blocks import Blocks, Hold, PivotSettings, Samples, cut_blocks, find_holds, pad_axes
 
 if TYPE_CHECKING:
@@ -115,14 +115,8 @@ def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
 
 def _quantisation(displacement: FloatArray) -> float:
     """Error of a level [m] that stands between two steps of the converter, where no noise dithers it."""
-    worst = 0.0
-    for column in displacement.T:
-        moves = np.abs(np.diff(column))
-        # two channels turned into X and Y leave rounding residues: those are no steps
-        real = moves > 1e-6 * np.ptp(column)
-        if real.any() and real.mean() < _UNDITHERED:
-            worst = max(worst, float(np.min(moves[real])) / math.sqrt(6.0))
-    return worst
+    steps = [step for step, share in map(converter_step, displacement.T) if share < _UNDITHERED]
+    return max(steps, default=0.0) / math.sqrt(6.0)
 
 
 def axial_channels(run: Run) -> dict[str, Channel]:
