@@ -36,7 +36,7 @@ from tpjb_ident.pivot.fit import (
 )
 from tpjb_ident.pivot.law_fit import LawFit
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_behind
+from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_behind
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LEVELS = np.arange(500.0, 5001.0, 500.0)
@@ -151,6 +151,36 @@ def test_readings_set_to_zero_before_each_run_tell_no_place():
         out = vectors(float(ANGLES[pad - 1]), np.array([REACH]))[0]
         zeroed.append(record(pad, shift=(1e-6 * pad, -2e-6) - out))
     assert check_placement(zeroed) == []
+
+
+@pytest.mark.parametrize(
+    ("odd", "seed", "named"),
+    [({}, 1, False), ({}, 2, False), ({"gain": 1.01}, 1, False), ({"gain": 1.1}, 1, True), ({"turn": 10.0}, 1, True)],
+)
+def test_three_probes_that_contradict_one_another_are_refused(odd, seed, named):
+    """Each with the gain error that is stated of it, half a per cent, and drift of some nanometres."""
+    rng = np.random.default_rng(seed)
+    axes = np.radians([0.0, 60.0, 120.0])
+    probes = {f"X{k}": channel("displacement", axis, 0.005) for k, axis in enumerate(axes)}
+    for probe in probes.values():
+        probe.axis_uncertainty, probe.plane = 0.0, 0.0
+    gain = 1.0 + 0.005 * rng.standard_normal(3)
+    gain[2] *= odd.get("gain", 1.0)
+    read_along = axes.copy()
+    read_along[2] += math.radians(odd.get("turn", 0.0))
+    records = []
+    for pad in range(1, 6):
+        one = record(pad)
+        one.run.channels = probes
+        slopes = gain * np.cos(read_along - ANGLES[pad - 1]) + 0.003 * rng.standard_normal(3)
+        records.append(replace(one, slopes=dict(zip(probes, slopes))))
+    problems = check_spares(records)
+    assert [p.run for p in problems] == ([f"p-{pad}" for pad in range(1, 6)] if named else [])
+    if named:
+        assert "X0, X1, X2 contradict one another" in problems[0].what
+        for one in records:  # in planes of their own they may move apart
+            one.run.channels = probes | {"X2": SimpleNamespace(**(vars(probes["X2"]) | {"plane": 0.02}))}
+        assert check_spares(records) == []
 
 
 def signed(pad, size, name=None):

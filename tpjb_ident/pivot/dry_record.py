@@ -75,6 +75,7 @@ class DryRecord:
     pickup: PickupSignature | None = None
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
+    slopes: Mapping[str, float] = field(default_factory=dict)  #: of readings, where more than two tell a vector
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
@@ -105,7 +106,8 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
         raise _refusal(run, "record", what, "Record for longer, or set a shorter block")
     good = np.ones(len(blocks), dtype=bool)
     step = _quantisation(samples.displacement)
-    return DryRecord(run, run.pad, angle, holds, blocks, good, lost, step, pickup, load_direction(blocks))
+    direction, slopes = load_direction(blocks), _slopes(run, angle)
+    return DryRecord(run, run.pad, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes)
 
 
 def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -122,6 +124,22 @@ def _quantisation(displacement: FloatArray) -> float:
 def axial_channels(run: Run) -> dict[str, Channel]:
     """Probes and cells of a run, by name."""
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
+
+
+def _slopes(run: Run, angle: float) -> dict[str, float]:
+    """By how much each reading changes with the vector that all of its quantity make along the pad; dead ones apart."""
+    slopes: dict[str, float] = {}
+    for quantity in ("force", "displacement"):
+        names = [name for name, channel in axial_channels(run).items() if channel.quantity == quantity]
+        if len(names) < 3:
+            continue
+        along = run.vector(quantity).values @ pad_axes(angle)[0]
+        for name in names:
+            reading = np.asarray(run.record(name).values)
+            used = np.isfinite(along) & np.isfinite(reading)
+            if np.ptp(reading[used]) > 0.0:
+                slopes[name] = float(np.polyfit(along[used], reading[used], 1)[0])
+    return slopes
 
 
 def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:

@@ -42,7 +42,7 @@ from tpjb_ident.pivot.law_fit import (
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, structure_of
+from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_of
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
@@ -191,7 +191,8 @@ def fit_pivots(
     records, problems = _read(campaign, angles, settings)
     noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
     records = [replace(r, displacement_direction=displacement_direction(r.blocks, noise)) for r in records]
-    problems += check_placement(records) + check_pickup(records) + check_directions(records, settings, angles)
+    problems += check_spares(records) + check_placement(records) + check_pickup(records)
+    problems += check_directions(records, settings, angles)
     refused = {problem.run for problem in problems}
     pads: dict[int, list[DryRecord]] = {}
     for record in records:
