@@ -20,8 +20,8 @@ _ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, wh
 _ALONG = 0.5  # of the clearance: pads may differ, but not by this much
 _CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
 _SPARE_CURE = "Check sensitivities and axes against the certificates and the drawing; set the wrong one to ignore"
-#: Gain of a channel where nothing is stated, drift of a reading over a run, as shares; chance of a false alarm.
-_GAIN, _SPARE_DRIFT, _BY_CHANCE = 0.005, 0.01, 1e-4
+#: Gain uncertainty of a channel where nothing is stated; what a curved path leaves of a slope; chance of a false alarm.
+_GAIN, _CURVED, _BY_CHANCE = 0.005, 1e-3, 1e-4
 #: Pads that must be there: two numbers are fitted.
 _FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
@@ -193,7 +193,7 @@ def check_spares(records: Sequence[DryRecord]) -> list[Problem]:
     """Whether channels of one plane that are more than two agree: each may be off by what is stated of it.
 
     The changes s (m,) of readings along axes A (m, 2) with null space N leave N s, which gains and angles of the
-    channels, common to all runs, and the drift of each run must explain.
+    channels, common to all runs, and each run's own noise must explain: that of the direction across the pad.
     """
     groups: dict[tuple[str, float], list[str]] = {}
     for name, channel in (axial_channels(records[0].run) if records else {}).items():
@@ -214,16 +214,18 @@ def _contradiction(records: Sequence[DryRecord], names: Sequence[str]) -> float:
     null = np.linalg.svd(axes)[0][:, 2:].T
     gain = np.array([_GAIN if channel.uncertainty is None else channel.uncertainty for channel in channels])
     angle = np.array([channel.axis_uncertainty for channel in channels])
-    left, effects = [], []
+    left, effects, noise = [], [], []
     for record in records:
         slopes = np.array([record.slopes[name] for name in names])
         moved = np.linalg.lstsq(axes, slopes, rcond=None)[0]
         left.append(null @ slopes)
+        direction = record.load_direction if channels[0].quantity == "force" else record.displacement_direction
+        noise += len(null) * [min(max(direction.se, _CURVED), 1.0) ** 2]
         effects.append(null @ np.diag(slopes) @ np.diag(gain))
         turned = null @ np.diag(axes @ np.array([moved[1], -moved[0]])) @ np.diag(angle)
         effects[-1] = np.hstack([effects[-1], turned])
     design, residual = np.vstack(effects), np.concatenate(left)
-    covariance = design @ design.T + _SPARE_DRIFT**2 * np.eye(len(residual))
+    covariance = design @ design.T + np.diag(noise)
     return float(special.chdtrc(len(residual), residual @ np.linalg.solve(covariance, residual)))
 
 
