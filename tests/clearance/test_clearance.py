@@ -26,6 +26,7 @@ from tpjb_ident.clearance.measure import (
     pairs_frame,
     radial_stiffness,
 )
+from tpjb_ident.clearance.sweep import _settled
 from tpjb_ident.conditions import sentences
 from tpjb_ident.pivot import fit_pivots
 
@@ -145,6 +146,17 @@ def test_without_curves_zero_load_is_extrapolated(whole):
     assert np.all(np.abs(found.clearance - CLEARANCE) < 4 * found.clearance_se)
     assert found.clearance == pytest.approx(CLEARANCE, abs=0.6e-6)
     assert "give-from-sweep" in found.status
+
+
+def test_a_converter_of_coarse_steps_shows_corners_that_stand_still():
+    """The step hides how pivots deflect: most pieces of a corner stay where they are, and that is no way to it."""
+    place = np.zeros((40, 2))
+    place[:5, 0] = 1e-5 * np.arange(5, 0, -1)
+    place[20:, 1] = 0.75e-6
+    corner = np.ones((40, 2), dtype=bool)
+    expected = np.ones(40, dtype=bool)
+    expected[:7] = expected[18:22] = False  # on its way, and what stands beside a step
+    np.testing.assert_array_equal(_settled(0.1 * np.arange(40), place, corner), expected)
 
 
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):

@@ -151,7 +151,7 @@ def _settled(time: FloatArray, place: FloatArray, touched: BoolArray) -> BoolArr
     speed = np.maximum(np.r_[step, 0.0], np.r_[0.0, step])
     ordinary = float(np.median(speed[corner]))
     spread = robust_deviation(speed[corner] - ordinary)
-    moving = corner & (speed >= ordinary + _MOVING * spread)
+    moving = corner & (speed > ordinary + _MOVING * spread)
     # the piece beside a moving one hides a remainder of the way below the noise, and would do so at every corner
     beside = np.r_[moving[1:], False] | np.r_[False, moving[:-1]]
     return np.asarray(~corner | ~(moving | beside))

@@ -262,7 +262,7 @@ def assemble_curve(
         load_direction=first.load_direction,
         displacement_direction=first.displacement_direction,
         hysteresis=_loop(steps, law),
-        relative_calibration=_calibration(axial_channels(first.run), first.angle),
+        relative_calibration=relative_calibration(axial_channels(first.run), first.angle),
         runs=tuple(record.run.id for record in records),
     )
     return replace(curve, status=tuple(_status(curve, records, settings, structure)))
@@ -324,8 +324,8 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
     return measure_loop(applied, reading, gradient @ law.covariance @ gradient.T, steps.branch[used])
 
 
-def _calibration(channels: Mapping[str, Channel], angle: float) -> float:
-    """Relative standard uncertainty of the stiffness from the certificates of probes and cells."""
+def relative_calibration(channels: Mapping[str, Channel], angle: float) -> float:
+    """Relative standard uncertainty along a pad's angle [rad] from the certificates of channels."""
     # two channels at right angles share a direction as the squares of their cosines
     shares = [math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0) for c in channels.values()]
     return math.sqrt(sum(share**2 for share in shares))
