@@ -12,7 +12,7 @@ from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posteri
 from tpjb_ident.diagnosis.comparison.paths import Path
 from tpjb_ident.diagnosis.comparison.scores import Strain, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
-from tpjb_ident.diagnosis.diagnose import pose
+from tpjb_ident.diagnosis.diagnose import diagnose, pose
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.forward.workers import workers
 from tpjb_ident.diagnosis.planned import planned_observations
@@ -112,3 +112,11 @@ def test_what_is_left_out_would_not_have_changed_the_answer(campaign, monkeypatc
     assert whole.probability(whole.best) == pytest.approx(quick.probability(quick.best), abs=0.01)
     left_out = [f for f in whole.fits if f.labels not in {fit.labels for fit in quick.fits}]
     assert sum(whole.probability(fit) for fit in left_out) < 0.01
+
+
+@pytest.mark.slow
+def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campaign):
+    forward, problem, _ = campaign
+    settings = DiagnoseSettings(workers=1, skip=frozenset(known_effects()))
+    verdict = diagnose(problem.observations, forward.setup, settings).verdict
+    assert (verdict.verdict, verdict.effects, verdict.below_floor) == ("unexplained", (), ())

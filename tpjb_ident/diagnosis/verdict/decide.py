@@ -154,7 +154,8 @@ def _term_parameters(fault: Fault, amplitudes: FloatArray, errors: FloatArray) -
 def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:
     """Effects that this campaign could not have seen at a typical size."""
     paths = [path for path in comparison.paths if not path.fault.is_term]
-    typical = np.column_stack([problem.sigma * (path.neutral_slope @ path.fault.width) for path in paths])
+    rows = [problem.sigma * (path.neutral_slope @ path.fault.width) for path in paths]
+    typical = np.reshape(rows, (-1, len(problem.sigma))).T
     white = np.linalg.solve(usual_factor(problem.observations, problem.columns), typical / settings.width)
     sizes: dict[str, float] = {}
     for path, size in zip(paths, np.linalg.norm(white, axis=0), strict=True):
