@@ -95,7 +95,7 @@ class Levels:
         offset = linear.residual + linear.jacobian @ linear.theta
         rest = errors.basis @ np.column_stack([offset, beside])
         weighted = np.swapaxes(own[None] * errors.shrink[:, :, None] ** 2, 1, 2)
-        lower = np.linalg.cholesky(weighted @ own + np.eye(own.shape[1]))
+        lower = np.asarray(np.linalg.cholesky(weighted @ own + np.eye(own.shape[1])), float)
         return cls(errors, rest, lower, np.linalg.solve(lower, weighted @ rest))
 
     @property
