@@ -146,12 +146,8 @@ def points_of(given: Mapping[str, Any]) -> list[OperatingPoint]:
             raise ArgumentError(f"points: {name} is missing. Give load, speed and excitation.")
         value = given.get(name, -math.pi / 2)
         lists[name] = np.atleast_1d(np.asarray(to_si(value, dimension, f"points: {name}"), dtype=float))
-    return [
-        OperatingPoint(float(w), float(a), float(n), float(f))
-        for w, a, n, f in itertools.product(
-            *(lists[name] for name in ("load", "load_direction", "speed", "excitation"))
-        )
-    ]
+    every = itertools.product(*(lists[name] for name in ("load", "load_direction", "speed", "excitation")))
+    return [OperatingPoint(float(load), float(angle), float(speed), float(line)) for load, angle, speed, line in every]
 
 
 def planned_layout(bearing: Bearing, points: Sequence[OperatingPoint], static: tuple[int, bool, float, bool]) -> Layout:

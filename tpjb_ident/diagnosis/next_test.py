@@ -62,21 +62,7 @@ class Design:
 
     def forward(self, setup: Setup, seen: Observations) -> Forward:
         """The model of this test, for what `planned` lists."""
-        if self.change is None:
-            return Forward(setup, self.layout, seen.elements)
-        return _ChangedForward(setup, self.layout, seen.elements, last=self.change)
-
-
-@dataclass
-class _ChangedForward(Forward):
-    """A model of a rig that the test itself has changed; `last` is done after effects and nuisances."""
-
-    last: Change = lambda setup: setup
-
-    def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None):  # type: ignore[no-untyped-def]
-        """Predict; see `Forward`."""
-        before = change or (lambda setup: setup)
-        return super().__call__(effects, lambda setup: self.last(before(setup)))
+        return Forward(setup, self.layout, seen.elements, last=self.change)
 
 
 def designs(setup: Setup, layout: Layout) -> tuple[Design, ...]:

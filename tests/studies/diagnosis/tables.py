@@ -2,7 +2,7 @@
 
     python -m tests.studies.diagnosis.tables [--write SECTION] ROWS.jsonl [MORE.jsonl ..]
 
-`SECTION` of RESULTS.md: mixtures, mixtures-between, mixtures-one, volts, strangers.
+`SECTION` of RESULTS.md: mixtures, mixtures-between, mixtures-one, volts, strangers, strangers-unseen.
 """
 
 from __future__ import annotations

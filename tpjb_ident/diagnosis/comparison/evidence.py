@@ -79,6 +79,43 @@ class Linear:
     width: FloatArray = field(repr=False)  #: (k,): standard deviations of the priors
 
 
+@dataclass(frozen=True)
+class Levels:
+    """Columns beside a model at every scale of the model's error, the model's own numbers integrated out."""
+
+    errors: ErrorModel
+    rest: FloatArray  #: (n, c)
+    lower: FloatArray  #: (scales, k, k): Cholesky factors of the numbers' inverse covariance, in prior widths
+    shared: FloatArray  #: (scales, k, c)
+
+    @classmethod
+    def of(cls, errors: ErrorModel, linear: Linear, beside: FloatArray) -> Levels:
+        """The model's residual where nothing is off comes first, then what is `beside` it, (n, c - 1)."""
+        own = errors.basis @ (linear.jacobian * linear.width)
+        offset = linear.residual + linear.jacobian @ linear.theta
+        rest = errors.basis @ np.column_stack([offset, beside])
+        weighted = np.swapaxes(own[None] * errors.shrink[:, :, None] ** 2, 1, 2)
+        lower = np.asarray(np.linalg.cholesky(weighted @ own + np.eye(own.shape[1])), float)
+        return cls(errors, rest, lower, np.linalg.solve(lower, weighted @ rest))
+
+    @property
+    def half_det(self) -> FloatArray:
+        """Half the logarithm of the numbers' inverse covariance's determinant, (scales,)."""
+        return np.asarray(np.log(np.diagonal(self.lower, axis1=1, axis2=2)).sum(axis=1))
+
+    def product(self, columns: slice) -> FloatArray:
+        """Products of some columns with each other, the residual first among them, (scales, 1 + c, 1 + c)."""
+        chosen = [0, *range(columns.start, columns.stop)]
+        rest, shared = self.rest[:, chosen], self.shared[:, :, chosen]
+        weighted = np.swapaxes(rest[None] * self.errors.shrink[:, :, None] ** 2, 1, 2)
+        return np.asarray(weighted @ rest - np.swapaxes(shared, 1, 2) @ shared)
+
+    def mean(self, level: int, at: slice, weights: FloatArray) -> FloatArray:
+        """The model's own numbers beside columns with some weights, in prior widths, (k,)."""
+        shared = self.shared[level]
+        return np.asarray(np.linalg.solve(self.lower[level].T, shared[:, 0] - shared[:, at] @ weights))
+
+
 def posterior(errors: ErrorModel, linear: Linear) -> Posterior:
     """Evidence and posterior of the free numbers.
 
@@ -86,28 +123,18 @@ def posterior(errors: ErrorModel, linear: Linear) -> Posterior:
     point counts, and the other scales keep their distance to it.
     """
     width = linear.width
-    offset = linear.residual + linear.jacobian @ linear.theta
-    rotated = errors.basis @ np.column_stack([offset, linear.residual, linear.jacobian * width])
-    prior_cost = float(np.sum((linear.theta / width) ** 2))
-    count, numbers = len(errors.scales), len(width)
-    logs, promised = np.zeros(count), np.zeros(count)
-    means, spreads = np.zeros((count, numbers)), np.zeros((count, numbers, numbers))
-    for index, shrink in enumerate(errors.shrink):
-        white = rotated * shrink[:, None]
-        target, at_point, columns = white[:, 0], white[:, 1], white[:, 2:]
-        lower = np.linalg.cholesky(columns.T @ columns + np.eye(numbers))
-        explained = np.linalg.solve(lower, columns.T @ target)
-        inverse = np.linalg.inv(lower)
-        means[index] = (inverse.T @ explained) * width
-        spreads[index] = (inverse.T @ inverse) * np.outer(width, width)
-        square = float(target @ target - explained @ explained)
-        promised[index] = 0.5 * (float(at_point @ at_point) + prior_cost - square)
-        logs[index] = -0.5 * (square + errors.log_norm[index] + 2.0 * np.log(np.diag(lower)).sum())
-    weighted = logs + errors.log_weights
+    levels = Levels.of(errors, linear, linear.residual)
+    square = levels.product(slice(1, 1))[:, 0, 0]
+    solved = errors.shrink**2 @ levels.rest[:, 1] ** 2 + np.sum((linear.theta / width) ** 2)
+    weighted = -0.5 * (square + errors.log_norm) - levels.half_det + errors.log_weights
     total = float(logsumexp(weighted))
     weights = np.exp(weighted - total)
+    inverse = np.linalg.inv(levels.lower)
+    means = np.einsum("lji,lj->li", inverse, levels.shared[:, :, 0]) * width
     mean = weights @ means
     moved = (means - mean) * np.sqrt(weights)[:, None]
-    covariance = np.tensordot(weights, spreads, 1) + moved.T @ moved
+    spread = np.tensordot(weights, np.swapaxes(inverse, 1, 2) @ inverse, 1)
+    covariance = spread * np.outer(width, width) + moved.T @ moved
     scale = float(np.exp(weights @ np.log(errors.scales)))
-    return Posterior(total - float(promised[int(np.argmax(weights))]), weights, mean, covariance, scale, total)
+    promised = 0.5 * float((solved - square)[int(np.argmax(weights))])
+    return Posterior(total - promised, weights, mean, covariance, scale, total)

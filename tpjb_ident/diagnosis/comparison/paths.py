@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
@@ -26,39 +27,20 @@ class AmplitudePath:
     at: FloatArray  #: (m,): amplitudes, counted from the neutral one, which is among them; rising
     columns: FloatArray  #: (n, 2 m): changes of the prediction there, then its derivatives
 
+    @functools.cached_property
+    def pieces(self) -> CubicHermiteSpline:
+        """Weights of the columns between the ends."""
+        each = np.eye(2 * len(self.at))
+        return CubicHermiteSpline(self.at, *np.split(each, 2))
+
     def weights(self, amplitudes: FloatArray) -> FloatArray:
         """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends."""
-        inside = self._inside(amplitudes)
-        return self._pieces(inside, _VALUE) + (amplitudes - inside)[:, None] * self.slope_weights(inside)
+        inside = np.clip(amplitudes, self.at[0], self.at[-1])
+        return np.asarray(self.pieces(inside) + (amplitudes - inside)[:, None] * self.slope_weights(inside))
 
     def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
         """Weights of the columns in the derivative at some amplitudes, (k, 2 m); `amplitudes` (k,)."""
-        return self._pieces(self._inside(amplitudes), _SLOPE)
-
-    def _inside(self, amplitudes: FloatArray) -> FloatArray:
-        return np.clip(amplitudes, self.at[0], self.at[-1])
-
-    def _pieces(self, inside: FloatArray, basis: FloatArray) -> FloatArray:
-        count = len(self.at)
-        lower = np.clip(np.searchsorted(self.at, inside, side="right") - 1, 0, count - 2)
-        length = self.at[lower + 1] - self.at[lower]
-        u = (inside - self.at[lower]) / length
-        # of value at left, value at right, derivative at left, derivative at right
-        parts = (u[:, None] ** np.arange(4)) @ basis
-        if basis is _VALUE:
-            parts[:, 2:] *= length[:, None]
-        else:
-            parts[:, :2] /= length[:, None]
-        out = np.zeros((len(inside), 2 * count))
-        rows = np.arange(len(inside))
-        for column, at in enumerate((lower, lower + 1, count + lower, count + lower + 1)):
-            out[rows, at] = parts[:, column]
-        return out
-
-
-#: Cubic Hermite pieces by powers of the place within the piece, rows 1, u, u^2, u^3.
-_VALUE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
-_SLOPE = np.array([[0.0, 0, 1, 0], [-6, 6, -4, -2], [6, -6, 3, 3], [0, 0, 0, 0]])
+        return np.asarray(self.pieces(np.clip(amplitudes, self.at[0], self.at[-1]), 1))
 
 
 def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> AmplitudePath:

@@ -25,8 +25,6 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
-#: Nats that put a coarse start before all others.
-_FIRST = 1e6
 
 
 @dataclass(frozen=True)
@@ -93,12 +91,14 @@ class _Search:
         self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Proposal] = {}
         self.paths: tuple[Path, ...] = ()
+        self.whole = True  #: whether paths are known as far as jumps of K and C ask for
+        self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
         self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
 
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
-        nothing = np.zeros(len(self.problem.nuisances))
-        self._fit(Proposal((), nothing, self.problem.scaled(self.problem.columns)), rough=True)
+        stated = self._stated
+        self._fit(Proposal((), stated.theta, stated.jacobian), rough=True)
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
@@ -114,11 +114,29 @@ class _Search:
         """The likeliest proposal; None where none comes near the leader."""
         if self.tried >= self.settings.most_fits:
             return None
-        order = sorted(self.proposals.values(), key=lambda p: -p.estimate)
+        if not (self.whole or self._passed or any(map(self._comes_first, self.proposals.values()))):
+            self._ask_whole_paths()
+        order = sorted(self.proposals.values(), key=lambda p: (not self._comes_first(p), -p.estimate))
         leader = self._leader()
         if leader is not None and leader.posterior.scale <= self.settings.right:
             order = [p for p in order if self._promising(p, leader)]
         return self.proposals.pop(order[0].labels) if order else None
+
+    @property
+    def _passed(self) -> bool:
+        """Whether a fit, tenable or not, has found its way past the jumps of K and C."""
+        return any(fit.posterior.scale <= self.settings.suspect for fit in self.fits.values())
+
+    def _comes_first(self, proposal: Proposal) -> bool:
+        """Whether a start is coarse, and has no clearly better ones: once a fit is past the jumps these have been."""
+        return proposal.coarse and (proposal.estimate >= self.clear or (self.whole and not self._passed))
+
+    def _ask_whole_paths(self) -> None:
+        """Ask for every path to both of its ends, where no fit got past the jumps that may lie on them."""
+        self.whole = True
+        for end in (-1.0, 1.0):
+            self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
+        self._propose_alone()
 
     def _promising(self, proposal: Proposal, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a right leader, or by a fault beside it."""
@@ -159,7 +177,8 @@ class _Search:
         known = self.fits.get(proposal.labels)
         if known is not None and known.posterior.total >= fit.posterior.total:
             return
-        self.fits[proposal.labels], self.estimates[proposal.labels] = fit, proposal.estimate
+        self.fits[proposal.labels] = fit
+        self.estimates[proposal.labels] = math.inf if proposal.coarse else proposal.estimate
         if fit.faults and self._near(fit, fit.posterior.total, self.settings.near):
             self._propose_neighbours(fit)
 
@@ -183,31 +202,47 @@ class _Search:
         return math.log(self.settings.prior[len(faults)] / spread) + terms * math.log(self.settings.term)
 
     def _propose_singles(self) -> None:
-        """Every fault by itself, from the baseline as stated."""
+        """Every fault by itself, from the baseline as stated; the paths of those that lead are asked for further on."""
+        self.paths = lay_paths(self.run, self.problem)
+        self._follow(self._singles())
+        if self._propose_alone() > self.settings.suspect:  # a jump hides what lies behind it
+            self.whole = False
+            self._follow(self._singles(coarse=True))
+            self._propose_alone()
+
+    def _lengthen(self, sizes: Sequence[float]) -> None:
+        self.paths = lengthened(self.run, self.problem, self.paths, sizes)
+
+    def _follow(self, leading: Sequence[Score]) -> None:
+        """Ask for more of the paths that lead, towards where they lead."""
+        labels = list(dict.fromkeys(score.path.fault.label for score in leading))[: Deciding.followed]
+        sizes = {id(score.path): float(score.amplitudes[0]) for score in leading if score.path.fault.label in labels}
+        self._lengthen([sizes.get(id(path), 0.0) for path in self.paths])
+
+    @property
+    def _stated(self) -> Point:
         problem = self.problem
-        columns = problem.scaled(problem.columns)
-        nothing = np.zeros(columns.shape[1])
-        base = problem.scaled(problem.base)
-        linear = Linear(problem.measured - base, nothing, columns, np.ones(columns.shape[1]))
-        self.paths = lay_paths(self.run, problem)
-        strain = self.fits[frozenset()].strain
-        first = scores(problem.errors, linear, self.paths, strain)
-        suspect = self.settings.suspect
-        leading = list(dict.fromkeys(score.path.fault.label for score in first))[: Deciding.followed]
-        sizes = {id(score.path): float(score.amplitudes[0]) for score in first if score.path.fault.label in leading}
-        self.paths = lengthened(self.run, problem, self.paths, [sizes.get(id(path), 0.0) for path in self.paths])
-        singles = scores(problem.errors, linear, self.paths, strain)
-        for end in (-1.0, 1.0) if singles and singles[0].scale > suspect else ():  # a jump hides what lies behind it
-            ends = [end * float(path.fault.width[0]) for path in self.paths]
-            self.paths = lengthened(self.run, problem, self.paths, ends)
-            singles = scores(problem.errors, linear, self.paths, strain)
-        stated = Point(nothing, base, columns)
+        return Point(np.zeros(len(problem.nuisances)), problem.scaled(problem.base), problem.scaled(problem.columns))
+
+    def _singles(self, coarse: bool = False) -> list[Score]:
+        """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
+        errors, stated = self.problem.errors, self._stated
+        width = np.full(len(stated.theta), self.settings.held if coarse else 1.0)
+        linear = Linear(self.problem.measured - stated.prediction, stated.theta, stated.jacobian, width)
+        return scores(errors.coarse if coarse else errors, linear, self.paths, self.fits[frozenset()].strain)
+
+    def _propose_alone(self) -> float:
+        """Propose every fault by itself, with coarse starts where the likeliest is surely wrong; its scale."""
+        singles = self._singles()
+        scale = singles[0].scale if singles else 0.0
         for score in singles:
-            self._propose(score, (), stated)
-        if singles and singles[0].scale > suspect:
-            held = Linear(linear.residual, nothing, columns, np.full(len(nothing), self.settings.held))
-            for score in scores(problem.errors.coarse, held, self.paths, strain)[: self.settings.coarse]:
-                self._propose(score, (), stated, coarse=True)
+            self._propose(score, (), self._stated)
+        if scale > self.settings.suspect:
+            rough = self._singles(coarse=True)[: self.settings.coarse]
+            for score in rough:
+                self._propose(score, (), self._stated, coarse=True)
+            self.clear = rough[0].total - self.settings.mistaken
+        return scale
 
     def _propose_neighbours(self, fit: Fit) -> None:
         """One fault more, and one less."""
@@ -231,7 +266,7 @@ class _Search:
             return
         fault = score.path.fault.turned()
         faults = (*faults, fault)
-        estimate = score.total + self._log_prior(faults) + (_FIRST if coarse else 0.0)
+        estimate = score.total + self._log_prior(faults)
         if score.p < self.settings.untenable:  # it would have to be a step on the way
             estimate -= self.settings.near
         theta, jacobian = point.theta, point.jacobian
@@ -264,8 +299,8 @@ class _Search:
     def _offer(self, proposal: Proposal) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
-        better = fit is None or proposal.estimate > self._log_probability(fit) + Deciding.better
-        if better and (known is None or known.estimate < proposal.estimate):
+        better = fit is None or proposal.coarse or proposal.estimate > self._log_probability(fit) + Deciding.better
+        if better and (known is None or (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)):
             self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -126,12 +126,13 @@ class Forward:
     elements: tuple[Element, ...] = field(repr=False)
     cache: ModelCache = field(default_factory=ModelCache, repr=False)
     _shares: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)
+    last: Change | None = None  #: of a rig that a test itself has changed, after effects and nuisances
 
     def __call__(self, effects: Sequence[Effect] = (), change: Change | None = None) -> FloatArray:
         """Predict, (n,)."""
         setup = apply_effects(self.setup, effects)
-        if change is not None:
-            setup = change(setup)
+        for done in (change, self.last):
+            setup = setup if done is None else done(setup)
         table = _PredictedTable(setup)
         for test in self.layout.dynamic:
             point = (test.load, test.direction, test.speed)
@@ -150,7 +151,7 @@ class Forward:
 
     def fresh(self) -> Forward:
         """Return a copy that knows what this one knows now, whatever this one goes on to solve."""
-        return Forward(self.setup, self.layout, self.elements, self.cache.copy(), dict(self._shares))
+        return replace(self, cache=self.cache.copy(), _shares=dict(self._shares))
 
     def pad_shares(self) -> FloatArray:
         """Share of the static load on the pad of every temperature element at the last call; NaN elsewhere, (n,)."""

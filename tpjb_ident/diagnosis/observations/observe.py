@@ -169,6 +169,10 @@ class _Builder:
         self.covariance.append(covariance[np.ix_(finite, finite)])
         self.kept = finite
 
+    def observed(self, layout: Layout) -> Observations:
+        value, sigma = np.array(self.value), np.array(self.sigma)
+        return Observations(layout, value, block_diag(*self.covariance), sigma, tuple(self.elements))
+
 
 def observe(
     identification: Identification,
@@ -185,11 +189,7 @@ def observe(
     usable = [c for c in curves if c.valid_from < c.valid_to < math.inf]
     dry = tuple(_add_dry(builder, curve, tolerance) for curve in usable)
     push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
-    layout = Layout(dynamic, locus_tests, dry, push)
-    return Observations(
-        layout, np.array(builder.value), block_diag(*builder.covariance), np.array(builder.sigma),
-        tuple(builder.elements),
-    )  # fmt: skip
+    return builder.observed(Layout(dynamic, locus_tests, dry, push))
 
 
 def _add_dynamic(builder: _Builder, identification: Identification, tolerance: Tolerance) -> tuple[DynamicTest, ...]:
@@ -326,7 +326,7 @@ def _largest_gap(angle: FloatArray) -> float:
 def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
     """Read a table of coefficients."""
     tolerance = tolerance or Tolerance()
-    rows: list[tuple[Element, float, float, float]] = []
+    builder = _Builder()
     tests: dict[tuple[float, float, float], list[float]] = {}
     for entry in read_coefficients(path, reading_error):
         point = entry.point
@@ -339,10 +339,7 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
             direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
             scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))
             least = Deciding.axis * scale * (reading_error or 0.0)
-            for name, (value, error) in part_coefficients.items():
-                sigma = max(factor * error, least)
-                rows.append((Element("h", name, where), factor * value, sigma, tolerance.stiffness * scale))
-    dynamic = tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())
-    value, error, sigma = np.array([row[1:] for row in rows]).T
-    elements = tuple(row[0] for row in rows)
-    return Observations(Layout(dynamic), value, np.diag(error**2), sigma, elements)
+            elements = [Element("h", name, where) for name in part_coefficients]
+            value, error = factor * np.array(list(part_coefficients.values())).reshape(-1, 2).T
+            builder.add(elements, value, np.diag(np.maximum(error, least) ** 2), tolerance.stiffness * scale)
+    return builder.observed(Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())))

@@ -153,13 +153,13 @@ def _term_parameters(fault: Fault, amplitudes: FloatArray, errors: FloatArray) -
 
 def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:
     """Effects that this campaign could not have seen at a typical size."""
-    factor = usual_factor(problem.observations, problem.columns)
+    paths = [path for path in comparison.paths if not path.fault.is_term]
+    rows = [problem.sigma * (path.neutral_slope @ path.fault.width) for path in paths]
+    typical = np.reshape(rows, (-1, len(problem.sigma))).T
+    white = np.linalg.solve(usual_factor(problem.observations, problem.columns), typical / settings.width)
     sizes: dict[str, float] = {}
-    for path in comparison.paths:
-        if not path.fault.is_term:
-            typical = problem.sigma * (path.neutral_slope @ path.fault.width) / settings.width
-            size = float(np.linalg.norm(np.linalg.solve(factor, typical)))
-            sizes[path.fault.name] = max(sizes.get(path.fault.name, 0.0), size)
+    for path, size in zip(paths, np.linalg.norm(white, axis=0), strict=True):
+        sizes[path.fault.name] = max(sizes.get(path.fault.name, 0.0), float(size))
     beyond = [d.name for d in comparison.best.tolerances if abs(d.significance) > settings.visible]
     far = {n.effect.split()[0] for n in problem.nuisances if f"{n.name} {n.place}".strip() in beyond and n.effect}
     names = comparison.best.names | far

@@ -1,0 +1,122 @@
+"""Explanations are fitted in the order of their scores, until none comes near the leader."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from model.effects import Effect, known_effects
+from tests.diagnosis.rocker_case import noisy, rocker_setup, whole_layout
+from tpjb_ident.diagnosis.comparison import search
+from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Linear, posterior
+from tpjb_ident.diagnosis.comparison.paths import Path
+from tpjb_ident.diagnosis.comparison.scores import Strain, scores
+from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.diagnosis.diagnose import diagnose, pose
+from tpjb_ident.diagnosis.forward.forward import Forward
+from tpjb_ident.diagnosis.forward.workers import workers
+from tpjb_ident.diagnosis.planned import planned_observations
+
+TRIED = frozenset({"oil_viscosity", "probe_gain", "loadcell_gain", "probe_rotation", "channel_delay"})
+
+
+def linear_case(scales):
+    """A model of five numbers beside noise and a smooth error, and three columns that a fault may take."""
+    rng = np.random.default_rng(8)
+    smooth = rng.normal(size=(40, 4))
+    errors = ErrorModel(0.1 * np.eye(40), smooth @ smooth.T + 0.01 * np.eye(40), np.array(scales))
+    jacobian, columns = rng.normal(size=(40, 5)), rng.normal(size=(40, 3))
+    width, theta = np.array([1.0, 1.0, 0.5, 2.0, 1.0]), 0.1 * rng.normal(size=5)
+    residual = columns[:, 1] * 1.5 + rng.normal(size=40)
+    return errors, Linear(residual, theta, jacobian, width), columns
+
+
+def straight(column, name="x"):
+    end = np.full(1, 1e6)
+    fault = SimpleNamespace(width=np.full(1, 3.0), origin=np.zeros(1), low=-end, high=end, label=name)
+    return Path(fault, column[:, None])
+
+
+def test_evidence_is_the_density_of_what_was_observed_with_all_numbers_integrated_out():
+    errors, linear, _ = linear_case([0.3, 1.0, 4.0])
+    wide = linear.jacobian * linear.width
+    offset = linear.residual + linear.jacobian @ linear.theta
+    logs = []
+    for index in range(3):
+        whole = errors.covariance(index) + wide @ wide.T
+        square = offset @ np.linalg.solve(whole, offset)
+        logs.append(-0.5 * (square + np.linalg.slogdet(2.0 * np.pi * whole)[1]) + errors.log_weights[index])
+    assert posterior(errors, linear).promised == pytest.approx(np.logaddexp.reduce(logs), abs=1e-9)
+
+
+def test_a_score_is_the_evidence_of_the_model_with_the_fault():
+    errors, linear, columns = linear_case([1.0])
+    nothing = Strain(np.zeros((0, 5)), np.zeros(0))
+    found = scores(errors, linear, [straight(column, k) for k, column in enumerate(columns.T)], nothing)
+    assert found[0].path.fault.label == 1
+    for score in found:
+        wider = Linear(
+            linear.residual, np.append(linear.theta, 0.0), np.column_stack([linear.jacobian, score.path.columns]),
+            np.append(linear.width, 3.0),
+        )  # fmt: skip
+        whole = posterior(errors, wider)
+        assert score.total == pytest.approx(whole.promised, abs=1e-9)
+        assert score.amplitudes[0] == pytest.approx(whole.mean[-1], rel=1e-9)
+    assert [s.total for s in found] == sorted((s.total for s in found), reverse=True)
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """A rig whose oil is a fifth thinner than its file says, and few effects to be told apart."""
+    setup = rocker_setup(accuracy=1e-5)
+    planned = planned_observations(setup, whole_layout((2500.0, 7500.0)))
+    forward = Forward(setup, planned.layout, planned.elements)
+    hidden = forward.fresh()([Effect("oil_viscosity", factor=0.8)])
+    skipped = frozenset(known_effects()) - TRIED
+    return forward, pose(noisy(planned, hidden, 3), forward, DiagnoseSettings(workers=1, skip=skipped)), skipped
+
+
+def fits_of(campaign, monkeypatch, **changed):
+    """Every proposal that was fitted, with the largest estimate that waited, and what came out."""
+    forward, problem, skipped = campaign
+    fitted_in_order, fit = [], search._Search._fit
+
+    def recorded(self, proposal, rough=False):
+        waiting = [p.estimate for p in self.proposals.values()]
+        fitted_in_order.append((proposal, max(waiting, default=-np.inf)))
+        fit(self, proposal, rough)
+
+    monkeypatch.setattr(search._Search, "_fit", recorded)
+    settings = DiagnoseSettings(workers=1, skip=skipped, **changed)
+    with workers(forward, problem, 1) as run:
+        return fitted_in_order, search.compare(run, problem, settings)
+
+
+@pytest.mark.slow  # seconds: the bearing model itself
+def test_the_likeliest_explanation_is_fitted_first_and_no_hopeless_one_at_all(campaign, monkeypatch):
+    order, comparison = fits_of(campaign, monkeypatch)
+    assert comparison.best.names == {"oil_viscosity"}
+    assert [sorted(p.labels) for p, _ in order[:2]] == [[], ["oil_viscosity"]]
+    assert all(p.estimate >= waiting for p, waiting in order[1:] if not p.coarse)
+    assert len(order) <= 4
+
+
+@pytest.mark.slow
+def test_what_is_left_out_would_not_have_changed_the_answer(campaign, monkeypatch):
+    few, quick = fits_of(campaign, monkeypatch)
+    monkeypatch.undo()
+    monkeypatch.setattr(search._Search, "_promising", lambda *_: True)
+    many, whole = fits_of(campaign, monkeypatch, near=1e3, most_fits=8)
+    assert len(many) == 8 > len(few)
+    assert whole.best.labels == quick.best.labels
+    assert whole.probability(whole.best) == pytest.approx(quick.probability(quick.best), abs=0.01)
+    left_out = [f for f in whole.fits if f.labels not in {fit.labels for fit in quick.fits}]
+    assert sum(whole.probability(fit) for fit in left_out) < 0.01
+
+
+@pytest.mark.slow
+def test_without_an_effect_in_the_library_none_is_below_the_floor_or_named(campaign):
+    forward, problem, _ = campaign
+    settings = DiagnoseSettings(workers=1, skip=frozenset(known_effects()))
+    verdict = diagnose(problem.observations, forward.setup, settings).verdict
+    assert (verdict.verdict, verdict.effects, verdict.below_floor) == ("unexplained", (), ())
