@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
@@ -114,10 +115,9 @@ def _images_of(
     least = np.maximum(_CLEAR * floor, _SHARE * size)
     if not np.isfinite(least).all() or size <= 0:
         return None
-    inside = amplitude[1:-1]
-    top = (inside > least[1:-1]) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
-    peaks = np.flatnonzero(top) + 1
-    peaks = peaks[(peaks > 1.2 * frequency * record.duration) & _is_free(peaks, record)]
+    peaks = find_peaks(amplitude)[0]
+    peaks = peaks[(amplitude > least)[peaks] & (peaks > 1.2 * frequency * record.duration)]
+    peaks = peaks[_is_free(peaks, record)]
     for low in peaks[np.argsort(-amplitude[peaks])][:_TRIED]:
         rate = low / record.duration + frequency
         mirror = record.rate - (rate + frequency) if rate + frequency > record.rate / 2 else rate + frequency
