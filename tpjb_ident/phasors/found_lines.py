@@ -35,7 +35,7 @@ def unexpected_lines(
 
     `images` (m,): frequencies at which lines stand that are none [Hz].
     """
-    whole = np.array([line.frequency for line in result.lines.whole])
+    whole = result.lines.whole_frequencies
     frequencies: list[float] = []
     for quantity in ("force", "displacement"):
         places = result.pick(quantity)
@@ -46,7 +46,7 @@ def unexpected_lines(
                 columns = [k for k, place in enumerate(record.places) if place in places]
                 if columns:
                     frequencies += _peaks(record, columns, np.append(whole, frequencies), smallest)
-    top = REACH * max(line.frequency for line in result.lines.excitation)
+    top = REACH * max(result.lines.driven)
     apart = _LOBE / records[0].duration
     frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > apart]
     strange = tuple(sorted(f for f in frequencies if f not in whole))[:MAX_LINES]

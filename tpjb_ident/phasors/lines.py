@@ -8,6 +8,7 @@ window; what is faint in the whole record alone, unless it stands out there.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +53,16 @@ class LineSet:
         return np.array([line.frequency for line in self.excitation + self.nuisance])
 
     @property
+    def whole_frequencies(self) -> FloatArray:
+        """Frequencies of the whole record's lines [Hz], (n_whole_lines,)."""
+        return np.array([line.frequency for line in self.whole])
+
+    @property
+    def driven(self) -> tuple[float, ...]:
+        """Frequencies of the excitation [Hz]."""
+        return tuple(line.frequency for line in self.excitation)
+
+    @property
     def found(self) -> tuple[float, ...]:
         """Frequencies of lines that nobody mentioned [Hz]."""
         return tuple(line.frequency for line in self.nuisance if line.name == "found")
@@ -68,19 +79,19 @@ class LineSet:
 
     def faster(self, rate: float) -> LineSet:
         """The same lines by a clock that lets them turn faster, relative."""
-        groups = [
-            tuple(replace(line, frequency=line.frequency * (1 + rate)) for line in lines)
-            for lines in (self.excitation, self.nuisance, self.faint)
-        ]
-        return replace(self, excitation=groups[0], nuisance=groups[1], faint=groups[2])
+        return self._moved(lambda line: rate * line.frequency)
 
     def at_speed(self, speed: float) -> LineSet:
         """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
-        moved = [
-            tuple(replace(line, frequency=line.frequency + line.order * (speed - self.speed)) for line in lines)
-            for lines in (self.nuisance, self.faint)
-        ]
-        return replace(self, nuisance=moved[0], faint=moved[1], speed=speed)
+        return replace(self._moved(lambda line: line.order * (speed - self.speed)), speed=speed)
+
+    def _moved(self, by: Callable[[Line], float]) -> LineSet:
+        """The same lines, each moved in frequency [Hz]."""
+        excitation, nuisance, faint = (
+            tuple(replace(line, frequency=line.frequency + by(line)) for line in lines)
+            for lines in (self.excitation, self.nuisance, self.faint)
+        )
+        return replace(self, excitation=excitation, nuisance=nuisance, faint=faint)
 
 
 @dataclass(frozen=True)

@@ -140,7 +140,7 @@ class _Inspection:
         near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
         beside = tuple(frequency for frequency in near if frequency is not None)
         if beside:
-            exact = tuple(line.frequency for line in lines.excitation)
+            exact = lines.driven
             self._fit(self._lines(exact, lines.speed, (*lines.found, *beside)), self.follow)
             self.conditions += (lines_beside(beside),)
 
