@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from rigdata.problem import RigDataError
+from tpjb_ident.phasors import run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import oil_force
+from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
 from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
@@ -122,3 +126,12 @@ def test_inertia_is_added_to_the_cell_force():
     np.testing.assert_allclose(f, [[85.0, 60.0]])
     with pytest.raises(ValueError, match="housing mass"):
         oil_force(np.zeros((1, 2), complex), np.zeros((1, 2), complex), float("nan"))
+
+
+def test_a_time_column_in_the_wrong_unit_is_named_with_file_and_cure():
+    """Milliseconds called seconds make a record of one sample a second."""
+    run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, length=4000)
+    inspection = object.__new__(run_phasors._Inspection)
+    inspection.run, inspection.settings = run, PhasorSettings()
+    with pytest.raises(RigDataError, match=r"r1.csv, time: 1 samples per second .* 35 Hz.*ms called s"):
+        inspection._lines((35.0,), 20.0, ())

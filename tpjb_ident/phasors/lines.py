@@ -17,6 +17,8 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 
+#: Highest line that a record shows, over its sample rate.
+HIGHEST = 0.45
 #: How far the mains and the shaft's speed may be from what is stated [Hz].
 MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
@@ -114,7 +116,7 @@ def known_lines(
 ) -> LineSet:
     """Collect the lines of one run; coinciding ones are one, named in the order excitation, shaft, mains, others."""
     settings = settings or LineSettings()
-    top, apart = 0.45 * rate, ONE_LINE / duration
+    top, apart = HIGHEST * rate, ONE_LINE / duration
     if not excitation or not all(0.0 < f < top for f in excitation):
         raise BadInputError(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"
