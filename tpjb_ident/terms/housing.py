@@ -59,7 +59,8 @@ class Housing(Term):
                 Parameter("c_xx", "nm/N", SOFT, usual),
                 Parameter("c_yy", "nm/N", SOFT, usual),
                 Parameter("c_xy", "nm/N", across),
-                Parameter("loss", "1", loss),
+                # what cells without static part lead by beyond a mount's loss is their corner's
+                Parameter("loss", "1", loss if rig.static else _LOSS / 2),
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
