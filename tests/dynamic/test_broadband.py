@@ -19,7 +19,7 @@ from tests.studies.band_coverage import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.classic import classic_line
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
-from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.identification.identify import identify
@@ -435,10 +435,22 @@ def test_one_phase_set_is_told_from_several():
     assert not one_phase_set(other)
 
 
+def test_tones_are_the_lines_that_are_driven():
+    rng = np.random.default_rng(9)
+
+    def run(*places):
+        D = 1e-3 * _complex(rng, (8, 60, 2))
+        D[:, list(places)] += np.exp(1j * rng.uniform(0, 6, len(places)))[:, None] * [1.0, 0.3]
+        return spectra(D, D)
+
+    assert tones([run(30, 37), run(30, 37)]) == 2
+    assert tones([run(30, 37), run(15, 28, 43)]) == 3
+
+
 @pytest.mark.parametrize(
     ("kind", "rms", "peak", "one_sided", "share"),
     [("random", 0.08, 0.3, 0.0, 0.128), ("multisine", 0.01, 0.03, 0.0, 0.002), ("impact", 0.01, 0.06, 1.0, 0.108),
-     ("impact", 0.01, 0.02, 0.0, 0.002), ("random", 0.002, 0.01, 0.0, 0.0)],
+     ("pair", 0.06, 0.1, 0.0, 0.036), ("impact", 0.01, 0.02, 0.0, 0.002), ("random", 0.002, 0.01, 0.0, 0.0)],
 )  # fmt: skip
 def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_sided, share):
     assert band_change(kind, rms, peak, one_sided) == pytest.approx(share)
