@@ -19,7 +19,7 @@ from tests.studies.band_coverage import true_parameters
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.broadband.classic import classic_line
 from tpjb_ident.dynamic.broadband.period import find_period, resampled
-from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
 from tpjb_ident.dynamic.broadband.samples import Samples
 from tpjb_ident.identification.identify import identify
@@ -188,7 +188,7 @@ def test_a_period_need_not_hold_a_whole_number_of_samples(true):
     wave = np.sum(np.cos(2 * np.pi * np.outer(t, k) / true + phases), axis=1)
     rows = np.stack([wave, 0.5 * wave]) + 0.1 * rng.standard_normal((2, n))
     samples = Samples(rate, CHANNELS, np.concatenate([rows, rows]), None, None)
-    found = find_period(samples, (9.0, 121.0), np.zeros(n // 2 + 1, dtype=bool))
+    found = find_period(samples, (9.0, 121.0), (), 0.5)
     assert found is not None
     assert found == pytest.approx(true, abs=0.01)
     whole = resampled(samples, found, 121.0)
@@ -196,11 +196,47 @@ def test_a_period_need_not_hold_a_whole_number_of_samples(true):
     assert np.std(folded[2] - folded[3]) < 0.2
 
 
-def test_noise_that_does_not_repeat_has_no_period():
-    rng = np.random.default_rng(5)
-    rows = rng.standard_normal((2, 4000))
+@pytest.mark.parametrize("tones", [(30.0, 37.0), (15.0, 28.0, 43.0, 72.0)])
+@pytest.mark.parametrize(("weak", "noise"), [(1.0, 0.02), (0.15, 0.02), (0.0, 0.5)])
+def test_few_tones_have_beats_that_are_no_period(tones, weak, noise):
+    """30 and 37 Hz all but repeat after 0.133 s, and one of them alone does; the band may end at the tones."""
+    rng = np.random.default_rng(4)
+    t = np.arange(8000) / 1000.0
+    first, second = (np.cos(2 * np.pi * np.array(f)[:, None] * t).sum(axis=0) for f in (tones[::2], tones[1::2]))
+    rows = np.stack([first + weak * second, weak * first + second, first, 0.8 * first + weak * second])
+    samples = Samples(1000.0, CHANNELS, rows + noise * rng.standard_normal(rows.shape), None, None)
+    assert find_period(samples, (tones[0], tones[-1]), (), 0.5) == pytest.approx(1000.0, abs=0.1)
+
+
+@pytest.mark.parametrize("shaft", [22.0, 22.13])
+def test_the_shafts_line_does_not_turn_the_period(shaft):
+    """A sweep of exactly 2 s, six times; 1X is stronger than the sweep and not locked to it."""
+    t = np.arange(12000) / 1000.0
+    sweep = np.cos(2 * np.pi * (10 * (t % 2) + 20 * (t % 2) ** 2))
+    rows = np.stack([sweep, 0.5 * sweep]) + 3 * np.cos(2 * np.pi * shaft * t)
     samples = Samples(1000.0, CHANNELS, np.concatenate([rows, rows]), None, None)
-    assert find_period(samples, (10.0, 120.0), np.zeros(2001, dtype=bool)) is None
+    assert find_period(samples, (10.0, 90.0), (Line("1X", shaft, 0.08),), 0.5) == pytest.approx(2000.0, abs=0.004)
+
+
+def test_an_idle_command_and_noise_as_strong_as_the_tones_leave_the_period():
+    rng = np.random.default_rng(6)
+    t = np.arange(10000) / 1000.0
+    wave = np.cos(2 * np.pi * np.outer(np.arange(10, 90, 2) + 0.5, t) + rng.uniform(0, 6, (40, 1))).sum(axis=0)
+    command = np.stack([wave, 1e-3 * rng.standard_normal(len(t))])
+    rows = np.tile(wave, (4, 1)) + 8 * rng.standard_normal((4, len(t)))
+    driven = Samples(1000.0, CHANNELS, rows, command, None)
+    assert find_period(driven, (10.0, 90.0), (), 0.5) == pytest.approx(2000.0, abs=0.01)
+    assert find_period(replace(driven, command=None), (10.0, 90.0), (), 1.0) == pytest.approx(2000.0, abs=0.3)
+
+
+@pytest.mark.parametrize("seconds", [0.4, 1.0, 4.0])
+@pytest.mark.parametrize("band", [(10.0, 120.0), (20.0, 40.0)])
+def test_noise_that_does_not_repeat_has_no_period(seconds, band):
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        x = rng.standard_normal((2, round(1000 * seconds)))
+        samples = Samples(1000.0, CHANNELS, np.concatenate([x, [[1.0, 0.2], [-0.1, 1.5]] @ x]), None, None)
+        assert find_period(samples, band, (), 1.0) is None
 
 
 @pytest.mark.slow
@@ -399,10 +435,22 @@ def test_one_phase_set_is_told_from_several():
     assert not one_phase_set(other)
 
 
+def test_tones_are_the_lines_that_are_driven():
+    rng = np.random.default_rng(9)
+
+    def run(*places):
+        D = 1e-3 * _complex(rng, (8, 60, 2))
+        D[:, list(places)] += np.exp(1j * rng.uniform(0, 6, len(places)))[:, None] * [1.0, 0.3]
+        return spectra(D, D)
+
+    assert tones([run(30, 37), run(30, 37)]) == 2
+    assert tones([run(30, 37), run(15, 28, 43)]) == 3
+
+
 @pytest.mark.parametrize(
     ("kind", "rms", "peak", "one_sided", "share"),
     [("random", 0.08, 0.3, 0.0, 0.128), ("multisine", 0.01, 0.03, 0.0, 0.002), ("impact", 0.01, 0.06, 1.0, 0.108),
-     ("impact", 0.01, 0.02, 0.0, 0.002), ("random", 0.002, 0.01, 0.0, 0.0)],
+     ("pair", 0.06, 0.1, 0.0, 0.036), ("impact", 0.01, 0.02, 0.0, 0.002), ("random", 0.002, 0.01, 0.0, 0.0)],
 )  # fmt: skip
 def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_sided, share):
     assert band_change(kind, rms, peak, one_sided) == pytest.approx(share)

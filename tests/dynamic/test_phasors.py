@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from rigdata.problem import RigDataError
+from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.phasors.run_data import oil_force
+from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
 from tpjb_ident.phasors.windows import (
     RecordTooShortError,
     WindowSettings,
@@ -122,3 +126,36 @@ def test_inertia_is_added_to_the_cell_force():
     np.testing.assert_allclose(f, [[85.0, 60.0]])
     with pytest.raises(ValueError, match="housing mass"):
         oil_force(np.zeros((1, 2), complex), np.zeros((1, 2), complex), float("nan"))
+
+
+def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
+    """The samples present are fitted by the normal equations less the missing ones: 20 times quicker, and exact."""
+    rng = np.random.default_rng(8)
+    fitter = LineFitter(2000, 1000.0, np.array([20.0, 35.0, 70.0]))
+    rows = rng.standard_normal((3, 2, 8)) @ fitter.design.T + 0.1 * rng.standard_normal((3, 2, 2000))
+    spoiled = rows.copy()
+    spoiled[0, 0, 300:420] = np.nan
+    spoiled[1, 1, 900:960] = np.nan
+    spoiled[1, 1, [100, 1500]] += 9.0
+    spoiled[2, 0, 100:800] = np.nan
+    calls = []
+    robust = line_fit.robust_fit
+    monkeypatch.setattr(line_fit, "robust_fit", lambda *parts: calls.append(1) or robust(*parts))
+    fit, residual = fitter.fit_with_residual(spoiled, np.zeros(2))
+    assert len(calls) == 1  # a third of a window is missing: the few are no longer few
+    for k, i, bad in ((0, 0, []), (1, 1, [100, 1500]), (2, 0, [])):
+        used = np.isfinite(spoiled[k, i])
+        used[bad] = False
+        exact = np.linalg.lstsq(fitter.design[used], spoiled[k, i][used], rcond=None)[0]
+        assert np.allclose(fit.z[i, :, k], exact[0:6:2] + 1j * exact[1:6:2], rtol=1e-9)
+        assert fit.lost[i, k] == pytest.approx(1 - used.mean())
+        assert not residual[k, i][~used].any()
+
+
+def test_a_time_column_in_the_wrong_unit_is_named_with_file_and_cure():
+    """Milliseconds called seconds make a record of one sample a second."""
+    run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, length=4000)
+    inspection = object.__new__(run_phasors._Inspection)
+    inspection.run, inspection.settings = run, PhasorSettings()
+    with pytest.raises(RigDataError, match=r"r1.csv, time: 1 samples per second .* 35 Hz.*ms called s"):
+        inspection._lines((35.0,), 20.0, ())

@@ -71,6 +71,7 @@ class Case:
     shaft: float = 0.0  #: runout, relative to the probes' usual reading
     bent: float = 0.0  #: change of H by the usual motion
     bent_told: float = 0.0  #: what the harmonics let expect of it
+    corner: float = 0.0  #: Hz: of cells that show no static force
     crosstalk: float = 0.0  #: share of the second cell in the first
 
 
@@ -97,7 +98,7 @@ def made(case: Case, seed: int = 0) -> tuple[Rig, Blocks, np.ndarray]:
     """Rig, blocks, and the true H of every point (P, 2, 2)."""
     rng = np.random.default_rng([38, seed])
     sensors = sensors_of(case)
-    rig = Rig(sensors, MASS, case.mass_uncertainty * MASS, case.mount)
+    rig = Rig(sensors, MASS, case.mass_uncertainty * MASS, case.mount, static=not case.corner)
     points = [OperatingPoint(w, -math.pi / 2, 138.0, 2 * math.pi * f) for f in case.hertz for w in case.loads]
     point = np.repeat(np.arange(len(points)), case.directions * len(case.sizes))
     n, m = len(point), len(sensors)
@@ -203,7 +204,8 @@ def _factor(case, sensors, omega, temperature) -> np.ndarray:
     drift = np.array([case.drift.get(sensor.name, 0.0) for sensor in sensors])
     away = temperature - temperature.mean()
     exponent = gain - 1j * omega[:, None] * (late + fast * MIDDLE) + away[:, None] * drift
-    return np.exp(exponent)
+    cells = np.array([sensor.quantity == "force" for sensor in sensors])
+    return np.exp(exponent) / (1 - 2j * np.pi * case.corner / omega[:, None] * cells)
 
 
 def solved(rig: Rig, blocks: Blocks, truth: np.ndarray, *more, without=(), seed: int = 1) -> Solution:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved
+from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved, terms_of
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.temperature import Temperature
@@ -101,6 +101,33 @@ def test_a_delay_is_told_by_the_housing_s_equations(mount, seed):
     assert held(solution, truth)
     ignored = solved(replace(rig, sensors=tuple(replace(s, delay_uncertainty=0.0) for s in rig.sensors)), blocks, truth)
     assert np.abs(away(ignored, truth)).max() > np.abs(away(solution, truth)).max()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("accelerometers", [True, False])
+def test_a_low_corner_that_nobody_states_stands_in_the_interval(seed, accelerometers):
+    """Charge-coupled cells at one frequency: the springs' loss would explain the lead as well."""
+    case = Case(corner=0.6, hertz=(15.0,), accelerometers=accelerometers)
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    assert held(solution, truth, 2.5)
+    ignored = solved(replace(rig, static=True), blocks, truth)
+    assert np.abs(away(ignored, truth)).max() > 8
+    said = replace(rig, sensors=tuple(replace(s, corner_stated=True) for s in rig.sensors))
+    assert not any(term.parameters for term in terms_of(said, blocks) if term.name == "corner")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("corner", [0.3, 0.8])
+def test_two_frequencies_tell_the_corner_by_the_housing_s_equations(seed, corner):
+    case = Case(corner=corner, hertz=(10.0, 60.0), noise=3e-4)
+    rig, blocks, truth = made(case, seed)
+    solution = solved(rig, blocks, truth)
+    assert told(of(solution, "corner"), corner)
+    assert of(solution, "corner").deviation[0] < 0.1
+    assert held(solution, truth)
+    term = next(t for t in terms_of(rig, blocks) if t.name == "corner")
+    assert "low corner" in term.words(of(solution, "corner"))[0]
 
 
 def test_a_delay_of_the_probes_is_considered_where_cells_carry_the_housing():

@@ -77,7 +77,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     of_kind["dynamic"] = [s for s in dynamic if s.run.excitation_kind == "sine"]
     for observation in observations:
         check_speed(observation)
-    check_static_loads(observations)
+    static = check_static_loads(observations)
     check_positions(observations)
     check_magnitudes(observations, campaign.housing_mass)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
@@ -89,7 +89,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
     _check_duplicates(observations)
-    fit = rig_fit(campaign, dynamic)
+    fit = rig_fit(campaign, dynamic, static)
     if fit is None:
         return observations, ()
     check_accelerometers(fit)

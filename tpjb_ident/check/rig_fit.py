@@ -22,6 +22,7 @@ from tpjb_ident.estimate.sensors import alive, axes_of, found_mount, sensors_of
 from tpjb_ident.estimate.shape import free_force
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.axis import Axis
+from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import Housing
@@ -47,8 +48,8 @@ class RigFit:
     solution: Solution = field(repr=False)
 
 
-def rig_fit(campaign: Campaign, runs: Sequence[Observation]) -> RigFit | None:
-    """Fit the terms to all lines of dynamic runs; None where they are too few."""
+def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True) -> RigFit | None:
+    """Fit the terms to all lines of dynamic runs; None where they are too few; `static`: cells show the static load."""
     clear = [o for o in runs if "force" not in o.report.doubts and excited(o)]
     lines = [(observation, omega, row) for observation in clear for omega, row in observation.phasors]
     if len(lines) < _MIN_BLOCKS:
@@ -56,11 +57,11 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation]) -> RigFit | None:
     sensors = sensors_of(campaign)
     blocks = _blocks(sensors, lines)
     mass = float(np.nan_to_num(campaign.housing_mass))
-    rig = Rig(sensors, mass, mount=found_mount(sensors, blocks, campaign.mount, 1.0))
+    rig = Rig(sensors, mass, mount=found_mount(sensors, blocks, campaign.mount, 1.0), static=static)
     force = vector(rig, blocks, "force") + mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
     shape, start = free_force(vector(rig, blocks, "displacement"), force)
     shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
-    terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Housing, Tilt)]
+    terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
     solution = Solver(rig, blocks, terms, start, False, shape).run()

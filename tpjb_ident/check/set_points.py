@@ -48,11 +48,11 @@ def angle_between(first: float, second: float, period: float = 360.0) -> float:
     return abs((first - second + period / 2) % period - period / 2)
 
 
-def check_static_loads(observations: Sequence[Observation]) -> None:
+def check_static_loads(observations: Sequence[Observation]) -> bool:
     """Mean force of dynamic and locus runs against the stated static load, its direction, and the other runs.
 
     Cells that show no static force in any run are of a kind that shows none: that is a note, and nothing is held
-    against them.
+    against them; it is False then.
     """
     shown: list[tuple[Observation, complex]] = []
     for observation in observations:
@@ -69,13 +69,13 @@ def check_static_loads(observations: Sequence[Observation]) -> None:
             observation.report.say(
                 "no static force", "note", "mean force", text, "Nothing; static loads are taken as set"
             )
-        return
+        return False
     for observation, ratio in shown:
         _check_size(observation, abs(ratio))
         if abs(ratio) >= 0.02:
             _check_direction(observation, math.degrees(np.angle(ratio)))
     if len(shown) < _MIN_RUNS:
-        return
+        return True
     middle = complex(np.median(ratios.real), np.median(ratios.imag))
     off = np.abs(ratios - middle) / max(abs(middle), 1e-12)
     allowed = max(_LOAD_OFF, _MANY * robust_deviation(off))
@@ -88,6 +88,7 @@ def check_static_loads(observations: Sequence[Observation]) -> None:
             )
             cure = "Check static_load and its direction in this run, and the gain of the cells"
             observation.report.say("load ratio", "warning", "mean force", text, cure)
+    return True
 
 
 def without_static_part(ratios: ComplexArray) -> bool:

@@ -135,7 +135,8 @@ def _check_length(report: Reporter, samples: int, rate: float) -> None:
         report.say("short", "error", "time", text, "Export the run again")
     elif report.run.kind == "dynamic" and rate < 2.2 * excitation:
         text = f"{rate:g} samples per second cannot show an excitation of {excitation:g} Hz"
-        report.say("nyquist", "error", "time", text, "Check sample_rate and excitation_frequency")
+        cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
+        report.say("nyquist", "error", "time", text, cure)
     elif report.run.kind == "dynamic" and excitation > 0 and samples < _MIN_CYCLES * rate / excitation:
         text = f"the record holds only {samples * excitation / rate:.1f} cycles of the excitation"
         report.say("short", "warning", "time", text, f"Record at least {_MIN_CYCLES:g} cycles")

@@ -32,6 +32,7 @@ class Sensor:
     device: str = ""
     plane: float = 0.0
     temperature_coefficient_uncertainty: float = 0.0
+    corner_stated: bool = False  #: a filter that ends at a low corner, or a measured response
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class Rig:
     #: by term: what its test said of sensors that are since taken as uncertain as it showed them
     contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
+    static: bool = True  #: whether the cells show the static load
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""

@@ -41,6 +41,7 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
                 channel.clock,
                 channel.plane,
                 channel.temperature_coefficient_uncertainty,
+                any(getattr(filtered, "side", "high") == "high" for filtered in channel.response.filters),
             )
             for channel in alike
         ]

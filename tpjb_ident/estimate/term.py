@@ -57,6 +57,8 @@ class Term:
         Whether no record can tell them: their priors pass into the covariance, whatever the equations seem to say.
     additive : bool
         Whether it adds to readings, and so is applied after what multiplies them.
+    sentence, scale : str, float
+        Said of every parameter `p` that the records tell, with its `value` and its `error` times the scale.
 
     Examples
     --------
@@ -69,6 +71,8 @@ class Term:
     always_estimated = False
     never_estimated = False
     additive = False
+    sentence = ""
+    scale = 1.0
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         self.rig = rig
@@ -113,7 +117,9 @@ class Term:
 
     def words(self, fitted: Fitted) -> tuple[str, ...]:
         """One sentence a parameter that the records tell."""
-        return ()
+        figures = zip(self.parameters, self.scale * fitted.value, self.scale * fitted.deviation, fitted.estimated)
+        said = [self.sentence.format(p=p, value=value, error=error) for p, value, error, told in figures if told]
+        return tuple(sentence for sentence in said if sentence)
 
     def no_columns(self, blocks: Blocks) -> ComplexArray:
         """Zeros to be filled in, (n, m + 2, q)."""

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out
+from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
@@ -46,8 +46,10 @@ class BandBlocks:
         for b, point in enumerate(points):
             rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
             one_sided = max(s.one_sided for s in point.spectra)
-            bent[b] = band_change(point.group.kind, rms, peak, one_sided)
-            if point.method == "periods" and one_phase_set(point.spectra):
+            # two tones make nothing of one another that falls on them
+            pair = point.method == "periods" and tones(point.spectra) < 3
+            bent[b] = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
+            if point.method == "periods" and not pair and one_phase_set(point.spectra):
                 # alike in all runs: more than the two that h needs do not average it away
                 scatter[b] = line_scatter(rms) * np.sqrt(max(len(point.spectra), 2) / 2)
         return replace(self, bent=bent, uneven=scatter)

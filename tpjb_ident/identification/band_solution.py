@@ -81,26 +81,26 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     regular = data.driven & (condition < _ONE_LINE)
     usable, used = regular & told, regular
     middle = _middles(data, used)
-    start, at_lines = _start(data, crude, usable, middle)
+    start = _start(data, crude, usable, middle)
     task = _Task(rig, data, (), correct, None)
     solution, task, size = _lines(task, start, used)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
-    first = _first_points(data)
-    away = (solution.h - start)[first]
-    usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(at_lines).max(axis=(1, 2))
-    h[usable] = at_lines[usable] + away[usable]
+    # at the first point of every line
+    away = (solution.h - start)[np.searchsorted(data.line, np.arange(len(data.band)))]
+    usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
+    h[usable] = crude[usable] + away[usable]
     task = replace(task, kept=solution)
     models: dict[str, ModelFit] = {}
-    parts = _parts(data, used)
+    parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
     at = np.array([part.omega for part in parts]), np.array([part.band for part in parts], dtype=np.intp)
-    curve = start
     for name in MODELS:
         shape = over_frequency(name, data.band[data.line], data.omega, middle)
         numbers, fit = _model(task, shape, h[data.line], used[data.line])
         models[name] = ModelFit(numbers, fit, over_frequency(name, at[1], at[0], middle).change(numbers))
-        curve = fit.h
+    # a tone by itself has no curve but its own h
+    curve, last = np.where(np.isfinite(fit.h), fit.h, h[data.line]), models[name].at_parts
+    last = np.where(np.isfinite(last), last, h[[part.lines[0] for part in parts]])
     part, off = _part_solution(task, parts, curve)
-    last = models[tuple(MODELS)[-1]].at_parts
     return BandSolution(task.rig, h, solution, models, parts, last + off, part, middle, condition, used, size)
 
 
@@ -205,21 +205,14 @@ def _middles(data: BandBlocks, used: BoolArray) -> FloatArray:
     return middles
 
 
-def _start(
-    data: BandBlocks, crude: ComplexArray, usable: BoolArray, middle: FloatArray
-) -> tuple[ComplexArray, ComplexArray]:
-    """H to start from at every point (P, 2, 2), curved within its line as the band is, and at the lines (L, 2, 2)."""
+def _start(data: BandBlocks, crude: ComplexArray, usable: BoolArray, middle: FloatArray) -> ComplexArray:
+    """H to start from at every point (P, 2, 2), curved within its line as the band is; `crude` (L, 2, 2)."""
     curve = tuple(MODELS)[-1]
     of_lines = over_frequency(curve, data.band, data.line_omega, middle)
     numbers = nearest(of_lines, crude, usable.astype(float))
     of_points = over_frequency(curve, data.band[data.line], data.omega, middle)
     start = crude[data.line] + of_points.change(numbers) - of_lines.change(numbers)[data.line]
-    return np.where(usable[data.line][:, None, None], start, np.nan), crude
-
-
-def _first_points(data: BandBlocks) -> IntArray:
-    """The first point of every line, (L,)."""
-    return np.searchsorted(data.line, np.arange(len(data.band)))
+    return np.where(usable[data.line][:, None, None], start, np.nan)
 
 
 def _model(task: _Task, shape: Shape, h: ComplexArray, used: BoolArray) -> tuple[FloatArray, Solution]:
@@ -236,15 +229,16 @@ def _model(task: _Task, shape: Shape, h: ComplexArray, used: BoolArray) -> tuple
     return numbers, solution
 
 
-def _parts(data: BandBlocks, used: BoolArray) -> tuple[BandPart, ...]:
-    """Parts of all bands."""
+def _parts(data: BandBlocks, used: BoolArray, told: BoolArray) -> tuple[BandPart, ...]:
+    """Parts of all bands; few tones are no band: each that is told is a point."""
     parts = []
     for b in range(int(data.band.max(initial=-1)) + 1):
         lines = np.flatnonzero(used & (data.band == b))
-        count = min(_PARTS, len(lines) // 2)
-        if len(lines) < 2 * MODELS["K-C-M"] or not count:
-            continue
-        parts += [BandPart(b, own, float(data.line_omega[own].mean())) for own in np.array_split(lines, count)]
+        if len(lines) < 2 * MODELS["K-C-M"]:
+            groups = [lines[k : k + 1] for k in np.flatnonzero(told[lines])]
+        else:
+            groups = np.array_split(lines, min(_PARTS, len(lines) // 2))
+        parts += [BandPart(b, own, float(data.line_omega[own].mean())) for own in groups]
     return tuple(parts)
 
 

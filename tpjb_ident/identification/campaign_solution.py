@@ -97,7 +97,7 @@ def solve_campaign(
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
         mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), common)
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare)
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=common != 0)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
         rates = _clock_rates(rig, blocks, _starts(rig, sources, means))

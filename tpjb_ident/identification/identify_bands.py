@@ -101,7 +101,7 @@ def _solved(
         instruments = [_INSTRUMENTS[point.method][turn] for point in points]
         own = band_blocks(points, sensors, loads[0], temperatures, instruments)
         own = own.with_film(points, settings.clearance) if settings.clearance else own
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare)
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare, static=loads[1] != 0)
         mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads[1])
         solutions.append(solve_bands(replace(rig, mount=mount), own, settings.correct, _told(points, own, classic)))
         data = data or own

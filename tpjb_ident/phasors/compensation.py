@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
@@ -114,10 +115,9 @@ def _images_of(
     least = np.maximum(_CLEAR * floor, _SHARE * size)
     if not np.isfinite(least).all() or size <= 0:
         return None
-    inside = amplitude[1:-1]
-    top = (inside > least[1:-1]) & (inside >= amplitude[:-2]) & (inside > amplitude[2:])
-    peaks = np.flatnonzero(top) + 1
-    peaks = peaks[(peaks > 1.2 * frequency * record.duration) & _is_free(peaks, record)]
+    peaks = find_peaks(amplitude)[0]
+    peaks = peaks[(amplitude > least)[peaks] & (peaks > 1.2 * frequency * record.duration)]
+    peaks = peaks[_is_free(peaks, record)]
     for low in peaks[np.argsort(-amplitude[peaks])][:_TRIED]:
         rate = low / record.duration + frequency
         mirror = record.rate - (rate + frequency) if rate + frequency > record.rate / 2 else rate + frequency
@@ -148,7 +148,7 @@ def _is_missing(
     slower: SlowerChannel, sizes: FloatArray, amplitude: FloatArray, least: FloatArray, record: WholeRecord
 ) -> bool:
     """Whether some line has no image where this filling would have left a clear one."""
-    frequencies = np.array([line.frequency for line in record.lines.whole])
+    frequencies = record.lines.whole_frequencies
     for image in (slower.rate - frequencies, slower.rate + frequencies):
         expected = _MISSING * sizes * np.abs(frequencies / image) ** slower.order
         folded = np.abs((image + 0.5 * record.rate) % record.rate - 0.5 * record.rate)
@@ -163,7 +163,7 @@ def _is_missing(
 
 def _is_free(bins: IntArray, record: WholeRecord) -> BoolArray:
     """Whether bins (n,) are away from all lines of the record, (n,)."""
-    lines = np.array([line.frequency for line in record.lines.whole]) * record.duration
+    lines = record.lines.whole_frequencies * record.duration
     return np.asarray(np.abs(bins[:, None] - lines).min(axis=1) > _NEAR)
 
 
@@ -200,7 +200,7 @@ def channel_gains(
     """What channels made of a sine of size one at every line, (n_whole_lines, n_channels); None where nothing."""
     if not any(c.response or c.name in slower for c in channels):
         return None
-    frequencies = np.array([line.frequency for line in lines.whole])
+    frequencies = lines.whole_frequencies
     gains = np.ones((len(frequencies), len(channels)), dtype=complex)
     for k, channel in enumerate(channels):
         if channel.response:

@@ -10,6 +10,7 @@ slow change, one more line explains what is left.
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
@@ -34,7 +35,7 @@ def unexpected_lines(
 
     `images` (m,): frequencies at which lines stand that are none [Hz].
     """
-    whole = np.array([line.frequency for line in result.lines.whole])
+    whole = result.lines.whole_frequencies
     frequencies: list[float] = []
     for quantity in ("force", "displacement"):
         places = result.pick(quantity)
@@ -45,7 +46,7 @@ def unexpected_lines(
                 columns = [k for k, place in enumerate(record.places) if place in places]
                 if columns:
                     frequencies += _peaks(record, columns, np.append(whole, frequencies), smallest)
-    top = REACH * max(line.frequency for line in result.lines.excitation)
+    top = REACH * max(result.lines.driven)
     apart = _LOBE / records[0].duration
     frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > apart]
     strange = tuple(sorted(f for f in frequencies if f not in whole))[:MAX_LINES]
@@ -80,9 +81,8 @@ def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest:
     candidate[frequency < _LOBE * step] = False
     for f in known:
         candidate[np.abs(frequency - f) < _LOBE * step] = False
-    candidate[1:-1] &= (amplitude[1:-1] >= amplitude[:-2]) & (amplitude[1:-1] > amplitude[2:])
-    candidate[[0, -1]] = False
-    peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in np.flatnonzero(candidate)]
+    tops = [i for i in find_peaks(amplitude)[0] if candidate[i]]
+    peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
     faint = record.lines.faint
     sizes = np.linalg.norm(record.z[len(record.z) - len(faint) :, columns], axis=1)
     at = np.minimum(np.round([line.frequency * record.duration for line in faint]).astype(int), len(least) - 1)

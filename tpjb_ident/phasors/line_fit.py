@@ -134,14 +134,20 @@ class LineFitter:
         offset = _mean_of_present(stack[:, :: self._stride])
         residual = stack - offset
         coefficients = self._solve_and_subtract(residual)
-        scale = 1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1).reshape(q, n)
+        holed = np.flatnonzero(~np.isfinite(coefficients).all(axis=1))
+        filled = np.where(is_present(stack[holed]), stack[holed] - offset[holed], 0.0)
+        coefficients[holed], residual[holed] = self._solve_and_subtract(filled), filled
+        scale = 1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1)
+        scale[holed] = np.inf  # what is filled in is left out first
+        scale = scale.reshape(q, n)
         usual = usual_scale(scale.T) if usual is None else usual
         lost = np.zeros((q, n))
-        bad = self._unclean(residual, scale, usual, np.abs(coefficients).sum(axis=1))
+        bad = np.isinf(scale) | self._unclean(residual, scale, usual, np.abs(coefficients).sum(axis=1))
         coefficients, offset = coefficients.reshape(q, n, -1), offset.reshape(q, n)
         residual = residual.reshape(q, n, -1)
         for k, i in np.argwhere(bad):
-            robust = self._without_few(residual[k, i], coefficients[k, i], scale[k, i], float(usual[k]))
+            gaps = ~is_present(rows[k, i])
+            robust = self._without_few(residual[k, i], gaps, coefficients[k, i], scale[k, i], float(usual[k]))
             if robust is None:
                 fit = robust_fit(self.design, rows[k, i] - offset[k, i], float(usual[k]))
                 robust = fit.coefficients, fit.scale, fit.lost
@@ -179,22 +185,24 @@ class LineFitter:
         return coefficients
 
     def _without_few(
-        self, residual: FloatArray, coefficients: FloatArray, scale: float, usual: float
+        self, residual: FloatArray, gaps: BoolArray, coefficients: FloatArray, scale: float, usual: float
     ) -> tuple[FloatArray, float, float] | None:
         """Leave the few outlying samples out of a window's fit until no verdict changes; None where it cannot.
 
         Their rows are taken off the normal equations: no need to go through all samples again.
 
-        `residual` (length,), `coefficients` (n_columns,).
+        `residual` (length,), `gaps` (length,) where there is no value, `coefficients` (n_columns,); `scale` is infinite
+        where these rest on what fills the gaps.
         """
-        if not scale <= SCALE_LIMIT * usual:
+        first, limit = scale, SCALE_LIMIT * usual
+        if limit < first < np.inf:
             return None
         gram = np.linalg.inv(self._gram_inverse)
         size, solution, left_out = np.abs(residual), coefficients, None
         for _ in range(_FEW_ROUNDS):
-            previous, left_out = left_out, np.flatnonzero(with_flanks(size > BAD_LIMIT * scale))
+            previous, left_out = left_out, np.flatnonzero(gaps | with_flanks(size > BAD_LIMIT * scale))
             if previous is not None and np.array_equal(previous, left_out):
-                return solution, scale, len(left_out) / self.length
+                return (solution, scale, len(left_out) / self.length) if min(first, scale) <= limit else None
             if len(left_out) > _FEW * self.length:
                 return None
             rows = self.design[left_out]
@@ -204,8 +212,8 @@ class LineFitter:
             except np.linalg.LinAlgError:  # what is left does not tell its lines apart
                 return None
             solution = coefficients - change
-            size = np.abs(residual + self.design @ change)
-            scale = robust_deviation(size)
+            size = np.where(gaps, 0.0, np.abs(residual + self.design @ change))
+            scale = robust_deviation(size[~gaps])
         return None
 
 

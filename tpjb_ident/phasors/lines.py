@@ -8,6 +8,7 @@ window; what is faint in the whole record alone, unless it stands out there.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,8 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 
+#: Highest line that a record shows, over its sample rate.
+HIGHEST = 0.45
 #: How far the mains and the shaft's speed may be from what is stated [Hz].
 MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
@@ -52,6 +55,16 @@ class LineSet:
         return np.array([line.frequency for line in self.excitation + self.nuisance])
 
     @property
+    def whole_frequencies(self) -> FloatArray:
+        """Frequencies of the whole record's lines [Hz], (n_whole_lines,)."""
+        return np.array([line.frequency for line in self.whole])
+
+    @property
+    def driven(self) -> tuple[float, ...]:
+        """Frequencies of the excitation [Hz]."""
+        return tuple(line.frequency for line in self.excitation)
+
+    @property
     def found(self) -> tuple[float, ...]:
         """Frequencies of lines that nobody mentioned [Hz]."""
         return tuple(line.frequency for line in self.nuisance if line.name == "found")
@@ -68,19 +81,19 @@ class LineSet:
 
     def faster(self, rate: float) -> LineSet:
         """The same lines by a clock that lets them turn faster, relative."""
-        groups = [
-            tuple(replace(line, frequency=line.frequency * (1 + rate)) for line in lines)
-            for lines in (self.excitation, self.nuisance, self.faint)
-        ]
-        return replace(self, excitation=groups[0], nuisance=groups[1], faint=groups[2])
+        return self._moved(lambda line: rate * line.frequency)
 
     def at_speed(self, speed: float) -> LineSet:
         """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
-        moved = [
-            tuple(replace(line, frequency=line.frequency + line.order * (speed - self.speed)) for line in lines)
-            for lines in (self.nuisance, self.faint)
-        ]
-        return replace(self, nuisance=moved[0], faint=moved[1], speed=speed)
+        return replace(self._moved(lambda line: line.order * (speed - self.speed)), speed=speed)
+
+    def _moved(self, by: Callable[[Line], float]) -> LineSet:
+        """The same lines, each moved in frequency [Hz]."""
+        excitation, nuisance, faint = (
+            tuple(replace(line, frequency=line.frequency + by(line)) for line in lines)
+            for lines in (self.excitation, self.nuisance, self.faint)
+        )
+        return replace(self, excitation=excitation, nuisance=nuisance, faint=faint)
 
 
 @dataclass(frozen=True)
@@ -103,7 +116,7 @@ def known_lines(
 ) -> LineSet:
     """Collect the lines of one run; coinciding ones are one, named in the order excitation, shaft, mains, others."""
     settings = settings or LineSettings()
-    top, apart = 0.45 * rate, ONE_LINE / duration
+    top, apart = HIGHEST * rate, ONE_LINE / duration
     if not excitation or not all(0.0 < f < top for f in excitation):
         raise BadInputError(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"

@@ -112,9 +112,8 @@ class RunPhasors:
         return self.divided(self._late(delays)) if any(delays.values()) else self
 
     def _late(self, delays: Mapping[str, float]) -> ComplexArray:
-        frequencies = np.array([line.frequency for line in self.lines.whole])
         late = np.array([delays.get(c.quantity, 0.0) for c in self.channels])
-        return np.exp(-2j * np.pi * np.multiply.outer(frequencies, late))
+        return np.exp(-2j * np.pi * np.multiply.outer(self.lines.whole_frequencies, late))
 
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""

@@ -18,7 +18,7 @@ from tpjb_ident.phasors.compensation import compensated, filled_channels, slower
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
-from tpjb_ident.phasors.lines import LineSet, known_lines
+from tpjb_ident.phasors.lines import HIGHEST, LineSet, known_lines
 from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed
@@ -118,8 +118,12 @@ class _Inspection:
         self.result = result.with_record(record_phasors(self.records, channels), residual, settings.delays)
 
     def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
-        rate = self.run.sample_rate
-        return known_lines(excitation, speed, rate, self.settings.lines, extra, self.run.length / rate)
+        run, rate = self.run, self.run.sample_rate
+        if not max(excitation) < HIGHEST * rate:
+            fault = f"{rate:g} samples per second cannot show an excitation of {max(excitation):g} Hz"
+            cure = "Check sample_rate, the unit of the time column (ms called s?) and excitation_frequency"
+            raise refuse(run.file, "time", fault, cure, run.id)
+        return known_lines(excitation, speed, rate, self.settings.lines, extra, run.length / rate)
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
         self.follow: ShaftCourse | None = follow
@@ -140,7 +144,7 @@ class _Inspection:
         near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
         beside = tuple(frequency for frequency in near if frequency is not None)
         if beside:
-            exact = tuple(line.frequency for line in lines.excitation)
+            exact = lines.driven
             self._fit(self._lines(exact, lines.speed, (*lines.found, *beside)), self.follow)
             self.conditions += (lines_beside(beside),)
 

@@ -101,7 +101,7 @@ def fitted_whole(
 def residual_beside(records: tuple[WholeRecord, ...], driven: int, channels: int) -> ComplexArray:
     """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
     first = records[0]
-    frequencies = np.array([line.frequency for line in first.lines.whole]) * first.duration
+    frequencies = first.lines.whole_frequencies * first.duration
     offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
     bins = round(frequencies[driven]) + np.concatenate([-offsets[::-1], offsets])
     free = np.abs(bins[:, None] - np.delete(frequencies, driven)).min(axis=1, initial=np.inf) > _CLEAR_OF

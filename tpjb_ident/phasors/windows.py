@@ -78,7 +78,7 @@ def shortest_window(lines: LineSet, rate: float, settings: WindowSettings) -> fl
     """Shortest window [s] that keeps the excitation lines within the accepted inflation."""
     frequencies = lines.frequencies
     n_driven = len(lines.excitation)
-    start = settings.min_cycles / min(line.frequency for line in lines.excitation)
+    start = settings.min_cycles / min(lines.driven)
     length = start
     # A dozen beats between neighbours separate any two lines; what is not resolved then never is.
     longest = max(start, 12.0 / _gap(lines)) if np.isfinite(_gap(lines)) else 2 * start

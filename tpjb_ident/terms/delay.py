@@ -20,6 +20,7 @@ class Delay(Factor):
     """A sensor that comes later by tau reads exp(-i omega tau) times the truth."""
 
     name = "delay"
+    sentence = "{p.name} late by {value:.3g} ms (standard error {error:.2g} ms)"
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
@@ -44,11 +45,3 @@ class Delay(Factor):
         if not names:
             return ()
         return (Condition("cells-and-accelerometers-out-of-phase", f"{'; '.join(self.words(fitted))}"),)
-
-    def words(self, fitted: Fitted) -> tuple[str, ...]:
-        """Delays that the records tell."""
-        return tuple(
-            f"{p.name} late by {fitted.value[k]:.3g} ms (standard error {fitted.deviation[k]:.2g} ms)"
-            for k, p in enumerate(self.parameters)
-            if fitted.estimated[k]
-        )

@@ -17,6 +17,8 @@ class Gain(Factor):
     """Logarithm of a sensor's gain; two probes and two cells tell nothing of it, a third probe the differences."""
 
     name = "calibration"
+    sentence = "{p.name} reads {value:+.2f} % (standard error {error:.2f} %)"
+    scale = 100.0
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
@@ -59,12 +61,3 @@ class Gain(Factor):
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
         apart = max(np.ptp(self._values(fitted, quantity)) for quantity in self.spread(fitted))
         return (Condition("records-contradicted" if apart > _NO_GAIN else "probe-gains-differ", text),)
-
-    def words(self, fitted: Fitted) -> tuple[str, ...]:
-        """Gains that the records tell."""
-        sentences = []
-        for k, parameter in enumerate(self.parameters):
-            if fitted.estimated[k]:
-                share, error = 100 * fitted.value[k], 100 * fitted.deviation[k]
-                sentences.append(f"{parameter.name} reads {share:+.2f} % (standard error {error:.2f} %)")
-        return tuple(sentences)

@@ -54,11 +54,13 @@ class Housing(Term):
         if len(rig.of("acceleration")) < 2:
             usual = 0.0  # the inertia stays in F, as is said of the point
         if rig.mount == "cells":
+            self.sentence = "{p.name} of the cells {value:.3g} {p.unit} (standard error {error:.2g})"
             self.parameters = (
                 Parameter("c_xx", "nm/N", SOFT, usual),
                 Parameter("c_yy", "nm/N", SOFT, usual),
                 Parameter("c_xy", "nm/N", across),
-                Parameter("loss", "1", loss),
+                # what cells without static part lead by beyond a mount's loss is their corner's
+                Parameter("loss", "1", loss if rig.static else _LOSS / 2),
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
@@ -143,16 +145,6 @@ class Housing(Term):
             return 0.0
         loss, error = float(fitted.value[3]), float(fitted.deviation[3])
         return -loss / self._omega if loss < -2 * error else 0.0
-
-    def words(self, fitted: Fitted) -> tuple[str, ...]:
-        """Springs under the housing."""
-        if self.rig.mount != "cells":
-            return ()
-        return tuple(
-            f"{p.name} of the cells {fitted.value[k]:.3g} {p.unit} (standard error {fitted.deviation[k]:.2g})"
-            for k, p in enumerate(self.parameters)
-            if fitted.estimated[k]
-        )
 
 
 def _compliance(value: FloatArray) -> ComplexArray:

@@ -7,6 +7,7 @@ from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.axis import Axis
 from tpjb_ident.terms.baseline import Baseline
 from tpjb_ident.terms.clock import Clock
+from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.gain import Gain
@@ -25,6 +26,7 @@ TERMS: tuple[type[Term], ...] = (
     Temperature,
     Axis,
     Delay,
+    Corner,
     Clock,
     Mass,
     Housing,

@@ -17,6 +17,8 @@ class Temperature(Factor):
     """A sensor reads more by its coefficient for every kelvin away from the reference."""
 
     name = "temperature"
+    sentence = "{p.name} reads {value:+.3f} % more per K (standard error {error:.3f} %)"
+    scale = 0.1
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
@@ -39,11 +41,3 @@ class Temperature(Factor):
         if not beyond(fitted, self.parameters):
             return ()
         return (Condition("probes-drift", "; ".join(self.words(fitted))),)
-
-    def words(self, fitted: Fitted) -> tuple[str, ...]:
-        """Drifts that the records tell."""
-        return tuple(
-            f"{p.name} reads {fitted.value[k] / 10:+.3f} % more per K (standard error {fitted.deviation[k] / 10:.3f} %)"
-            for k, p in enumerate(self.parameters)
-            if fitted.estimated[k]
-        )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import zoom_fft
 
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.dynamic.broadband.samples import Samples
@@ -44,20 +45,19 @@ def _shown(samples: Samples, nominal: float, wander: float) -> float:
     """Frequency of the highest peak near `nominal` [Hz], where one stands clear of what is around it."""
     n, rate = samples.length, samples.rate
     window = np.hanning(n)
-    t = np.arange(n) / rate
     step = 0.25 * rate / n
-    grid = nominal + step * np.arange(-int(wander / step) - 1, int(wander / step) + 2)
-    waves = [window * np.exp(-2j * np.pi * f * t) for f in grid]
-    power = np.zeros(len(grid))
+    reach = int(wander / step) + 1
+    ends = [nominal - reach * step, nominal + reach * step]
+    power = np.zeros(2 * reach + 1)
     for q in ("displacement", "force"):
         rows = samples.rows[samples.places(q)]
         rows = rows - rows.mean(axis=1, keepdims=True)
-        each = np.array([np.sum(np.abs(rows @ wave) ** 2) for wave in waves])
+        each = np.sum(np.abs(zoom_fft(rows * window, ends, len(power), fs=rate, endpoint=True)) ** 2, axis=0)
         power += each / max(float(np.sum(rows**2)) * float(np.sum(window**2)), 1e-300)
     k = int(np.argmax(power))
-    if not 0 < k < len(grid) - 1 or power[k] < 20.0:
+    if not 0 < k < 2 * reach or power[k] < 20.0:
         return nominal
-    return float(grid[k] + step * vertex(power[k - 1 : k + 2]))
+    return float(ends[0] + step * (k + vertex(power[k - 1 : k + 2])))
 
 
 def without_disturbances(samples: Samples, lines: tuple[Line, ...], period: int | None = None) -> Samples:

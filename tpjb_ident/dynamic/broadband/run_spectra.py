@@ -26,6 +26,8 @@ from tpjb_ident.phasors.compensation import compensated, inspect_readings
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 
+#: Share of the power that a period may leave where none is stated.
+_LEFT = 0.5
 #: Kinds that may repeat themselves; those that never do are not asked.
 _MAY_REPEAT = ("multisine", "random", "sweep")
 #: Kinds whose records may begin and end in motion; a hammer waits for rest.
@@ -152,9 +154,9 @@ def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
 def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
     if run.excitation_kind not in _MAY_REPEAT:
         return None
-    frequency = np.asarray(np.fft.rfftfreq(samples.length, 1 / samples.rate), dtype=float)
-    period = find_period(samples, band, bins_taken(frequency, lines, samples.length / samples.rate))
-    if period is None and run.excitation_kind == "multisine":
+    stated = run.excitation_kind == "multisine"
+    period = find_period(samples, band, lines, 1.0 if stated else _LEFT)
+    if period is None and stated:
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)

@@ -117,7 +117,10 @@ def _common_conditions(common: complex) -> tuple[Condition, ...]:
     """What all runs share: a gain of the cells, or what no gain explains."""
     size, turn = abs(common), float(np.angle(common))
     if size == 0.0:
-        text = "the cells show no static force: whether the loads meet their set points is not known"
+        text = (
+            "the cells show no static force: whether the loads meet their set points is not known, nor, unless it is "
+            'stated, the cells\' low corner, for which C is widened (filter = "butterworth 1 high 0.1 Hz")'
+        )
         return (Condition("no-static-force", text),)
     if not _CONTRADICTS[0] <= size <= _CONTRADICTS[1]:
         return (

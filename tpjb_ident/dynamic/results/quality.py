@@ -116,12 +116,11 @@ def _missing(data: PointData) -> list[Condition]:
     if empty:
         return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
     complete = complete[driven]
-    if complete.mean() < 1 - _MAX_LOST:
-        text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
-        return [Condition("most-windows-lost", text)]
-    if complete.mean() < 0.9:
-        return [Condition("windows-missing", f"{int((~complete).sum())} of {len(complete)} windows gave no phasors")]
-    return []
+    lost = 1 - complete.mean()
+    if not lost > 0.1:
+        return []
+    text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
+    return [Condition("most-windows-lost" if lost > _MAX_LOST else "windows-missing", text)]
 
 
 def _in_stretch(run: RunPhasors) -> BoolArray:

@@ -45,7 +45,7 @@ class RunDigest:
     @property
     def excitations(self) -> tuple[float, ...]:
         """Frequencies of its excitation lines [Hz]."""
-        return tuple(line.frequency for line in self.phasors.lines.excitation)
+        return self.phasors.lines.driven
 
     @property
     def conditions(self) -> tuple[Condition, ...]:

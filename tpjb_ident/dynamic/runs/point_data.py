@@ -63,7 +63,7 @@ def finite_mean(rows: FloatArray) -> FloatArray:
 
 def gather(runs: list[RunPhasors]) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    lines = [(run.point, tuple(line.frequency for line in run.lines.excitation)) for run in runs]
+    lines = [(run.point, run.lines.driven) for run in runs]
     return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
 
 

@@ -129,7 +129,7 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResul
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
     """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
     beginning = beginning_of(kept)
-    frequencies = [line.frequency for line in phasors.lines.excitation]
+    frequencies = phasors.lines.driven
     if len(frequencies) == 1:
         point = replace(run.point, excitation=2 * np.pi * frequencies[0])
         return (of_run(observe(replace(beginning, point=point), phasors), run),)
