@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -157,6 +158,24 @@ def test_a_converter_of_coarse_steps_shows_corners_that_stand_still():
     expected = np.ones(40, dtype=bool)
     expected[:7] = expected[18:22] = False  # on its way, and what stands beside a step
     np.testing.assert_array_equal(_settled(0.1 * np.arange(40), place, corner), expected)
+
+
+@pytest.mark.parametrize(("gain", "refused"), [(1.005, False), (1.1, True)])
+def test_a_third_probe_that_contradicts_two_is_refused(whole, gain, refused):
+    source, _ = whole
+    run = source.of_kind("clearance")[0]
+    third = replace(run.channels["X1A"], name="X1C", axis=0.5 * np.pi)
+    reading = gain * run.vector("displacement").values[:, 1]
+
+    def record(name):
+        return SimpleNamespace(values=reading) if name == "X1C" else run.record(name)
+
+    more = OtherRun(run, channels={**run.channels, "X1C": third}, record=record)
+    if refused:
+        with pytest.raises(RigDataError, match="X1C contradict one another"):
+            measure_run(more, ANGLES)
+    else:
+        assert len(measure_run(more, ANGLES).clearance) == len(ANGLES)
 
 
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):

@@ -173,7 +173,7 @@ def test_three_probes_that_contradict_one_another_are_refused(odd, seed, named):
         one = record(pad)
         one.run.channels = probes
         slopes = gain * np.cos(read_along - ANGLES[pad - 1]) + 0.0005 * rng.standard_normal(3)
-        records.append(replace(one, slopes=dict(zip(probes, slopes))))
+        records.append(replace(one, slopes=dict(zip(probes, slopes[:, None]))))
     problems = check_spares(records)
     assert [p.run for p in problems] == ([f"p-{pad}" for pad in range(1, 6)] if named else [])
     if named:

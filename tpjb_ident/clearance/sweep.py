@@ -16,7 +16,8 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.slow_samples import piece_means, slow_samples
+from tpjb_ident.phasors.slow_samples import piece_means, slow_samples, spare_slopes
+from tpjb_ident.phasors.spare_channels import REMEDY, contradictions
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run
@@ -54,6 +55,9 @@ def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
     time, load, position, good, _ = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
+    slopes = spare_slopes(run, np.eye(2))
+    for what in contradictions(run.channels, [slopes], {"force": [0.0], "displacement": [0.0]}):
+        raise refuse(run.file, "channels", f"clearance run {run.id}: {what}", REMEDY, run.id)
     load, position, time = load[good], position[good], time[good]
     _check_turn(run, load, position)
     # whole turns of a shaft that turns: its runout averages out

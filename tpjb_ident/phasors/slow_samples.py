@@ -8,8 +8,7 @@ ramp.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +17,11 @@ from scipy import ndimage
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
-from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.spare_channels import without_dead_spares
 
 if TYPE_CHECKING:
-    from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
@@ -32,8 +30,6 @@ _NOTHING = 1e-15  # [m] or [N]: below what any sensor knows
 _THRESHOLD = 7.0  # noise standard deviations beyond both medians
 _SHORTEST = 50  # samples
 _TIMES_EXPECTED = 10.0
-#: Two directions whose smallest singular value is below this tell no plane.
-_PLANE = 0.1
 _NOISE_FREE = (
     0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
 )
@@ -51,12 +47,6 @@ def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, F
     return slower.time, load, place, good_samples(np.hstack([load, place]), longest), slower.rate
 
 
-def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
-    """Whether the others of a channel's quantity that are alive tell the plane without it."""
-    axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
-    return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
-
-
 def _statistics(run: Run) -> dict[str, ChannelStatistics]:
     """Statistics of every force and displacement channel."""
     statistics: dict[str, ChannelStatistics] = {}
@@ -67,11 +57,24 @@ def _statistics(run: Run) -> dict[str, ChannelStatistics]:
     return statistics
 
 
-def _without_dead_spares(run: Run, statistics: Mapping[str, ChannelStatistics]) -> Run:
-    """The run without channels that read one value throughout, where others tell the plane without them."""
-    alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
-    channels = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
-    return run if len(channels) == len(run.channels) else replace(run, channels=channels)
+def spare_slopes(run: Run, along: FloatArray, longest: int = 60) -> dict[str, FloatArray]:
+    """By how much each live reading changes with the vector of its quantity along directions (k, 2), (k,) each.
+
+    Of quantities alone that more than two channels tell.
+    """
+    slopes: dict[str, FloatArray] = {}
+    for quantity in ("force", "displacement"):
+        names = [name for name, c in run.channels.items() if c.quantity == quantity and c.axis is not None]
+        if len(names) < 3:
+            continue
+        moved = run.vector(quantity).values @ along.T
+        for name in names:
+            reading = np.asarray(run.record(name).values)
+            used = good_samples(np.column_stack([moved, reading]), longest)
+            if np.ptp(reading[used]) > 0.0:
+                design = np.column_stack([moved[used], np.ones(used.sum())])
+                slopes[name] = np.linalg.lstsq(design, reading[used], rcond=None)[0][:-1]
+    return slopes
 
 
 def refused_runs(problems: Sequence[Problem]) -> tuple[Condition, ...]:
@@ -144,7 +147,7 @@ def refuse_flat_channels(run: Run) -> Run:
     in the curve itself gives it away, but readings without noise do.
     """
     statistics = _statistics(run)
-    run = _without_dead_spares(run, statistics)
+    run = without_dead_spares(run, statistics)
     problems = []
     for quantity in ("force", "displacement"):
         alike = {name: statistics[name] for name, c in run.channels.items() if c.quantity == quantity}

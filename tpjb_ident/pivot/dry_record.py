@@ -23,7 +23,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import converter_step, good_samples, slow_samples
+from tpjb_ident.phasors.slow_samples import converter_step, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import Blocks, Hold, PivotSettings, Samples, cut_blocks, find_holds, pad_axes
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class DryRecord:
     pickup: PickupSignature | None = None
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
-    slopes: Mapping[str, float] = field(default_factory=dict)  #: of readings, where more than two tell a vector
+    slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
 
 
 def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
@@ -106,7 +106,7 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
         raise _refusal(run, "record", what, "Record for longer, or set a shorter block")
     good = np.ones(len(blocks), dtype=bool)
     step = _quantisation(samples.displacement)
-    direction, slopes = load_direction(blocks), _slopes(run, angle, settings.longest_glitch)
+    direction, slopes = load_direction(blocks), spare_slopes(run, pad_axes(angle)[:1], settings.longest_glitch)
     return DryRecord(run, run.pad, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes)
 
 
@@ -124,22 +124,6 @@ def _quantisation(displacement: FloatArray) -> float:
 def axial_channels(run: Run) -> dict[str, Channel]:
     """Probes and cells of a run, by name."""
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
-
-
-def _slopes(run: Run, angle: float, longest: int) -> dict[str, float]:
-    """By how much each reading changes with the vector that all of its quantity make along the pad; dead ones apart."""
-    slopes: dict[str, float] = {}
-    for quantity in ("force", "displacement"):
-        names = [name for name, channel in axial_channels(run).items() if channel.quantity == quantity]
-        if len(names) < 3:
-            continue
-        along = run.vector(quantity).values @ pad_axes(angle)[0]
-        for name in names:
-            reading = np.asarray(run.record(name).values)
-            used = good_samples(np.column_stack([along, reading]), longest)
-            if np.ptp(reading[used]) > 0.0:
-                slopes[name] = float(np.polyfit(along[used], reading[used], 1)[0])
-    return slopes
 
 
 def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem
 from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.spare_channels import REMEDY, contradictions
 from tpjb_ident.pivot.blocks import PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
 
@@ -19,9 +19,6 @@ _ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to i
 _ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
 _ALONG = 0.5  # of the clearance: pads may differ, but not by this much
 _CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
-_SPARE_CURE = "Check sensitivities and axes against the certificates and the drawing; set the wrong one to ignore"
-#: Gain uncertainty of a channel where nothing is stated; what a curved path leaves of a slope; chance of a false alarm.
-_GAIN, _CURVED, _BY_CHANCE = 0.005, 1e-3, 1e-4
 #: Pads that must be there: two numbers are fitted.
 _FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
@@ -190,43 +187,15 @@ def _centre(starts: FloatArray, outward: FloatArray) -> tuple[FloatArray, float]
 
 
 def check_spares(records: Sequence[DryRecord]) -> list[Problem]:
-    """Whether channels of one plane that are more than two agree: each may be off by what is stated of it.
-
-    The changes s (m,) of readings along axes A (m, 2) with null space N leave N s, which gains and angles of the
-    channels, common to all runs, and each run's own noise must explain: that of the direction across the pad.
-    """
-    groups: dict[tuple[str, float], list[str]] = {}
-    for name, channel in (axial_channels(records[0].run) if records else {}).items():
-        if all(name in record.slopes for record in records):
-            groups.setdefault((str(channel.quantity), channel.plane), []).append(name)
+    """Whether channels of one plane that are more than two agree, over all runs; noise is that across the pads."""
+    noise = {
+        "force": [record.load_direction.se for record in records],
+        "displacement": [record.displacement_direction.se for record in records],
+    }
     problems = []
-    for names in groups.values():
-        if len(names) > 2 and _contradiction(records, names) < _BY_CHANCE:
-            what = f"{', '.join(names)} contradict one another: no movement makes all of them read what they do"
-            problems += [_problem(record, f"channels {', '.join(names)}", what, _SPARE_CURE) for record in records]
+    for what in contradictions(records[0].run.channels if records else {}, [r.slopes for r in records], noise):
+        problems += [_problem(record, "channels", what, REMEDY) for record in records]
     return problems
-
-
-def _contradiction(records: Sequence[DryRecord], names: Sequence[str]) -> float:
-    """Chance of channels that are as stated to leave as much as these do."""
-    channels = [axial_channels(records[0].run)[name] for name in names]
-    axes = np.array([[math.cos(channel.axis or 0.0), math.sin(channel.axis or 0.0)] for channel in channels])
-    null = np.linalg.svd(axes)[0][:, 2:].T
-    gain = np.array([_GAIN if channel.uncertainty is None else channel.uncertainty for channel in channels])
-    angle = np.array([channel.axis_uncertainty for channel in channels])
-    left, effects, noise = [], [], []
-    for record in records:
-        slopes = np.array([record.slopes[name] for name in names])
-        moved = np.linalg.lstsq(axes, slopes, rcond=None)[0]
-        left.append(null @ slopes)
-        direction = record.load_direction if channels[0].quantity == "force" else record.displacement_direction
-        noise += len(null) * [min(max(direction.se, _CURVED), 1.0) ** 2]
-        effects.append(null @ np.diag(slopes) @ np.diag(gain))
-        turned = null @ np.diag(axes @ np.array([moved[1], -moved[0]])) @ np.diag(angle)
-        effects[-1] = np.hstack([effects[-1], turned])
-    design, residual = np.vstack(effects), np.concatenate(left)
-    covariance = design @ design.T + np.diag(noise)
-    return float(special.chdtrc(len(residual), residual @ np.linalg.solve(covariance, residual)))
 
 
 def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:
