@@ -22,7 +22,7 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 #: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them. The check
 #: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
-    "tpjb_ident/check/rig_fit.py": {"Axis", "Delay", "Gain", "Housing", "Tilt"},
+    "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
     "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
     "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
 }
