@@ -102,7 +102,7 @@ def _flat_share(readings: FloatArray, top: float, width: float) -> float:
     starts = np.count_nonzero(np.diff(at_top.astype(int), prepend=0) > 0)
     if count < 20 or starts < 3 or 2 * count < 3 * starts or count < 0.005 * len(readings):
         return 0.0
-    levels, counts = np.unique(readings[~at_top], return_counts=True)
-    # At least the next level that occurs, however coarse the converter; where levels hold as many, loads were held.
-    near = max(counts[levels >= min(top - width, levels[-1])].sum(), counts.max())
+    # At least the next level that occurs, however coarse the converter.
+    below = min(top - width, float(np.max(readings[~at_top])))
+    near = int(np.count_nonzero(readings >= below)) - count
     return count / len(readings) if count >= 4 * near else 0.0

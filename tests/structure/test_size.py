@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (137.53, 16_482),
     "model": (91.86, 12_029),
-    "rigdata": (70.85, 9_480),
+    "rigdata": (70.84, 9_480),
     "diagnosis": (39.0, 4_823),
     "cli": (29.46, 4_100),
     "report": (27.28, 3_482),
