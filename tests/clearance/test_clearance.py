@@ -178,6 +178,15 @@ def test_a_third_probe_that_contradicts_two_is_refused(whole, gain, refused):
         assert len(measure_run(more, ANGLES).clearance) == len(ANGLES)
 
 
+def test_a_polygon_says_how_far_the_probes_gains_are_known(whole):
+    source, _ = whole
+    run = source.of_kind("clearance")[0]
+    channels = {n: replace(c, uncertainty=0.01) if c.quantity == "displacement" else c for n, c in run.channels.items()}
+    found = measure_run(OtherRun(run, channels=channels), ANGLES).relative_calibration
+    assert found[0] == pytest.approx(0.01 / np.sqrt(2))  # between two probes
+    assert np.all((found >= found[0] - 1e-12) & (found < 0.01))
+
+
 def test_a_clean_sweep_is_measured_to_a_tenth_of_a_micrometre(opened):
     clean = rig(noise=Noise.none(), clearance=(80e-6,) * 5)
     found = measure_clearance(opened(clean), ANGLES)

@@ -20,7 +20,7 @@ from rigdata.run import Run
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.set_points import oil_force, plane_vector
 from tpjb_ident.phasors.run_data import QUANTITIES
-from tpjb_ident.phasors.spare_channels import is_spare
+from tpjb_ident.phasors.slow_samples import is_spare
 
 #: A running shaft's vibration, run-out and noise together, from low to high, that no probe shows [m]: error, warning.
 _STILL_PROBE = (2e-8, 1e-7)

@@ -12,8 +12,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.phasors.slow_samples import stands_still
-from tpjb_ident.phasors.spare_channels import is_spare
+from tpjb_ident.phasors.slow_samples import is_spare, stands_still
 
 #: Quantities without which a run of that kind says nothing.
 _NEEDED = {

@@ -17,12 +17,14 @@ from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.pivot.dry_record import axial_channels, relative_calibration
 from tpjb_ident.presentation import Presented
 from tpjb_ident.schema import TANGENT
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rigdata.calibration import Channel
     from rigdata.campaign import Campaign, Run
     from rigdata.operating_point import OperatingPoint
 
@@ -70,6 +72,9 @@ class ClearancePolygon(Presented):
         How the centre was chosen.
     status : tuple of Condition
         Named conditions.
+    relative_calibration : (n,) ndarray
+        Standard uncertainty along the pads from the probes' certificates, relative; not in the standard errors, as in
+        `PivotCurve`.
     """
 
     run: str
@@ -91,6 +96,7 @@ class ClearancePolygon(Presented):
     temperature: float = np.nan
     centre_rule: CentreRule = "least-absolute"
     status: tuple[Condition, ...] = ()
+    relative_calibration: FloatArray | float = 0.0
 
     def to_frame(self) -> pd.DataFrame:
         """Table of `clearance.csv` (outputs.md): one row per pad, SI, angles in degrees."""
@@ -193,8 +199,10 @@ def measure_run(
     pads = np.flatnonzero(reached)
     centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
     polygon = _polygon(run, contact, angles, fit, centre)
-    status = (*polygon.status, *_gains_differ(run, polygon), *_extrapolated(contact.push, curves))
-    return replace(polygon, status=status, centre_rule=rule)
+    probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
+    status = (*polygon.status, *_gains_differ(probes, polygon), *_extrapolated(contact.push, curves))
+    calibration = np.array([relative_calibration(probes, float(angle)) for angle in angles])
+    return replace(polygon, status=status, centre_rule=rule, relative_calibration=calibration)
 
 
 def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit, centre: Centre) -> ClearancePolygon:
@@ -235,9 +243,8 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
     )
 
 
-def _gains_differ(run: Run, polygon: ClearancePolygon) -> tuple[Condition, ...]:
+def _gains_differ(probes: Sequence[Channel], polygon: ClearancePolygon) -> tuple[Condition, ...]:
     """One probe reads more than the other: sizes do not tell, the angles between the sides do."""
-    probes = [c for c in run.channels.values() if c.quantity == "displacement" and c.axis is not None]
     if len(probes) != 2:
         return ()
     first, second = probes

@@ -16,8 +16,7 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import RigDataError, refuse
 from rigdata.vector import directions
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.slow_samples import piece_means, slow_samples, spare_slopes
-from tpjb_ident.phasors.spare_channels import REMEDY, contradictions
+from tpjb_ident.phasors.slow_samples import REMEDY, contradictions, piece_means, slow_samples, spare_slopes
 
 if TYPE_CHECKING:
     from rigdata.campaign import Run

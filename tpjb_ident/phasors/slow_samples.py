@@ -1,27 +1,29 @@
-"""Bad samples of slow records: glitches, which jump out of the signal and come back, and channels that stand still.
+"""Bad samples and channels of slow records: glitches, channels that stand still, more than two that do not agree.
 
-A staircase, a ramp and a shaft that slides from corner to corner all move monotonically over the length of
-a glitch. So a sample belongs to the signal when it lies between the median of what came before and the
-median of what comes after, give or take the noise; a median filter alone would cut the corners of every
-ramp.
+Glitches jump out of the signal and come back. A staircase, a ramp and a shaft that slides from corner to corner all
+move monotonically over the length of a glitch. So a sample belongs to the signal when it lies between the median of what
+came before and the median of what comes after, give or take the noise; a median filter alone would cut the corners of
+every ramp.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, special
 
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError
+from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.spare_channels import without_dead_spares
 
 if TYPE_CHECKING:
+    from rigdata.calibration import Channel
     from rigdata.campaign import Run
 
 _ROUNDING = 1e-9  # of the reading, for a component that does not move at all
@@ -33,6 +35,11 @@ _TIMES_EXPECTED = 10.0
 _NOISE_FREE = (
     0.5  # share of repeated readings, apart from the longest stretch: a computed record, or a coarse converter
 )
+REMEDY = "Check sensitivities and axes against the certificates and the drawing; set the wrong one to ignore"
+#: Two directions whose smallest singular value is below this tell no plane.
+_PLANE = 0.1
+#: Gain uncertainty of a channel where nothing is stated; what a curved path leaves of a slope; chance of a false alarm.
+_GAIN, _CURVED, _BY_CHANCE = 0.005, 1e-3, 1e-4
 
 
 def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, float]:
@@ -147,7 +154,7 @@ def refuse_flat_channels(run: Run) -> Run:
     in the curve itself gives it away, but readings without noise do.
     """
     statistics = _statistics(run)
-    run = without_dead_spares(run, statistics)
+    run = _without_dead_spares(run, statistics)
     problems = []
     for quantity in ("force", "displacement"):
         alike = {name: statistics[name] for name, c in run.channels.items() if c.quantity == quantity}
@@ -176,3 +183,56 @@ def _problem(run: Run, name: str, statistics: ChannelStatistics) -> Problem:
     text = f"run {run.id}: stands still {how_long}: stuck, clipped or dead"
     cure = "Check sensor, range and logger, and repeat the run"
     return Problem("error", run.file, f"channel {name}", text, cure, run=run.id)
+
+
+def is_spare(channel: Channel, alive: Sequence[Channel]) -> bool:
+    """Whether the others of a channel's quantity that are alive tell the plane without it."""
+    axes = [c.axis for c in alive if c.quantity == channel.quantity and c.name != channel.name and c.axis is not None]
+    return len(axes) > 1 and bool(np.linalg.svd(directions(axes), compute_uv=False)[-1] > _PLANE)
+
+
+def _without_dead_spares(run: Run, statistics: Mapping[str, ChannelStatistics]) -> Run:
+    """The run without channels that read one value throughout, where others tell the plane without them."""
+    alive = [c for name, c in run.channels.items() if name not in statistics or not statistics[name].constant]
+    channels = {name: c for name, c in run.channels.items() if c in alive or not is_spare(c, alive)}
+    return run if len(channels) == len(run.channels) else replace(run, channels=channels)
+
+
+def contradictions(
+    channels: Mapping[str, Channel], slopes: Sequence[Mapping[str, FloatArray]], noise: Mapping[str, Sequence[float]]
+) -> list[str]:
+    """Names of channels of one plane that do not agree, each set of them in one text.
+
+    `slopes`: of every run, by how much each reading changes with some directions (k,); `noise`: by quantity, standard
+    error of the slopes of every run.
+    """
+    groups: dict[tuple[str, float], list[str]] = {}
+    for name in slopes[0] if slopes else ():
+        if all(name in run_slopes for run_slopes in slopes):
+            groups.setdefault((str(channels[name].quantity), channels[name].plane), []).append(name)
+    contradicting = []
+    for (quantity, _), names in groups.items():
+        rows = np.vstack([np.column_stack([run_slopes[name] for name in names]) for run_slopes in slopes])
+        spread = np.repeat(np.clip(noise[quantity], _CURVED, 1.0), len(rows) // len(slopes))
+        if len(names) > 2 and _chance([channels[name] for name in names], rows, spread) < _BY_CHANCE:
+            listed = ", ".join(names)
+            contradicting.append(f"{listed} contradict one another: no movement makes all of them read what they do")
+    return contradicting
+
+
+def _chance(channels: Sequence[Channel], rows: FloatArray, noise: FloatArray) -> float:
+    """Chance of channels (m) that are as stated to leave as much as these do.
+
+    The changes s (m,) of readings along axes A (m, 2) with null space N leave N s, which gains and angles of the
+    channels, common to all rows (r, m), and each row's own noise (r,) must explain.
+    """
+    axes = directions([channel.axis or 0.0 for channel in channels])
+    null = np.linalg.svd(axes)[0][:, 2:].T
+    gain = np.array([_GAIN if channel.uncertainty is None else channel.uncertainty for channel in channels])
+    angle = np.array([channel.axis_uncertainty for channel in channels])
+    moved = np.linalg.lstsq(axes, rows.T, rcond=None)[0]
+    turned = (axes @ np.array([moved[1], -moved[0]])).T
+    effects = [np.hstack([null * (s * gain), null * (t * angle)]) for s, t in zip(rows, turned)]
+    design, residual = np.vstack(effects), (rows @ null.T).ravel()
+    covariance = design @ design.T + np.diag(np.repeat(noise**2, len(null)))
+    return float(special.chdtrc(len(residual), residual @ np.linalg.solve(covariance, residual)))

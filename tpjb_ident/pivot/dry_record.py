@@ -12,7 +12,7 @@ exchanged together with its cable and amplifier keeps its signature: that cannot
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -124,6 +124,13 @@ def _quantisation(displacement: FloatArray) -> float:
 def axial_channels(run: Run) -> dict[str, Channel]:
     """Probes and cells of a run, by name."""
     return {n: c for n, c in run.channels.items() if c.quantity in ("force", "displacement") and c.axis is not None}
+
+
+def relative_calibration(channels: Iterable[Channel], angle: float) -> float:
+    """Relative standard uncertainty along a pad's angle [rad] from the certificates of channels."""
+    # two channels at right angles share a direction as the squares of their cosines
+    shares = [math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0) for c in channels]
+    return math.sqrt(sum(share**2 for share in shares))
 
 
 def _pickup(run: Run, vectors: Mapping[str, FloatArray], good: BoolArray, rate: float) -> PickupSignature | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ from tpjb_ident.pivot.dry_record import (
     noise_about_curve,
     noise_within_holds,
     read_dry_run,
+    relative_calibration,
 )
 from tpjb_ident.pivot.law_fit import (
     FRICTION,
@@ -45,7 +46,6 @@ from tpjb_ident.pivot.laws import LAWS
 from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_of
 
 if TYPE_CHECKING:
-    from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
 
 REFERENCE_SHARE = 0.4  # reference load of the laws, as a share of the largest load
@@ -262,7 +262,7 @@ def assemble_curve(
         load_direction=first.load_direction,
         displacement_direction=first.displacement_direction,
         hysteresis=_loop(steps, law),
-        relative_calibration=relative_calibration(axial_channels(first.run), first.angle),
+        relative_calibration=relative_calibration(axial_channels(first.run).values(), first.angle),
         runs=tuple(record.run.id for record in records),
     )
     return replace(curve, status=tuple(_status(curve, records, settings, structure)))
@@ -322,13 +322,6 @@ def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:
     applied = (steps.load / (1.0 - law.theta[FRICTION] * steps.branch))[used]
     reading, gradient = law.reading_gradient(applied, steps.branch[used].astype(float))
     return measure_loop(applied, reading, gradient @ law.covariance @ gradient.T, steps.branch[used])
-
-
-def relative_calibration(channels: Mapping[str, Channel], angle: float) -> float:
-    """Relative standard uncertainty along a pad's angle [rad] from the certificates of channels."""
-    # two channels at right angles share a direction as the squares of their cosines
-    shares = [math.cos((c.axis or 0.0) - angle) ** 2 * (c.uncertainty or 0.0) for c in channels.values()]
-    return math.sqrt(sum(share**2 for share in shares))
 
 
 def _status(

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import Problem
 from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.spare_channels import REMEDY, contradictions
+from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
 from tpjb_ident.pivot.blocks import PivotSettings, pad_axes
 from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
 

@@ -47,7 +47,7 @@ def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
         save_panels(panels, folder / "figures")
     parts = [f"the {name} is measured" for name in ("clearance", "locus") if getattr(static, name) is not None]
     c.print(f"{source.id}: {' and '.join(parts)}.")
-    _show(c, static, drawing, source, refused)
+    _show(c, static, drawing, source.id, refused)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for polygon in polygons:
         c.print(str(polygon))
@@ -101,29 +101,24 @@ def _write_tables(c: Command, static: StaticTests, polygons: tuple[ClearancePoly
         c.table("clearance_pairs", pairs_frame(static.clearance, polygons))
 
 
-def _show(c: Command, static: StaticTests, bearing: Bearing, source: Campaign, refused: list[str]) -> None:
+def _show(c: Command, static: StaticTests, bearing: Bearing, name: str, refused: list[str]) -> None:
     """Print the clearance per pad and the drawing's, the locus, and what is wrong with either."""
     import numpy as np
-
-    from tpjb_ident.pivot.dry_record import axial_channels
-    from tpjb_ident.pivot.fit import relative_calibration
 
     polygon = static.clearance
     if polygon is not None:
         rows = []
-        channels = axial_channels(source.run(polygon.run))
-        probes = {name: channel for name, channel in channels.items() if channel.quantity == "displacement"}
+        # a table's reader has no other place that says how far the probes' gains are known
+        half = 1.96 * np.hypot(polygon.clearance_se, polygon.clearance * polygon.relative_calibration)
         for k, pad in enumerate(bearing.pads):
-            # a table's reader has no other place that says how far the probes' gains are known
-            gain = polygon.clearance[k] * relative_calibration(probes, pad.pivot_angle)
-            half = 1.96 * float(np.hypot(polygon.clearance_se[k], gain))
-            rows.append([f"#{k + 1}", pad.assembled_clearance, polygon.clearance[k], half, polygon.clearance_pushed[k]])
+            measured = (polygon.clearance[k], half[k], polygon.clearance_pushed[k])
+            rows.append([f"#{k + 1}", pad.assembled_clearance, *measured])
         columns = [*words("pad"), Column("drawing", ".4g", quantity="length")]
         columns += [
             Column(title, form, quantity="length")
             for title, form in (("measured", ".4g"), ("± (95 %)", ".2g"), ("pushed", ".4g"))
         ]
-        c.show(f"{source.id}: clearance, {UNITS['length'][0]}", columns, rows)
+        c.show(f"{name}: clearance, {UNITS['length'][0]}", columns, rows)
     printed: tuple[str, ...] = ()
     if static.locus is not None:
         c.print(f"locus: {static.locus}")

@@ -6,6 +6,7 @@ is fitted, and proposes further ones where it comes near the leader: the same st
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -219,7 +220,7 @@ class _Search:
         sizes = {id(score.path): float(score.amplitudes[0]) for score in leading if score.path.fault.label in labels}
         self._lengthen([sizes.get(id(path), 0.0) for path in self.paths])
 
-    @property
+    @functools.cached_property
     def _stated(self) -> Point:
         problem = self.problem
         return Point(np.zeros(len(problem.nuisances)), problem.scaled(problem.base), problem.scaled(problem.columns))
