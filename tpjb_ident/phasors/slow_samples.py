@@ -2,8 +2,8 @@
 
 Glitches jump out of the signal and come back. A staircase, a ramp and a shaft that slides from corner to corner all
 move monotonically over the length of a glitch. So a sample belongs to the signal when it lies between the median of
-what came before and the median of what comes after, give or take the noise; a median filter alone would cut the corners of
-every ramp.
+what came before and the median of what comes after, give or take the noise; a median filter alone would cut the
+corners of every ramp.
 """
 
 from __future__ import annotations
