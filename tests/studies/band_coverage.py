@@ -21,7 +21,7 @@ from rigdata import load_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
 from tests.rigs.closed_form_bearing import NOMINAL
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.identification.identify import identify
@@ -29,6 +29,8 @@ from tpjb_ident.identification.identify import identify
 #: Noise of probes, cells and accelerometers, in units of `rig.NOISE`: usual, and with 5 to 20 % on the displacements.
 USUAL, LOUD = (5.0, 5.0, 1.0), (15.0, 8.0, 3.0)
 FOUR = (0.0, 45.0, 90.0, 135.0)
+HEAD = ("excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %",
+        "K-C-M inside %", "kyy +- %", "refused", "reported")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -158,12 +160,7 @@ def run_row(row: BandRow, seeds: range) -> Tally:
 
 def main() -> None:
     """Command line."""
-    options = study_parser(__doc__)
-    options.add_argument("--seeds", type=int, default=20)
-    options.add_argument("--first-seed", type=int, default=7000)
-    options.add_argument("--only", default="")
-    given = options.parse_args()
-    head = ["excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %"]
+    given = study_parser(__doc__, seeds=20, first_seed=7000, only="").parse_args()
     rows = []
     for row in band_rows():
         if given.only in row.name:
@@ -171,9 +168,7 @@ def main() -> None:
             rows.append(tally.cells(row.name))
             print(rows[-1], flush=True)
             print(f"{row.name}: {dict(tally.named)}", file=sys.stderr, flush=True)
-    if given.write:
-        head += ["K-C-M inside %", "kyy +- %", "refused", "reported"]
-        write_section("band", typed(), table(head, rows))
+    report(given, "band", table(HEAD, rows))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Whether the 95 % intervals of a campaign of sines hold, by directions, repeats, seconds and loads.
 
-    python -P -m tests.studies.coverage [--seeds N] [--write]
+    python -P -m tests.studies.coverage [--seeds N] [--only WORDS] [--write]
 
 Two counts a plan: with gains drawn from the stated uncertainty, entries of a campaign moving together; and without any
 error of the sensors or statement of it, where records, loads and runs alone speak.
@@ -18,7 +18,7 @@ from rigdata.campaign import load_campaign
 from tests.studies.field import acquisition
 from tests.studies.field import closed_form as cf
 from tests.studies.field.acquisition import Acquisition, write_campaign
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
 
@@ -69,17 +69,13 @@ def row(name: str, seeds: int) -> tuple[object, ...]:
 
 def main() -> None:
     """Print the table, or write it."""
-    parser = study_parser(__doc__)
-    parser.add_argument("--seeds", type=int, default=60)
-    parser.add_argument("--only", default="")
-    given = parser.parse_args()
+    given = study_parser(__doc__, seeds=60, only="").parse_args()
     rows = []
     for name in PLANS:
         if given.only in name:
             rows.append(row(name, given.seeds))
             print(*rows[-1], sep=" | ", flush=True)
-    if given.write:
-        write_section("coverage", typed(), table(HEAD, rows))
+    report(given, "coverage", table(HEAD, rows))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import h5py
 from model.bearing_file import parse_bearing
 from rigdata import load_campaign
 from rigdata.problem import RigDataError
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 from tpjb_ident.dynamic.settings import IdentifySettings
@@ -116,8 +116,7 @@ def answers(path: Path, truth: dict[object, list[float]]) -> tuple[str, str, str
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    options = parser.parse_args()
+    asked = study_parser(__doc__).parse_args()
     with h5py.File(DEMO) as file:
         whole = str(file.attrs["manifest"])
     cells: dict[tuple[str, str], list[str]] = {}
@@ -136,10 +135,7 @@ def main() -> None:
     text = f"{count} cases, {silent} with a wrong number that nothing flags. Factor: `check`, `identify`.\n\n"
     rows = [(sensor, runs, "; ".join(outcomes)) for (sensor, runs), outcomes in cells.items()]
     text += table(("description", "runs", "factor: check, identify"), rows)
-    if options.write:
-        write_section("descriptions", typed(), text)
-    else:
-        print(text)
+    report(asked, "descriptions", text)
 
 
 if __name__ == "__main__":

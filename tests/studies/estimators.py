@@ -1,8 +1,9 @@
-"""Regenerate the estimator study: ``python -m tests.studies.estimators [--replicates 400] [--write]``.
+"""Error, bias and coverage of every estimator in the simulated situation of `tests/rigs/estimator_cases.py`.
 
-Prints, for every case of `estimator_cases` and every method: RMSE of H in % of its norm, bias of kxx
-and kyy in %, coverage of the 95 % intervals in % (all eight entries), milliseconds per H. The default
-method gets all replicates, the others a quarter of them.
+    python -m tests.studies.estimators [--replicates 400] [--seed 2026] [--write]
+
+RMSE of H in % of its norm, bias of kxx and kyy in %, coverage of the 95 % intervals in % (all eight entries), and
+milliseconds per H. The default method gets all replicates, the others a quarter of them.
 """
 
 from __future__ import annotations
@@ -13,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.rigs.estimator_cases import H_TRUE, OMEGA, Case, draw
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
-from tpjb_ident.runtime.executors import local_workers, map_ordered
 
 METHODS = ("ols", "rlm:huber", "rlm:tukey", "mm", "iv", "mm-eiv")
 CASES = (
@@ -42,16 +42,7 @@ class Score:
     worst: float  #: largest relative error of any replicate [%]
 
     def __str__(self) -> str:
-        return f"{self.rmse:6.2f} ({self.bias[0]:+.2f} {self.bias[1]:+.2f}, {self.coverage:.0f})"
-
-
-@dataclass(frozen=True)
-class Row:
-    """One case of the study: windows per direction."""
-
-    case: str
-    windows: int
-    scores: dict[str, Score]
+        return f"{self.rmse:.2f} ({self.bias[0]:+.2f} {self.bias[1]:+.2f}, {self.coverage:.0f})"
 
 
 def score(case: Case, method: str, replicates: int, seed: int) -> Score:
@@ -60,15 +51,10 @@ def score(case: Case, method: str, replicates: int, seed: int) -> Score:
     errors, biases, inside, times = [], [], [], []
     for replicate in range(replicates):
         s = draw(case, seed, replicate)
+        command = s.command if name == "iv" else None
         began = time.process_time()
         est = estimate_dynamic_stiffness(
-            s.D,
-            s.F,
-            OMEGA,
-            s.direction,
-            method=name,
-            norm=norm or None,
-            reference=s.command if name == "iv" else None,
+            s.D, s.F, OMEGA, s.direction, method=name, norm=norm or None, reference=command
         )
         times.append(time.process_time() - began)
         errors.append(np.linalg.norm(est.h - H_TRUE) / np.linalg.norm(H_TRUE))
@@ -84,44 +70,24 @@ def score(case: Case, method: str, replicates: int, seed: int) -> Score:
     )
 
 
-def study(replicates: int, seed: int, count: int) -> list[Row]:
-    """Score every method in every case, `count` cases at a time; print each row as it comes."""
-    jobs = [(case, replicates, seed) for case in CASES]
-    rows = []
-    with local_workers(count) as workers:
-        for row in map_ordered(workers, score_case, jobs):
-            print(f"| {row.case} | " + " | ".join(str(row.scores[m]) for m in METHODS) + " |", flush=True)
-            rows.append(row)
-    return rows
-
-
-def score_case(case: Case, replicates: int, seed: int) -> Row:
-    """Score every method in one case."""
-    scores = {}
-    for method in METHODS:
-        scores[method] = score(case, method, replicates if method == DEFAULT else max(replicates // 4, 1), seed)
-    return Row(case.name, case.windows, scores)
-
-
 def main() -> None:
-    """Print the table."""
-    parser = study_parser(__doc__)
-    parser.add_argument("--replicates", type=int, default=400)
-    parser.add_argument("--seed", type=int, default=2026)
-    parser.add_argument("--workers", type=int, default=1)
-    options = parser.parse_args()
-    print(f"{options.replicates} replicates, seed {options.seed}: RMSE % (bias kxx, kyy %, coverage %)")
-    print("| case | " + " | ".join(METHODS) + " |")
-    print("|---|" + "---|" * len(METHODS))
-    rows = study(options.replicates, options.seed, options.workers)
-    if options.write:
-        full = [row for row in rows if row.windows == 20]
-        times = [np.median([row.scores[m].milliseconds for row in full]) for m in METHODS]
-        ratios = ["time per H, `rlm:huber` = 1", *(f"{t / times[METHODS.index('rlm:huber')]:.2f}" for t in times)]
-        entries = [[row.case, *(str(row.scores[m]).strip() for m in METHODS)] for row in rows]
-        note = f"{options.replicates} replicates, seed {options.seed}: RMSE % of H (bias kxx, kyy %, coverage %).\n\n"
-        head = ["case", *(f"`{m}`" for m in METHODS)]
-        write_section("estimators", typed(), note + table(head, [*entries, ratios]))
+    """Score every method in every case; times are of the cases with all windows."""
+    asked = study_parser(__doc__, replicates=400, seed=2026).parse_args()
+    rows, times = [], []
+    for case in CASES:
+        scores = []
+        for method in METHODS:
+            count = asked.replicates if method == DEFAULT else max(asked.replicates // 4, 1)
+            scores.append(score(case, method, count, asked.seed))
+        rows.append([case.name, *map(str, scores)])
+        print(*rows[-1], sep=" | ", flush=True)
+        if case.windows == Case().windows:
+            times.append([s.milliseconds for s in scores])
+    middle = np.median(times, axis=0)
+    ratios = middle / middle[METHODS.index("rlm:huber")]
+    rows.append(["time per H, `rlm:huber` = 1", *(f"{ratio:.2f}" for ratio in ratios)])
+    note = f"{asked.replicates} replicates, seed {asked.seed}: RMSE % of H (bias kxx, kyy %, coverage %).\n\n"
+    report(asked, "estimators", note + table(["case", *(f"`{method}`" for method in METHODS)], rows))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ Adiabatic, pivots by Kirk, each point from nothing: what is answered, what is sa
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from dataclasses import replace
@@ -18,7 +17,7 @@ from model.bearing import Bearing
 from model.bearing_file import load_bearing
 from model.options import Options
 from model.predict import predict
-from tests.studies.results import table, write_section
+from tests.studies.results import report, study_parser, table
 
 FOLDER = Path(__file__).resolve().parents[2] / "model" / "bearings"
 SPEED = 2 * math.pi * 500.0
@@ -43,9 +42,7 @@ def solved(bearing: Bearing, turbulence: str) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
+    asked = study_parser(__doc__).parse_args()
     rows = []
     for name in ("rocker", "spherical"):
         drawn = load_bearing(FOLDER / f"{name}.toml")
@@ -55,10 +52,7 @@ def main() -> None:
                 pads = (replace(p, pad_clearance=p.assembled_clearance / (1.0 - preload)) for p in drawn.pads)
                 film = "laminar" if turbulence == "none" else turbulence
                 rows.append([name, film, f"{preload:g}", *solved(drawn.with_pads(tuple(pads)), turbulence)])
-    text = table(("bearing", "film", "preload", "answered", "Re", "longest [ms]", "of the rest"), rows)
-    print(text)
-    if asked.write:
-        write_section("fast", "python -m tests.studies.fast_shaft --write", text)
+    report(asked, "fast", table(("bearing", "film", "preload", "answered", "Re", "longest [ms]", "of the rest"), rows))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Put each named fault into good virtual campaigns: what does `tpjb check` say, and does identification go on?
 
-    python -m tests.studies.fault_detection [--seeds 3] [--good 30] [--faults dead ..] [--rows FILE] [--write]
+    python -m tests.studies.fault_detection [--seeds 3] [--good 12] [--only dead|stuck] [--rows FILE] [--write]
 
 Per fault: the share of campaigns in which the struck run is named with an error or a warning, the share in which
 another run is blamed, and what became of the coefficients: the largest error of the direct terms
@@ -27,7 +27,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Fault, Noise, operating_points
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import BEARINGS, DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig, written
-from tests.studies.results import Rows, study_parser, table, typed, write_section
+from tests.studies.results import Rows, report, study_parser, table
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
 
@@ -237,17 +237,11 @@ def run_seed(name: str, seed: int, folder: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--first", type=int, default=1, help="first seed")
-    parser.add_argument("--good", type=int, default=12, help="good campaigns")
-    parser.add_argument("--faults", nargs="*", help="parts of names")
-    parser.add_argument("--rows", type=Path, help="file of results, one JSON line each; what it has is not done again")
-    asked = parser.parse_args()
+    asked = study_parser(__doc__, seeds=3, first=1, good=12, only="", rows=Path).parse_args()
     stored, entries = Rows(asked.rows, "fault", "seed"), []
     with tempfile.TemporaryDirectory() as scratch:
         for name in (GOOD, WANDERING, *FAULTS, *AMPLIFIED, MIXED):
-            if asked.faults and not any(part in name for part in asked.faults):
+            if not any(part in name for part in asked.only.split("|")):
                 continue
             seeds = range(asked.first, asked.first + (asked.good if name in (GOOD, WANDERING) else asked.seeds))
             for seed in seeds:
@@ -255,9 +249,8 @@ def main() -> None:
                     stored.add(run_seed(name, seed, Path(scratch)))
             entries.append(cells(name, [stored.known[name, seed] for seed in seeds]))
             print(entries[-1], flush=True)
-    if asked.write:
-        head = ("fault", "named", "as", "others blamed", "worst error", "identify says")
-        write_section("faults", typed(), table(head, entries))
+    head = ("fault", "named", "as", "others blamed", "worst error", "identify says")
+    report(asked, "faults", table(head, entries))
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ from typing import Any
 
 from tests.hostile.fuzz_mutations import mutated
 from tests.hostile.fuzz_targets import ROOT, TARGETS, Target, make_target
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 
 #: CPU seconds and bytes of growth above which a case is a finding.
 SLOWEST, LARGEST = 5.0, 2**31
@@ -268,13 +268,8 @@ def replay(name: str, seed: int, number: int) -> str | None:
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
+    parser = study_parser(__doc__, cases=100_000, seconds=600.0, seed=1, keep=Path("fuzz-findings"), case=int)
     parser.add_argument("target", nargs="+", choices=[*TARGETS, "all"])
-    parser.add_argument("--cases", type=int, default=100_000)
-    parser.add_argument("--seconds", type=float, default=600.0, help="wall time per target")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
-    parser.add_argument("--case", type=int, help="feed this case of the seed alone")
     given = parser.parse_args()
     names = TARGETS if "all" in given.target else given.target
     if given.case is not None:
@@ -289,8 +284,7 @@ def main() -> None:
         rows.append((name, *cells, f"{result['peak_MB']} MB", len(result["findings"])))
         failed = failed or bool(result["findings"])
     head = ("reader", "cases", "taken", "CPU s", "slowest case", "peak memory", "findings")
-    if given.write:
-        write_section("fuzz", typed(), table(head, rows))
+    report(given, "fuzz", table(head, rows))
     sys.exit(failed)
 
 

@@ -1,6 +1,6 @@
 """Mutants of interval limits: does a test notice when a limit is computed on the wrong side, or not at all?
 
-    python -m tests.studies.limit_mutants [--write]
+    python -m tests.studies.limit_mutants [--only FILE] [--write]
 
 Each mutant changes one expression of one file in a copy of the checkout and runs the tests nearest to it; it is killed
 where one of them fails. The tests are first run on the copy as it is, so that a failure is the mutant's.
@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -98,22 +98,18 @@ def outcome(folder: Path, mutant: Mutant) -> str:
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    parser.add_argument("--files", nargs="*", default=list(TESTS), help="of these files alone")
-    given = parser.parse_args()
+    given = study_parser(__doc__, only="").parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "checkout"
         shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", "build", ".venv", "__pycache__"))
         rows = []
-        for file in given.files:
+        for file in (file for file in TESTS if given.only in file):
             whole = passes(folder, file)
             for mutant in (m for m in MUTANTS if m.file == file):
                 answer = outcome(folder, mutant) if whole else "tests fail as they are"
                 rows.append((f"`{file}`", f"`{mutant.before}`", f"`{mutant.after}`", answer))
                 print(*rows[-1], flush=True)
-        if given.write:
-            columns = ("file", "expression", "becomes", "outcome")
-            write_section("limits", typed(), table(columns, rows))
+    report(given, "limits", table(("file", "expression", "becomes", "outcome"), rows))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ to no preload, where least decides which pads carry.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from collections import Counter
@@ -26,7 +25,7 @@ import numpy as np
 from model.predict import predict
 from model.prediction import Prediction
 from tests.rigs.random_bearings import RANGES, Case, draw
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, report, study_parser, table
 
 LIGHT_TO_HEAVY = RANGES | {
     "preload": (-0.05, 0.6, False),
@@ -126,24 +125,14 @@ def summary(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rings", action="store_true", help="hot rings of next to no preload")
-    parser.add_argument("--rows", type=Path, help="JSON lines of the cases judged so far")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
+    asked = study_parser(__doc__, cases=100, seed=1, rings=False, rows=Path).parse_args()
     rows = Rows(asked.rows, "case")
     drawn = rings if asked.rings else cases
     for number, (case, thermal) in enumerate(drawn(asked.cases, asked.seed)):
         if (number,) not in rows.known:
             rows.add(judged(number, case, thermal))
     text = summary(row for key, row in rows.known.items() if key[0] < asked.cases)
-    print(text)
-    if asked.write:
-        kind = " --rings" if asked.rings else ""
-        command = f"python -m tests.studies.loaded_pads --cases {asked.cases} --seed {asked.seed}{kind} --write"
-        write_section("rings" if asked.rings else "loaded pads", command, text)
+    report(asked, "rings" if asked.rings else "loaded pads", text)
 
 
 if __name__ == "__main__":

@@ -133,10 +133,7 @@ def _label(fault: Fault) -> str:
 
 def main() -> None:
     """Run everything that the command line asks for."""
-    parser = results.study_parser(__doc__)
-    parser.add_argument("--seeds", type=int, default=100)
-    parser.add_argument("--first", type=int, default=1000)
-    parser.add_argument("--faults", type=int, default=4, help="per seed")
+    parser = results.study_parser(__doc__, seeds=100, first=1000, faults=4)
     parser.add_argument("--programme", choices=("up", *PROGRAMMES), default="up", help="how the load goes")
     given = parser.parse_args()
     rows: list[tuple[float, ...]] = []
@@ -149,11 +146,8 @@ def main() -> None:
             rng = np.random.default_rng(seed)
             drawn = rng.choice(len(cases), min(given.faults, len(cases)), replace=False)
             found += [(cases[k], seed, one_fault(seed, cases[k], path)) for k in drawn]
-    table = np.array(rows)
-    lines = [*report(table), *report_faults(found)]
-    print("\n".join(lines))
-    if given.write:
-        results.write_section("pivots", results.typed(), "\n".join(lines))
+    lines = [*report(np.array(rows)), *report_faults(found)]
+    results.report(given, "pivots", "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ that has not converged does not say so. Rows are stored as they come: called aga
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 import warnings
@@ -31,7 +30,7 @@ from model.predict import predict
 from model.prediction import Prediction
 from model.statics.pad_film import PadFilm
 from tests.rigs.random_bearings import Case, draw
-from tests.studies.results import Rows, table, write_section
+from tests.studies.results import Rows, report, study_parser, table
 
 
 def turbulence(case: Case, rng: np.random.Generator) -> Prediction:
@@ -173,31 +172,22 @@ def table_rows(rows: list[dict[str, Any]]) -> list[tuple[object, ...]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", choices=KINDS, action="append")
-    parser.add_argument("--rows", type=Path, help="kept rows, added to as they come")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    chosen = parser.parse_args()
+    asked = study_parser(__doc__, cases=2000, seed=1, only="", rows=Path).parse_args()
     warnings.simplefilter("error")
-    stored = Rows(chosen.rows, "kind", "case")
-    cases = draw(chosen.cases, chosen.seed)
-    share = chosen.cases // 4
-    for kind in chosen.only or KINDS:
-        first = min(list(KINDS).index(kind), 3) * share
-        for number in range(first, first + share):
+    stored = Rows(asked.rows, "kind", "case")
+    cases = draw(asked.cases, asked.seed)
+    share = asked.cases // len(KINDS)
+    for place, kind in enumerate(KINDS):
+        if asked.only not in kind:
+            continue
+        for number in range(place * share, (place + 1) * share):
             if (kind, number) not in stored.known:
                 row = judged(kind, number, cases[number])
                 stored.add(row)
                 if row["fault"] or not row["converged"]:
                     print(row, flush=True)
     head = ("physics", "bearings", "converged", "the rest, all named", "silently wrong")
-    made = table(head, table_rows([*stored.known.values()]))
-    print(made)
-    if chosen.write:
-        command = f"python -m tests.studies.random_bearings --cases {chosen.cases} --seed {chosen.seed} --write"
-        write_section("random-bearings", command, made)
+    report(asked, "random-bearings", table(head, table_rows([*stored.known.values()])))
 
 
 if __name__ == "__main__":

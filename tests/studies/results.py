@@ -46,11 +46,27 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(lines)
 
 
-def study_parser(described: str | None) -> argparse.ArgumentParser:
-    """What every study can be asked: its first lines, and to write its section."""
+def study_parser(described: str | None, **options: Any) -> argparse.ArgumentParser:
+    """What a study can be asked: its options, each by its default or by its type, and to write its section."""
     parser = argparse.ArgumentParser(description=described, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
+    for name, value in options.items():
+        flag = "--" + name.replace("_", "-")
+        if value is False:
+            parser.add_argument(flag, action="store_true")
+        elif isinstance(value, type):
+            parser.add_argument(flag, type=value)
+        else:
+            parser.add_argument(flag, type=type(value), default=value)
     return parser
+
+
+def report(asked: argparse.Namespace, section: str, text: str, command: str = "") -> None:
+    """Print a study's table, and write it where that is asked; `command` makes it again, if not what was typed."""
+    if asked.write:
+        write_section(section, command or typed(), text)
+    else:
+        print(text)
 
 
 def typed() -> str:

@@ -1,6 +1,6 @@
 """Identified figures of the sample campaigns against their truth: shares inside the intervals and errors.
 
-python -m tests.studies.sample_accuracy [../shared/samples] [--write]
+python -m tests.studies.sample_accuracy [--write]
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ import numpy as np
 
 import rigdata
 from model.bearing_file import parse_bearing
-from tests.studies.results import study_parser, table, typed, write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.pivot import fit_pivots
 
+SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "samples"
 NAMES = ("rocker-baseline", "rocker-measured-pivots.h5", "spherical-baseline.h5")
 LOADS = (1000.0, 2000.0, 4000.0)
 
@@ -79,18 +80,13 @@ def locus_error(locus: Any, truth: dict[str, Any]) -> float:
 
 
 def main() -> None:
-    parser = study_parser(__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("../shared/samples"))
-    asked = parser.parse_args()
+    asked = study_parser(__doc__).parse_args()
     rows = []
     for name in NAMES:
-        truth = json.loads((asked.folder / "truth" / f"{name.removesuffix('.h5')}.json").read_text("utf-8"))
-        rows.append(row(asked.folder / name, truth))
+        truth = json.loads((SAMPLES / "truth" / f"{name.removesuffix('.h5')}.json").read_text("utf-8"))
+        rows.append(row(SAMPLES / name, truth))
     head = ("campaign", "K, C in 95 %", "largest error", "pivots in band", "largest error", "clearance", "locus")
-    text = table(head, rows)
-    print(text)
-    if asked.write:
-        write_section("samples", typed(), text)
+    report(asked, "samples", table(head, rows))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Every printed row of two four-pad bearings of the Journal-Bearing Databook (T. Someya, ed., Springer 1989), and here.
 
-    python -m tests.studies.someya [--table FILE] [--write]
+    python -m tests.studies.someya [--write]
 
 The bearing and what its numbers mean are those of `tests/literature/test_model_someya.py`; the rows are read from the
 references beside the checkout (`../shared/references`), where they have been transcribed.
@@ -8,12 +8,11 @@ references beside the checkout (`../shared/references`), where they have been tr
 
 from __future__ import annotations
 
-import argparse
 import csv
 from pathlib import Path
 
 from tests.literature.test_model_someya import BETWEEN_PADS, ON_PAD, numbers
-from tests.studies.results import table, write_section
+from tests.studies.results import report, study_parser, table
 
 PRINTED = Path(__file__).resolve().parents[3] / "shared" / "references" / "someya_4pad_tpjb.csv"
 
@@ -31,16 +30,10 @@ def compared(row: dict[str, str]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--table", type=Path, default=PRINTED, help="the printed rows")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
-    with asked.table.open(encoding="utf-8", newline="") as file:
+    asked = study_parser(__doc__).parse_args()
+    with PRINTED.open(encoding="utf-8", newline="") as file:
         rows = [compared(row) for row in csv.DictReader(file)]
-    text = table(("load", "S", "E", "Kxx", "Kyy", "Bxx", "Byy"), rows)
-    print(text)
-    if asked.write:
-        write_section("someya", "python -m tests.studies.someya --write", text)
+    report(asked, "someya", table(("load", "S", "E", "Kxx", "Kyy", "Bxx", "Byy"), rows))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ machine code on the disk, once in each checkout.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -18,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.studies.results import table, write_section
+from tests.studies.results import report, study_parser, table
 
 HERE = Path(__file__).resolve().parents[2]
 #: Runs in either checkout; prints milliseconds by name as JSON.
@@ -128,12 +127,7 @@ def measured(checkout: Path, model_only: bool) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--before", type=Path, required=True, help="an older checkout")
-    parser.add_argument("--rounds", type=int, default=4)
-    parser.add_argument("--model-only", action="store_true", help="leave out the commands")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
+    asked = study_parser(__doc__, before=HERE, rounds=4, model_only=False).parse_args()
     checkouts = (asked.before.resolve(), HERE)
     for checkout in checkouts:
         measured(checkout, asked.model_only)  # compiled once, if it was not
@@ -144,12 +138,7 @@ def main() -> None:
         sides = [firsts] if name in firsts[0] else rounds
         before, after = (min(both[side][name] for both in sides) for side in (0, 1))
         rows.append((name, f"{before:.1f}", f"{after:.1f}", f"{after / before:.2f}"))
-    text = table(("what", "before [ms]", "after [ms]", "after / before"), rows)
-    print(text)
-    if asked.write:
-        only = " --model-only" if asked.model_only else ""
-        command = f"python -m tests.studies.speed --before CHECKOUT --rounds {asked.rounds}{only} --write"
-        write_section("speed", command, text)
+    report(asked, "speed", table(("what", "before [ms]", "after [ms]", "after / before"), rows))
 
 
 if __name__ == "__main__":

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.studies.diagnosis.mixtures import SKIPPED, hidden, said
-from tests.studies.diagnosis.strangers import KINDS, Stranger, asked_parser, draw, every_row
+from tests.studies import results
+from tests.studies.diagnosis.bench import SKIPPED, hidden, said
+from tests.studies.diagnosis.strangers import KINDS, Stranger, draw, every_row
 from tests.studies.diagnosis.tables import all_there, no_false
-from tests.studies.results import table, write_section
 from tpjb_ident.diagnosis.comparison.search import Comparison, _Search
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.workers import workers
@@ -73,7 +74,7 @@ def report(rows: Sequence[dict[str, Any]]) -> str:
             for end, factor in ENDS.items()
         ]
     head = ["constant", "value", "answers that change", "all that is hidden listed", "a wrong name listed", "named"]
-    return f"{len(rows)} campaigns.\n\n" + table([*head, "a name where scatter is all"], lines)
+    return f"{len(rows)} campaigns.\n\n" + results.table([*head, "a name where scatter is all"], lines)
 
 
 def _line(rows: Sequence[dict[str, Any]], name: str, value: str, key: str) -> list[object]:
@@ -93,12 +94,9 @@ def _answer(row: dict[str, Any]) -> tuple[str, list[str]]:
 
 def main() -> None:
     """Search, judge with every constant, and print the table."""
-    asked = asked_parser(__doc__, "constants.jsonl", bearings=12, count=6, seed=302).parse_args()
-    text = report(every_row(asked, run))
-    if asked.write:
-        write_section("constants", "python -m tests.studies.diagnosis.constants --write", text)
-    else:
-        print(text)
+    options = {"bearings": 12, "count": 6, "seed": 302, "rows": Path("constants.jsonl")}
+    asked = results.study_parser(__doc__, **options).parse_args()
+    results.report(asked, "constants", report(every_row(asked, run)))
 
 
 if __name__ == "__main__":

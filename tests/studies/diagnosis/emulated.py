@@ -2,9 +2,8 @@
 
 What a bearing does at a static point is a smooth function of some 25 numbers (oil, clearances and pivots pad by pad,
 misalignment, starvation, ..), which are read off the `Setup`: effects and nuisances that move the same number add up
-as in the model. Every number by itself is followed by a spline through solved points; every pair by its bilinear
-term, solved at two corners (a cut expansion to second order: Rabitz, Alis, J. Math. Chem. 25 (1999) 197); what all
-pads do together, beyond that, by a spline of its own. Structure and instruments, dry tests and polygon are computed
+as in the model. Every number by itself is followed by a spline through solved points; what all pads do together, beyond
+that, by a spline of its own. Structure and instruments, dry tests and polygon are computed
 exactly. Truth and fits use the same emulator: what is tested is the decision, not the solver; raw records of another
 program test the rest.
 """
@@ -12,7 +11,6 @@ program test the rest.
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 import pickle
 from collections.abc import Callable, Iterator, Sequence
@@ -37,43 +35,43 @@ from tpjb_ident.diagnosis.forward.forward import (
     SolvedPoint,
     StaticPoint,
 )
-from tpjb_ident.diagnosis.observations.observe import Layout
 
-#: Coordinates: name, where its spline is solved, and the step of its bilinear terms.
+#: Where a coordinate's spline is solved, as shares of its range, and that range.
+Axis = tuple[tuple[float, ...], float]
+#: Coordinates: name, where its spline is solved as shares of its range, and that range.
 _BOTH = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
 _UP = (0.1, 0.25, 0.5, 0.75, 1.0)
-_WHOLE: dict[str, tuple[tuple[float, ...], float, float]] = {
-    "viscosity": (_BOTH, 0.5, 0.15),
-    "exponent": (_BOTH, 0.4, 0.1),
-    "heat": (_BOTH, 0.7, 0.15),
-    "supply": (_BOTH, 12.0, 3.0),
-    "arc": (_BOTH, 0.12, 0.03),
-    "damping": (_UP, 2e6, 4e5),
-    "rotation": (_UP, 5e4, 5e3),
-    "rolling": (_UP, 5.0, 1.0),
-    "lean x": (_BOTH, 1.1e-3, 4e-4),
-    "lean y": (_BOTH, 1.1e-3, 4e-4),
-    "starvation": (_UP, 0.5, 0.15),
-    "carryover": (_UP, 0.98, 0.4),
+_WHOLE: dict[str, Axis] = {
+    "viscosity": (_BOTH, 0.5),
+    "exponent": (_BOTH, 0.4),
+    "heat": (_BOTH, 0.7),
+    "supply": (_BOTH, 12.0),
+    "arc": (_BOTH, 0.12),
+    "damping": (_UP, 2e6),
+    "rotation": (_UP, 5e4),
+    "rolling": (_UP, 5.0),
+    "lean x": (_BOTH, 1.1e-3),
+    "lean y": (_BOTH, 1.1e-3),
+    "starvation": (_UP, 0.5),
+    "carryover": (_UP, 0.98),
 }
 #: The same, of every pad; and what all pads do together, beyond that.
-_OF_A_PAD: dict[str, tuple[tuple[float, ...], float, float]] = {
-    "offset": (_BOTH, 30e-6, 6e-6),
-    "pivot": (_BOTH, 1.6, 0.4),
-    "bore": (_BOTH, 40e-6, 10e-6),
+_OF_A_PAD: dict[str, Axis] = {
+    "offset": (_BOTH, 30e-6),
+    "pivot": (_BOTH, 1.6),
+    "bore": (_BOTH, 40e-6),
 }
 #: Beyond this multiple of its range a number has no equilibrium, as in the model something would give out.
 REACH = 1.5
 
 
-def axes(setup: Setup) -> dict[str, tuple[tuple[float, ...], float, float]]:
+def axes(setup: Setup) -> dict[str, Axis]:
     """Coordinates of a bearing with as many pads as it has; lengths are of a journal of 100 mm."""
     size = setup.bearing.journal_diameter / 0.1
     pads = {f"{name} {k}": row for name, row in _OF_A_PAD.items() for k in range(len(setup.bearing.pads))}
     scale = {"offset": size, "bore": size}
     return {
-        name: (shares, reach * scale.get(name.split()[0], 1.0), step * scale.get(name.split()[0], 1.0))
-        for name, (shares, reach, step) in {**_WHOLE, **pads}.items()
+        name: (shares, reach * scale.get(name.split()[0], 1.0)) for name, (shares, reach) in {**_WHOLE, **pads}.items()
     }
 
 
@@ -134,21 +132,16 @@ class Table:
     names: tuple[str, ...]
     base: FloatArray
     splines: list[CubicSpline] = field(repr=False)
-    pairs: FloatArray = field(repr=False)
     together: dict[str, CubicSpline] = field(repr=False)
 
     def __call__(self, place: FloatArray) -> FloatArray:
         """Answers at a place (c,)."""
-        moved = np.flatnonzero(place)
         out = self.base.copy()
-        for i in moved:
+        for i in np.flatnonzero(place):
             out += _follow(self.splines[i], place[i])
         for kind, spline in self.together.items():
             out += _follow(spline, float(np.mean(place[_members(self.names, kind)])))
-        if not len(self.pairs):
-            return out
-        u = place[moved]
-        return np.asarray(out + np.tensordot(np.outer(u, u), self.pairs[np.ix_(moved, moved)], 2))
+        return np.asarray(out)
 
 
 def _members(names: Sequence[str], kind: str) -> list[int]:
@@ -169,7 +162,7 @@ class Emulated(ModelCache):
     base: Setup | None = None
     points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = field(default_factory=dict)
     table: Table | None = None
-    axes: dict[str, tuple[tuple[float, ...], float, float]] = field(default_factory=dict)
+    axes: dict[str, Axis] = field(default_factory=dict)
     _last: tuple[bytes, FloatArray] | None = None
     _setup: tuple[Setup, FloatArray] | None = None
 
@@ -225,29 +218,27 @@ def _solved(latent: FloatArray, point: StaticPoint, lines: int) -> SolvedPoint:
     return SolvedPoint(h, rest[:2] / 1e5, force, rest[2 : 2 + pads], rest[2 + pads :] * 1e3)
 
 
-def emulate(forward: Forward, more: Layout, kept: Path | None = None, pairs: bool = True) -> Emulated:
-    """Solve what an emulator needs (some minutes; seconds without the terms of pairs), or read it."""
+def emulate(forward: Forward, kept: Path) -> Emulated:
+    """Solve what an emulator needs (seconds), or read it."""
     points: dict[tuple[StaticPoint, tuple[float, ...]], slice] = {}
     count = 0
-    for point, lines in _asked(forward.layout, more):
+    for point, lines in _asked(forward):
         size = 8 * len(lines) + 2 + 2 * len(forward.setup.bearing.pads)
         points[(point, lines)] = slice(count, count + size)
         count += size
-    if kept is not None and kept.exists():
+    if kept.exists():
         table = pickle.loads(kept.read_bytes())
     else:
-        table = _tabulate(forward, points, pairs)
-        if kept is not None:
-            kept.write_bytes(pickle.dumps(table))
+        table = _tabulate(forward, points)
+        kept.write_bytes(pickle.dumps(table))
     return Emulated(base=forward.setup, points=points, table=table, axes=axes(forward.setup))
 
 
-def _asked(*layouts: Layout) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
-    for layout in layouts:
-        for test in layout.dynamic:
-            yield (test.load, test.direction, test.speed), tuple(test.excitation)
-        for one in layout.locus:
-            yield (one.load, one.direction, one.speed), (one.speed,)
+def _asked(forward: Forward) -> Iterator[tuple[StaticPoint, tuple[float, ...]]]:
+    for test in forward.layout.dynamic:
+        yield (test.load, test.direction, test.speed), tuple(test.excitation)
+    for test in forward.layout.locus:
+        yield (test.load, test.direction, test.speed), (test.speed,)
 
 
 def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
@@ -262,26 +253,12 @@ def solve(forward: Forward, setup: Setup, points: Any) -> FloatArray:
     return np.concatenate(out)
 
 
-def _tabulate(forward: Forward, points: Any, pairs: bool) -> Table:
+def _tabulate(forward: Forward, points: Any) -> Table:
     start = forward.setup
     base, along = solve(forward, start, points), axes(start)
     names = tuple(along)
-    splines = [_spline(forward, points, base, lambda v, n=name: at(start, n, v), *along[name][:2]) for name in names]
-    table = Table(names, base, splines, np.zeros((len(names), len(names), len(base)) if pairs else (0, 0, 0)), {})
-    for i, j in itertools.combinations(range(len(names)), 2) if pairs else ():
-        steps = [along[names[k]][2] for k in (i, j)]
-        corners = []
-        for sign in (1.0, -1.0):
-            a, b = (sign * step if along[names[k]][0] is _BOTH else step for k, step in zip((i, j), steps, strict=True))
-            place = np.zeros(len(names))
-            place[[i, j]] = a, b
-            try:
-                missing = solve(forward, at(at(start, names[i], a), names[j], b), points) - table(place)
-            except NoEquilibriumError:
-                continue
-            corners.append(missing / (a * b))
-        if corners:
-            table.pairs[i, j] = table.pairs[j, i] = 0.5 * np.mean(corners, axis=0)
+    splines = [_spline(forward, points, base, lambda v, n=name: at(start, n, v), *along[name]) for name in names]
+    table = Table(names, base, splines, {})
     for kind in _OF_A_PAD:
         members = _members(names, kind)
 
@@ -293,7 +270,7 @@ def _tabulate(forward: Forward, points: Any, pairs: bool) -> Table:
             place[members] = value
             return table(place)
 
-        table.together[kind] = _spline(forward, points, known, moved, *along[f"{kind} 0"][:2])
+        table.together[kind] = _spline(forward, points, known, moved, *along[f"{kind} 0"])
     return table
 
 

@@ -1,6 +1,6 @@
 """Strangers: bearings, plans and faults by a generator that nothing of the decision was made for.
 
-    python -m tests.studies.diagnosis.strangers [--bearings 8] [--count 30] [--seed 0] [--rows FILE] [--write]
+    python -m tests.studies.diagnosis.strangers [--bearings 8] [--count 30] [--seed 0] [--clean] [--rows FILE] [--write]
 
 Every bearing is drawn: 3 to 6 pads, load on or between them, central or offset pivots, journals of 60 to 250 mm, five
 oils. Every plan is drawn: 2 to 12 operating points, one or two speeds, with or without locus, polygon, dry tests and
@@ -29,10 +29,10 @@ from model.bearing_file import load_bearing
 from model.effects import Effect
 from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
+from tests.studies.diagnosis.bench import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
 from tests.studies.diagnosis.emulated import emulate
-from tests.studies.diagnosis.mixtures import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
 from tests.studies.diagnosis.tables import all_there, no_false, tables
-from tests.studies.results import Rows, study_parser, table, write_section
+from tests.studies.results import Rows, report, study_parser, table
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import ACCURACY, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
@@ -191,10 +191,10 @@ def stranger(number: int, folder: Path | None, points: int = 0) -> Stranger:
         except NoEquilibriumError:
             continue
     table_of = None if folder is None else folder / f"stranger-{number}-{points}.table"
-    cache = model.cache if table_of is None else emulate(model, Layout(()), table_of, pairs=False)
+    cache = model.cache if table_of is None else emulate(model, table_of)
     forward = Forward(setup, layout, observations.elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=SKIPPED))
-    return Stranger(Bench(problem, forward, forward, seen_sizes(problem, forward)), grade, f"{words}; {plan}", text)
+    return Stranger(Bench(problem, forward, seen_sizes(problem, forward)), grade, f"{words}; {plan}", text)
 
 
 def faults(one: Stranger, kind: str, rng: np.random.Generator) -> list[Effect]:
@@ -283,7 +283,7 @@ def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> di
     verdict = decision.verdict
     return {
         "kind": kind, "bearing": number, "seed": seed, "words": one.words, **hidden(drawn), **said(verdict),
-        "elsewhere": {}, "gap": verdict.gap, "reasons": list(verdict.reasons), "scale": decision.model.posterior.scale,
+        "gap": verdict.gap, "reasons": list(verdict.reasons), "scale": decision.model.posterior.scale,
         "far": [(d.name, d.size, d.significance) for d in decision.model.tolerances[:3]],
         "fits": [(f.label, f.posterior.total, p) for f, p in zip(comparison.fits[:6], comparison.probabilities)],
         "seconds": time.process_time() - began, "tried": len(comparison.fits),
@@ -340,15 +340,6 @@ def run_clean(folder: Path) -> str:
     return clean_table([*stored.known.values()])
 
 
-def asked_parser(described: str | None, rows: str, bearings: int, count: int, seed: int) -> argparse.ArgumentParser:
-    """What a study of strangers can be asked: how many bearings, campaigns of each, from which seed on."""
-    parser = study_parser(described)
-    for name, value in (("--bearings", bearings), ("--count", count), ("--seed", seed)):
-        parser.add_argument(name, type=int, default=value)
-    parser.add_argument("--rows", type=Path, default=Path(rows))
-    return parser
-
-
 def every_row(
     asked: argparse.Namespace, diagnosed: Callable[[Stranger, int, int], dict[str, Any] | None]
 ) -> list[dict[str, Any]]:
@@ -367,21 +358,14 @@ def every_row(
 
 def main() -> None:
     """Draw, diagnose, and print the tables."""
-    parser = asked_parser(__doc__, "strangers.jsonl", bearings=8, count=30, seed=0)
-    parser.add_argument("--clean", action="store_true", help="single tolerances on a bearing as drawn instead")
-    asked = parser.parse_args()
+    options = {"bearings": 8, "count": 30, "seed": 0, "clean": False, "rows": Path("strangers.jsonl")}
+    asked = study_parser(__doc__, **options).parse_args()
     if asked.clean:
-        text = run_clean(asked.rows.parent)
-        if asked.write:
-            write_section("clean", "python -m tests.studies.diagnosis.strangers --clean --write", text)
-        print(text)
-        return
-    settings = DiagnoseSettings(workers=1, skip=SKIPPED)
-    text = tables(every_row(asked, lambda one, number, seed: run(one, number, seed, settings)))
-    if asked.write:
-        write_section("strangers", "python -m tests.studies.diagnosis.strangers --write", text)
+        report(asked, "clean", run_clean(asked.rows.parent))
     else:
-        print(text)
+        settings = DiagnoseSettings(workers=1, skip=SKIPPED)
+        rows = every_row(asked, lambda one, number, seed: run(one, number, seed, settings))
+        report(asked, "strangers", tables(rows))
 
 
 if __name__ == "__main__":

@@ -1,16 +1,12 @@
-"""Tables of mixtures, from their rows.
+"""Tables of diagnosed campaigns, from their rows.
 
-    python -m tests.studies.diagnosis.tables [--write SECTION] ROWS.jsonl [MORE.jsonl ..]
-
-`SECTION` of RESULTS.md: mixtures, mixtures-between, mixtures-one, volts, strangers, strangers-unseen.
+python -m tests.studies.diagnosis.tables [--section strangers-unseen] [--write] ROWS.jsonl [MORE.jsonl ..]
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +15,7 @@ from typing import Any
 
 from scipy.stats import beta
 
-from tests.studies.results import write_section
+from tests.studies.results import report, study_parser
 
 Row = Mapping[str, Any]
 VERDICTS = ("consistent", "named", "ambiguous", "partly-explained", "unexplained")
@@ -46,8 +42,6 @@ def tables(rows: Sequence[Row]) -> str:
         _line("outside the library: a term, a drift, or unexplained", "90 %", described),
         _line("outside the library: no wrong name as the whole story", "", [r["verdict"] != "named" for r in outside]),
         _line("one clean cause of d' = 12 named", "98 %", clean),
-        "",
-        *_elsewhere(mixed),
         "",
         f"Processor seconds of a diagnosis: median {median(r['seconds'] for r in rows):.0f}, largest "
         f"{max(r['seconds'] for r in rows):.0f}.",
@@ -90,18 +84,6 @@ def _line(what: str, wanted: str, held: Sequence[bool]) -> str:
     low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
     high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
     return f"| {what} | {wanted} | {k} of {n}: {100 * k / n:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) |"
-
-
-def _elsewhere(rows: Sequence[Row]) -> list[str]:
-    """Error at loads and frequencies that were never fitted, where the dominant cause is named."""
-    named = [r["elsewhere"] for r in rows if r["elsewhere"] and r["named"] and _dominant(r, False)]
-    if not named:
-        return []
-    out = ["| rms error at 4.4 and 10 kN, 25 and 60 Hz, median | before | with what is named |", "|---|---|---|"]
-    for part, name in (("k", "K"), ("c", "C")):
-        before, after = (100 * median(e[f"{part}_{when}"] for e in named) for when in ("before", "after"))
-        out.append(f"| {name}, share of the direct coefficients | {before:.1f} % | {after:.1f} % |")
-    return out
 
 
 def _groups(row: Row) -> list[set[str]]:
@@ -154,15 +136,11 @@ def _held(row: Row, true: Mapping[str, float]) -> list[bool]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_parser(__doc__, section="strangers-unseen")
     parser.add_argument("rows", nargs="+", type=Path)
-    parser.add_argument("--write", metavar="SECTION", help="replace this section of RESULTS.md")
     asked = parser.parse_args()
     text = tables([json.loads(line) for path in asked.rows for line in path.read_text("utf-8").splitlines()])
-    if asked.write:
-        write_section(asked.write, f"python -m tests.studies.diagnosis.tables {' '.join(sys.argv[1:])}", text)
-    else:
-        print(text)
+    report(asked, asked.section, text)
 
 
 if __name__ == "__main__":

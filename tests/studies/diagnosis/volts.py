@@ -1,10 +1,10 @@
 """Mixtures as raw records: written by the virtual rig, identified and diagnosed by the command line.
 
-    python -m tests.studies.diagnosis.volts --rows FILE [--bearing stranger] [--count 100] [--core 1] [--write]
+    python -m tests.studies.diagnosis.volts --rows FILE [--count 100] [--seed 80000] [--keep FOLDER] [--write]
 
 Everything that may be off is drawn from its stated tolerance as in `strangers`, the same kinds in the same order, each
-on a bearing and a plan of its own (``--bearing rocker``: as in `mixtures`, the paper's plan); the rig writes a campaign
-from it (bearing and pivots that are off, probes, cells and thermometers with errors, noise, runout, drift, glitches,
+on a bearing and a plan of its own; the rig writes a campaign from it (bearing and pivots that are off, probes, cells
+and thermometers with errors, noise, runout, drift, glitches,
 loads that miss their set points), which is diagnosed with the bearing as drawn. The model that writes the records is
 ours, on a finer mesh than the one that diagnoses: what is tested beyond emulated campaigns is the way from volts to
 coefficients and the model itself in the place of its emulator. Campaigns are deleted once they are diagnosed; rows
@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 import pickle
 import tempfile
 import time
@@ -33,10 +32,10 @@ from model.setup import Setup
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
 from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, Timing
-from tests.studies.diagnosis import mixtures, strangers
-from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, hidden, said
+from tests.studies.diagnosis.bench import Bench, Drawn, hidden, said
+from tests.studies.diagnosis.strangers import KINDS, draw, stranger
 from tests.studies.diagnosis.tables import tables
-from tests.studies.results import Rows, study_parser, write_section
+from tests.studies.results import Rows, report, study_parser
 from tpjb_ident.compare.rig_from_model import INSTRUMENT_ERRORS, erring_instruments, truth_of
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance, Shift
@@ -44,8 +43,6 @@ from tpjb_ident.diagnosis.from_python import diagnose
 from tpjb_ident.diagnosis.observations.observe import Layout
 from tpjb_ident.errors import TpjbError
 
-#: Slow to simulate.
-SKIPPED = frozenset({"pad_conduction", "pivot_friction"})
 #: Tolerances of the instruments, and the effects of single channels.
 READ = {"probe_gain", "cell_gain", "thermometer"}
 CHANNELS = {name: own for name, own in OWN_NUMBERS.items() if own.tolerance in READ}
@@ -60,18 +57,14 @@ class Case:
     plan: RigPlan
     bench: Bench
     drawn: Drawn
-    words: str = ""
+    words: str
 
 
-def case_of(name: str, kind: str, seed: int, own: Bench | None) -> Case | None:
-    """Draw a campaign on a bearing of the library, or on one that is drawn itself."""
+def case_of(kind: str, seed: int) -> Case | None:
+    """Draw a campaign on a bearing that is drawn itself."""
     rng = np.random.default_rng([seed, 20190761])
-    if own is not None:
-        text = (BEARINGS / f"{name}.toml").read_text(encoding="utf-8")
-        drawn = mixtures.draw(replace(own, forward=own.forward.fresh()), kind, rng, OUTSIDE[1:])
-        return None if drawn is None else Case(text, RigPlan.like_paper(), own, drawn)
-    one = strangers.stranger(seed, None)
-    tries = (strangers.draw(one, kind, rng) for _ in range(6))
+    one = stranger(seed, None)
+    tries = (draw(one, kind, rng) for _ in range(6))
     drawn = next((d for d in tries if d is not None), None)
     if drawn is None:
         return None
@@ -154,7 +147,7 @@ def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]], effe
 
 
 def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) -> dict[str, Any]:
-    """Write and diagnose one campaign; a row as of `mixtures.run`."""
+    """Write and diagnose one campaign; a row as of `strangers.run`."""
     drawn = case.drawn
     left_out = {c.name for c in case.bench.problem.pool} - {c.name for c in drawn.problem.pool}
     known = {"seed": seed, "words": case.words, **hidden(drawn)}
@@ -175,7 +168,7 @@ def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) ->
     pairs = zip(comparison.fits[:6], comparison.probabilities)
     return {
         **known, **said(verdict), "gap": verdict.gap, "reasons": list(verdict.reasons),
-        "scale": comparison.best.posterior.scale, "below_floor": verdict.below_floor, "elsewhere": {},
+        "scale": comparison.best.posterior.scale, "below_floor": verdict.below_floor,
         "far": [(d.name, d.size, d.significance) for d in comparison.best.tolerances[:3]],
         "fits": [(f.label, f.posterior.total, p, f.p, f.posterior.scale) for f, p in pairs],
         "seconds": spent, "tried": len(comparison.fits),
@@ -184,33 +177,17 @@ def run(case: Case, seed: int, settings: DiagnoseSettings, keep: Path | None) ->
 
 def main() -> None:
     """Draw, write, diagnose, and print the tables."""
-    parser = study_parser(__doc__)
-    parser.add_argument("--bearing", default="stranger", help="or rocker, spherical")
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=80000)
-    parser.add_argument("--rows", type=Path, default=Path("volts.jsonl"))
-    parser.add_argument("--keep", type=Path, help="folder for the vectors of observations")
-    parser.add_argument("--core", type=int, help="run on this core only")
-    asked = parser.parse_args()
-    if asked.core is not None:
-        os.sched_setaffinity(0, {asked.core})
-    stored, settings = Rows(asked.rows, "bearing", "seed"), DiagnoseSettings(workers=1)
-    drawn_too = asked.bearing == "stranger"
-    kinds = strangers.KINDS if drawn_too else KINDS
-    own = None if drawn_too else bench(asked.bearing, None, SKIPPED)
+    options = {"count": 100, "seed": 80000, "rows": Path("volts.jsonl"), "keep": Path}
+    asked = study_parser(__doc__, **options).parse_args()
+    stored, settings = Rows(asked.rows, "seed"), DiagnoseSettings(workers=1)
     for number in range(asked.count):
-        seed, kind, began = asked.seed + number, kinds[number % len(kinds)], time.time()
-        if (asked.bearing, seed) not in stored.known:
-            case = case_of(asked.bearing, kind, seed, own)
+        seed, kind = asked.seed + number, KINDS[number % len(KINDS)]
+        if (seed,) not in stored.known:
+            case = case_of(kind, seed)
             if case is not None:
-                row = run(case, seed, settings, asked.keep)
-                stored.add({"bearing": asked.bearing, "kind": kind, "wall": time.time() - began, **row})
+                stored.add({"kind": kind, **run(case, seed, settings, asked.keep)})
     rows = [*stored.known.values()]
-    text = tables([row for row in rows if "failed" not in row])
-    if asked.write:
-        write_section("volts", f"python -m tests.studies.diagnosis.volts --rows {asked.rows} --write", text)
-    else:
-        print(text)
+    report(asked, "volts", tables([row for row in rows if "failed" not in row]))
     for row in rows:
         if "failed" in row:
             print(row["seed"], row["kind"], row["failed"])
