@@ -2,7 +2,7 @@
 
 The golden values pin the code against itself, in units of its standard deviations: a change of layout must not move a
 coefficient, its interval or a flag. A change of method may: `python -m tests.recovery.test_golden` writes the values
-anew, and the commit says why; `tests/studies/golden.py` holds fifty commands against each other.
+anew, and the commit says why.
 """
 
 from __future__ import annotations

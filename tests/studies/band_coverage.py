@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from rigdata import load_campaign
 from tests.rigs.band_campaign import write_band_campaign
@@ -31,6 +32,11 @@ USUAL, LOUD = (5.0, 5.0, 1.0), (15.0, 8.0, 3.0)
 FOUR = (0.0, 45.0, 90.0, 135.0)
 HEAD = ("excitation", "method", "lines", "h inside %", "half width %", "H1 kyy %", "kyy %", "points inside %",
         "K-C-M inside %", "kyy +- %", "refused", "reported")  # fmt: skip
+#: What is a mean over the operating points, and how it is printed.
+FORMS = (("inside", ".1f"), ("width", ".1f"), ("bias of H1", "+.1f"), ("bias", "+.1f"), ("points inside", ".1f"),
+         ("model inside", ".1f"), ("model width", ".1f"))  # fmt: skip
+MEANS = [name for name, _ in FORMS]
+COLUMNS = [*MEANS, "method", "lines", "reported", "conditions", "refused"]
 
 
 @dataclass(frozen=True)
@@ -69,72 +75,6 @@ def band_rows() -> list[BandRow]:
     ]
 
 
-@dataclass
-class Tally:
-    """What became of a row's campaigns."""
-
-    inside: list[float] = field(default_factory=list)
-    model_inside: list[float] = field(default_factory=list)
-    points_inside: list[float] = field(default_factory=list)
-    width: list[float] = field(default_factory=list)
-    model_width: list[float] = field(default_factory=list)
-    bias_h1: list[float] = field(default_factory=list)
-    bias: list[float] = field(default_factory=list)
-    refused: int = 0
-    models_refused: int = 0
-    results: int = 0
-    lines: int = 0
-    method: str = ""
-    named: Counter[str] = field(default_factory=Counter)
-
-    def add(self, result: BandResult, rig: BandRig) -> None:
-        """Hold one operating point against the truth."""
-        self.results += 1
-        self.refused += bool(untrusted(result.quality))
-        self.named.update(str(c) for c in result.quality)
-        if not result.lines:
-            return
-        load = result.point.static_load
-        h = stiffness(rig.bearing, 2 * np.pi * result.frequencies, load)
-        truth = np.concatenate([h.real.reshape(-1, 4), h.imag.reshape(-1, 4)], axis=1)
-        found = np.array([line.stiffness.vector for line in result.lines])
-        half = result.half_width()
-        self.inside.append(float(np.mean(np.abs(found - truth) <= half)))
-        size = np.abs(h[:, [0, 1], [0, 1]]).mean()
-        self.width.append(float(np.median(half[:, [0, 3]])) / size)
-        self.lines, self.method = len(result.lines), result.method
-        h1 = np.array([line.by_method["h1"].h[1, 1] for line in result.lines if "h1" in line.by_method])
-        if len(h1):
-            self.bias_h1.append(float(np.mean((h1 / h[: len(h1), 1, 1]).real)) - 1)
-        self.bias.append(float(np.mean((result.h[:, 1, 1] / h[:, 1, 1]).real)) - 1)
-        for point in result.points:
-            est = point.stiffness
-            known = stiffness(rig.bearing, np.array([est.omega]), load)[0]
-            truth = np.concatenate([known.real.ravel(), known.imag.ravel()])
-            self.points_inside.append(float(np.mean(np.abs(est.vector - truth) <= est.half_width())))
-        model = result.models.get("K-C-M")
-        if model is not None:
-            known = true_parameters(rig, load)
-            self.model_inside.append(float(np.mean(np.abs(model.parameters - known) <= model.half_width())))
-            self.model_width.append(float(model.half_width()[3] / known[3]))
-            self.models_refused += model.refused
-
-    def cells(self, name: str) -> list[str]:
-        """Row of the table."""
-
-        def share(values: list[float]) -> str:
-            return f"{100 * np.mean(values):.1f}" if values else "-"
-
-        def signed(values: list[float]) -> str:
-            return f"{100 * np.mean(values):+.1f}" if values else "-"
-
-        told = f"{self.refused} of {self.results}"
-        cells = [name, f"`{self.method}`", str(self.lines), share(self.inside), share(self.width)]
-        cells += [signed(self.bias_h1), signed(self.bias), share(self.points_inside), share(self.model_inside)]
-        cells += [share(self.model_width), str(self.models_refused), told]
-        return cells
-
-
 def true_parameters(rig: BandRig, load: float) -> np.ndarray:
     """K, C, M of the rig's bearing at a load, in the order of `FrequencyModel.parameters`."""
     share = load / NOMINAL
@@ -144,18 +84,59 @@ def true_parameters(rig: BandRig, load: float) -> np.ndarray:
     return np.concatenate([K, C, np.ravel(bearing.M)])
 
 
-def run_row(row: BandRow, seeds: range) -> Tally:
-    """Fresh campaigns of one row."""
-    tally = Tally()
+def judged(result: BandResult, rig: BandRig) -> dict[str, object]:
+    """One operating point against the truth, shares as numbers from 0 to 1."""
+    row: dict[str, object] = {"reported": bool(untrusted(result.quality)), "conditions": list(map(str, result.quality))}
+    if not result.lines:
+        return row
+    load = result.point.static_load
+    h = stiffness(rig.bearing, 2 * np.pi * result.frequencies, load)
+    truth = np.concatenate([h.real.reshape(-1, 4), h.imag.reshape(-1, 4)], axis=1)
+    found = np.array([line.stiffness.vector for line in result.lines])
+    half = result.half_width()
+    row |= {"method": result.method, "lines": len(result.lines)}
+    row["inside"] = np.mean(np.abs(found - truth) <= half)
+    row["width"] = np.median(half[:, [0, 3]]) / np.abs(h[:, [0, 1], [0, 1]]).mean()
+    h1 = np.array([line.by_method["h1"].h[1, 1] for line in result.lines if "h1" in line.by_method])
+    if len(h1):
+        row["bias of H1"] = np.mean((h1 / h[: len(h1), 1, 1]).real) - 1
+    row["bias"] = np.mean((result.h[:, 1, 1] / h[:, 1, 1]).real) - 1
+    points = []
+    for point in result.points:
+        est = point.stiffness
+        known = stiffness(rig.bearing, np.array([est.omega]), load)[0]
+        truth = np.concatenate([known.real.ravel(), known.imag.ravel()])
+        points.append(np.mean(np.abs(est.vector - truth) <= est.half_width()))
+    row["points inside"] = np.mean(points) if points else np.nan
+    model = result.models.get("K-C-M")
+    if model is not None:
+        known = true_parameters(rig, load)
+        row["model inside"] = np.mean(np.abs(model.parameters - known) <= model.half_width())
+        row["model width"] = model.half_width()[3] / known[3]
+        row["refused"] = model.refused
+    return row
+
+
+def run_row(row: BandRow, seeds: range) -> pd.DataFrame:
+    """Operating points of fresh campaigns of one row."""
+    rows = []
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         for seed in seeds:
             path = Path(folder) / "band.h5"
             write_band_campaign(path, row.rig, row.plans, seed)
-            for result in identify(load_campaign(path)).bands:
-                tally.add(result, row.rig)
+            rows += [judged(result, row.rig) for result in identify(load_campaign(path)).bands]
             path.unlink()
-    return tally
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def cells(name: str, points: pd.DataFrame) -> list[str]:
+    """Row of the table."""
+    mean = 100 * points[MEANS].astype(float).mean()
+    text = {column: "-" if np.isnan(value) else f"{value:{form}}" for (column, form), value in zip(FORMS, mean)}
+    _, last = [*points.dropna(subset="method").iterrows()][-1]
+    told = f"{points['reported'].sum()} of {len(points)}"
+    return [name, f"`{last['method']}`", f"{last['lines']:.0f}", *text.values(), f"{points['refused'].sum():.0f}", told]
 
 
 def main() -> None:
@@ -164,10 +145,10 @@ def main() -> None:
     rows = []
     for row in band_rows():
         if given.only in row.name:
-            tally = run_row(row, range(given.first_seed, given.first_seed + given.seeds))
-            rows.append(tally.cells(row.name))
+            points = run_row(row, range(given.first_seed, given.first_seed + given.seeds))
+            rows.append(cells(row.name, points))
             print(rows[-1], flush=True)
-            print(f"{row.name}: {dict(tally.named)}", file=sys.stderr, flush=True)
+            print(f"{row.name}: {dict(Counter(points['conditions'].explode()))}", file=sys.stderr, flush=True)
     report(given, "band", table(HEAD, rows))
 
 

@@ -29,32 +29,28 @@ from model.effects import Effect
 from model.predict import predict
 from model.prediction import Prediction
 from model.setup import Mesh
-from tests.studies.results import table, write_section
+from tests.studies.results import report, study_parser, table
 
 FILE = Path(__file__).resolve().parents[2] / "model" / "bearings" / "rocker.toml"
 VISCOSITY, SPEED, LOAD = 0.03956, 2 * math.pi * 22.0, 5000.0
 NAMES = ("kxx", "kyy", "cxx", "cyy")
 CROSS = ("kxy", "kyx", "cxy", "cyx")
+#: Solves cases, a line each; prints the version first, then K and C and the least time of each, after what compiles.
 CHILD = """
 import json, sys, time, warnings
-case = json.loads(sys.stdin.read())
-try:
-    from ross.bearings.fluid_film_bearing import FluidFilmBearing
-except ImportError as error:
-    print(json.dumps({"missing": str(error)}))
-    raise SystemExit
-warnings.simplefilter("ignore")
-times = []
-for _ in range(case.pop("repeats") + 1):  # the first one compiles
-    wall, began = time.perf_counter(), time.process_time()
-    bearing = FluidFilmBearing(n=0, **case)
-    times.append((time.process_time() - began, time.perf_counter() - wall))
-names = [kind + entry for kind in "kc" for entry in ("xx", "xy", "yx", "yy")]
-out = {name: float(getattr(bearing, name)[0]) for name in names}
-out["seconds"], out["wall"] = min(times[1:] or times)
 import ross
-out["version"] = ross.__version__
-print(json.dumps(out))
+from ross.bearings.fluid_film_bearing import FluidFilmBearing
+warnings.simplefilter("ignore")
+print(json.dumps(ross.__version__), flush=True)
+for line in sys.stdin:
+    times = []
+    for _ in range(2):
+        began = time.process_time()
+        bearing = FluidFilmBearing(n=0, **json.loads(line))
+        times.append(time.process_time() - began)
+    names = [kind + entry for kind in "kc" for entry in ("xx", "xy", "yx", "yy")]
+    out = {name: float(getattr(bearing, name)[0]) for name in names}
+    print(json.dumps({**out, "seconds": times[-1]}), flush=True)
 """
 
 
@@ -162,14 +158,14 @@ def peer_case(case: Case) -> dict[str, Any]:
     }
 
 
-def run_peer(python: str, case: dict[str, Any], repeats: int) -> dict[str, Any]:
-    """One case in the peer's interpreter; `missing` is set where it has no such engine."""
-    text = json.dumps(case | {"repeats": repeats})
+def run_peer(python: str, cases: list[dict[str, Any]]) -> tuple[str, list[dict[str, float]]]:
+    """The peer's version and its answers to cases; SystemExit where the interpreter has no such engine."""
+    text = "".join(json.dumps(case) + "\n" for case in cases)
     done = subprocess.run([python, "-c", CHILD], input=text, capture_output=True, text=True, check=False)
     if done.returncode:
-        return {"failed": done.stderr.strip()[-300:] or "no message"}
-    result: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
-    return result
+        sys.exit(f"no result of the ROSS fluid-film engine in {python}: {done.stderr.strip()[-300:] or 'no message'}")
+    version, *answers = [json.loads(line) for line in done.stdout.splitlines() if line[:1] in ('"', "{")]
+    return version, answers
 
 
 def run_ours(case: Case, repeats: int, mesh: Mesh | None = None) -> tuple[Prediction, float]:
@@ -188,14 +184,12 @@ def run_ours(case: Case, repeats: int, mesh: Mesh | None = None) -> tuple[Predic
 
 
 def compared(case: Case, asked: argparse.Namespace) -> list[str]:
-    """One row of the table: the peer less this model on a fine mesh; SystemExit if there is no peer."""
-    peer = run_peer(asked.python, peer_case(case), 1)
-    if "missing" in peer or "failed" in peer:
-        sys.exit(f"no result of the ROSS fluid-film engine in {asked.python}: {peer}")
+    """One row of the table: the peer less this model on a fine mesh."""
+    version, (peer,) = run_peer(asked.python, [peer_case(case)])
     ours, seconds = run_ours(case, asked.repeats)
     fine, _ = run_ours(case, 1, Mesh(320, 24))
     own = max(abs(getattr(ours, key) / getattr(fine, key) - 1.0) for key in NAMES)
-    print(f"{case.name}: ROSS {peer['version']}, default mesh here within {own:.2%} of 320 x 24", flush=True)
+    print(f"{case.name}: ROSS {version}, default mesh here within {own:.2%} of 320 x 24", flush=True)
     shares = [f"{peer[key] / getattr(fine, key) - 1.0:+.1%}" for key in NAMES]
     sign = 1.0 if case.rotation == "counter-clockwise" else -1.0
     direct = {kind: 0.5 * (getattr(fine, f"{kind}xx") + getattr(fine, f"{kind}yy")) for kind in "kc"}
@@ -207,17 +201,10 @@ def compared(case: Case, asked: argparse.Namespace) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--python", default=sys.executable, help="an interpreter that can import ross")
-    parser.add_argument("--repeats", type=int, default=10)
-    parser.add_argument("--only", default="", help="cases whose name holds this text")
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
+    asked = study_parser(__doc__, python=sys.executable, repeats=10, only="").parse_args()
     rows = [compared(case, asked) for case in CASES if asked.only in case.name]
     text = table(("case", "ROSS mesh", *NAMES, "cross terms", "ROSS", "here (80 x 6)", "ratio"), rows)
-    print(text)
-    if asked.write:
-        write_section("ross", "python -m tests.studies.peers --python INTERPRETER_WITH_ROSS --write", text)
+    report(asked, "ross", text, "python -m tests.studies.peers --python INTERPRETER_WITH_ROSS --write")
 
 
 if __name__ == "__main__":

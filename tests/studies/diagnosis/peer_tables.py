@@ -14,7 +14,6 @@ import argparse
 import csv
 import json
 import math
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -23,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from model.bearing import Pad
-from tests.studies.peers import Case, peer_case
-from tests.studies.results import study_parser, table, write_section
+from tests.studies.peers import Case, peer_case, run_peer
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.diagnosis.campaign import Baseline, diagnose_table
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -35,15 +34,6 @@ HZ = 2.0 * math.pi
 POINTS = ((2500.0, 22.0), (5000.0, 22.0), (7500.0, 22.0), (5000.0, 35.0), (5000.0, 50.0))
 READING_ERROR = 0.005
 ENTRIES = ("xx", "xy", "yx", "yy")
-CHILD = """
-import json, sys, warnings
-from ross.bearings.fluid_film_bearing import FluidFilmBearing
-warnings.simplefilter("ignore")
-for line in sys.stdin:
-    bearing = FluidFilmBearing(n=0, **json.loads(line))
-    names = [kind + entry for kind in "kc" for entry in ("xx", "xy", "yx", "yy")]
-    print(json.dumps({name: float(getattr(bearing, name)[0]) for name in names}), flush=True)
-"""
 
 
 def as_drawn(number: int, pad: Pad) -> Mapping[str, float]:
@@ -105,13 +95,8 @@ def solved(hidden: Hidden, python: str, kept: Path) -> list[dict[str, float]]:
         told = peer_case(case) | {"weight": load, "frequency": [speed * HZ]}
         for key in ("liquid_viscosity1", "liquid_viscosity2"):
             told["lubricant"] = {**told["lubricant"], key: hidden.viscosity * told["lubricant"][key]}
-        asked.append(json.dumps(told))
-    done = subprocess.run(
-        [python, "-c", CHILD], input="\n".join(asked) + "\n", capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        sys.exit(f"no result of the ROSS fluid-film engine in {python}: {done.stderr.strip()[-300:]}")
-    rows = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+        asked.append(told)
+    _, rows = run_peer(python, asked)
     kept.write_text(json.dumps(rows), "utf-8")
     return rows
 
@@ -164,20 +149,16 @@ def diagnosed(hidden: Hidden, asked: argparse.Namespace, number: int) -> list[ob
 
 def main() -> None:
     """Solve, diagnose, and print the table."""
-    parser = study_parser(__doc__)
-    parser.add_argument("--python", default=sys.executable, help="an interpreter that can import ross")
-    parser.add_argument("--folder", type=Path, default=Path("peer-tables"))
-    asked = parser.parse_args()
+    asked = study_parser(__doc__, python=sys.executable, folder=Path("peer-tables")).parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     lines = []
     for number, hidden in enumerate(TABLES):
         lines.append(diagnosed(hidden, asked, number))
         print(*lines[-1], sep=" | ", flush=True)
-    head = ["hidden", "verdict", "what is said", "alike", "held-out gap", "right", "processor seconds"]
+    head = ("hidden", "verdict", "what is said", "alike", "held-out gap", "right", "processor seconds")
     text = table(head, lines) + f"\n\nRight: {sum(line[5] == 'yes' for line in lines)} of {len(lines)}."
-    if asked.write:
-        command = "python -m tests.studies.diagnosis.peer_tables --python INTERPRETER_WITH_ROSS --write"
-        write_section("tables-ross", command, text)
+    command = "python -m tests.studies.diagnosis.peer_tables --python INTERPRETER_WITH_ROSS --write"
+    report(asked, "tables-ross", text, command)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,16 @@
 """The sample campaigns of another program, diagnosed: what was said, what is true, what it took.
 
-python -m tests.studies.diagnosis.samples [--write]
+python -m tests.studies.diagnosis.samples [--only NAME] [--write]
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from pathlib import Path
 
 import tpjb_ident as ti
-from tests.studies.results import write_section
+from tests.studies.results import report, study_parser, table
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.verdict.verdict import FoundEffect, Verdict
 
@@ -19,7 +18,7 @@ SHARED = Path(__file__).parents[4] / "shared"
 BEARINGS = {"spherical-baseline": "spherical", "effect-b": "spherical", "mixture-a": "spherical"}
 
 
-def row(name: str) -> str:
+def row(name: str) -> tuple[str, ...]:
     """One line of the table."""
     path = next(p for p in (SHARED / "samples" / f"{name}.h5", SHARED / "samples" / name) if p.exists())
     bearing = SHARED / "bearings" / f"{BEARINGS.get(name, 'rocker')}.toml"
@@ -27,11 +26,10 @@ def row(name: str) -> str:
     verdict = ti.diagnose(path, bearing, settings=DiagnoseSettings(workers=1)).diagnosis.verdict
     seconds = time.process_time() - began
     hidden = json.loads((SHARED / "samples" / "truth" / f"{name}.json").read_text(encoding="utf-8")).get("effects", [])
-    cells = (
+    return (
         name, "; ".join(_hidden(effect) for effect in hidden) or "nothing", verdict.verdict,
         "; ".join(_said(effect) for effect in verdict.effects), _gaps(verdict), f"{seconds:.0f}",
     )  # fmt: skip
-    return "| " + " | ".join(cells) + " |"
 
 
 def _hidden(effect: dict) -> str:  # type: ignore[type-arg]
@@ -49,15 +47,14 @@ def _gaps(verdict: Verdict) -> str:
 
 def main() -> None:
     """Diagnose all and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="replace the table of RESULTS.md")
-    asked = parser.parse_args()
-    lines = ["| campaign | hidden | verdict | said, 95 % | held-out gap as stated | processor, s |", "|---" * 6 + "|"]
+    asked = study_parser(__doc__, only="").parse_args()
+    rows = []
     for path in sorted((SHARED / "samples" / "truth").glob("*.json")):
-        lines.append(row(path.stem))
-        print(lines[-1], flush=True)
-    if asked.write:
-        write_section("diagnosis-samples", "python -m tests.studies.diagnosis.samples --write", "\n".join(lines))
+        if asked.only in path.stem:
+            rows.append(row(path.stem))
+            print(*rows[-1], sep=" | ", flush=True)
+    head = ("campaign", "hidden", "verdict", "said, 95 %", "held-out gap as stated", "processor, s")
+    report(asked, "diagnosis-samples", table(head, rows))
 
 
 if __name__ == "__main__":
