@@ -6,6 +6,7 @@ An example is given `np`, `ti`, and the paths `demo` (the bundled campaign) and 
 from __future__ import annotations
 
 import doctest
+import functools
 import importlib
 from collections.abc import Iterator
 
@@ -33,6 +34,33 @@ def described() -> Iterator[tuple[str, str, str]]:
 def _has_docstring(node) -> bool:
     first = node.body[0]
     return hasattr(first, "value") and isinstance(getattr(first.value, "value", None), str)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def computed_once():
+    """What several examples ask of the demo alike, its comparison and its diagnosis, is computed for the first."""
+    from tpjb_ident.compare import comparison
+    from tpjb_ident.diagnosis import campaign, from_python
+
+    answers: dict[str, object] = {}
+
+    def once(function):
+        @functools.wraps(function)
+        def answer(*given, **named):
+            asked = [part for part in (*given, *named.values()) if part not in (None, campaign.Baseline())]
+            key = f"{function.__name__} {[getattr(part, 'path', part) for part in asked]}"
+            if key not in answers:
+                answers[key] = function(*given, **named)
+            return answers[key]
+
+        return answer
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(comparison, "compare_campaign", once(comparison.compare_campaign))
+        shared = once(campaign.diagnose_campaign)
+        for module in (campaign, from_python):
+            patch.setattr(module, "diagnose_campaign", shared)
+        yield
 
 
 EXAMPLES = [(path, name) for path, name, text in described() if ">>>" in text]
