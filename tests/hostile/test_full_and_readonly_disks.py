@@ -76,17 +76,16 @@ def test_a_former_result_survives_a_disk_that_has_become_full(tmp_path):
     assert set(marks(first, "predict")) == set(contents[0]) - {"run.json"}
 
 
-def test_a_campaign_on_a_read_only_disk_gives_the_same_bits(small_campaign, tmp_path):
+def test_a_campaign_on_a_read_only_disk_gives_the_same_bits(small_campaign, undisturbed, tmp_path):
     folder = tmp_path / "campaign"  # of its own: the shared one lies above the results
     folder.mkdir()
     small_campaign = Path(shutil.copy(small_campaign, folder))
     before = hashlib.sha256(small_campaign.read_bytes()).hexdigest()
     sealed = f"mount --bind {folder} {folder} && mount -o remount,ro,bind {folder} && ! touch {folder}/x 2>/dev/null"
-    for name, mounting in (("sealed", sealed), ("open", "true")):
-        words = ("identify", small_campaign, "--workers", 1, "--out", tmp_path / name)
-        code, errors = in_namespace(f'{mounting} && exec "$0" -m tpjb_ident "$@"', *words)
-        assert code == 0, errors
-    assert marks(tmp_path / "sealed", "identify") == marks(tmp_path / "open", "identify")
+    words = ("identify", small_campaign, "--workers", 1, "--out", tmp_path / "out")
+    code, errors = in_namespace(f'{sealed} && exec "$0" -m tpjb_ident "$@"', *words)
+    assert code == 0, errors
+    assert marks(tmp_path / "out", "identify") == undisturbed
     assert hashlib.sha256(small_campaign.read_bytes()).hexdigest() == before
 
 
