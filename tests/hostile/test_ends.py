@@ -79,8 +79,13 @@ def is_alive(group: int) -> bool:
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize(
-    ("words", "seconds"),  # after its folder is made: while workers are busy
-    [(("diagnose", "--workers", "2"), 1.0), (("identify", "--workers", "2"), 0.2), (("compare",), 1.0)],
+    ("words", "seconds"),  # after its folder is made: at once, or while workers are busy
+    [
+        (("diagnose", "--workers", "2"), 1.0),
+        (("identify", "--workers", "1"), 0.0),
+        (("identify", "--workers", "2"), 0.2),
+        (("compare",), 1.0),
+    ],
 )
 def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_nothing(tmp_path, words, seconds, number, code):
     command = [sys.executable, "-m", "tpjb_ident", words[0], str(DEMO), *words[1:], "--out", str(tmp_path / "o")]
@@ -96,6 +101,7 @@ def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_nothing(tmp_pa
     output, _ = process.communicate(timeout=60)
     assert process.returncode == code, output
     assert "Traceback" not in output
+    assert output.count("interrupted") == (number == signal.SIGINT)
     assert list(tmp_path.iterdir()) == []
     until = time.monotonic() + 20.0
     while is_alive(process.pid) and time.monotonic() < until:  # the system's own helpers end with their pipes

@@ -1,14 +1,12 @@
-"""A kill, Ctrl-C, a full disk, two runs at once: results are whole or absent, raw data untouched."""
+"""A kill, a full disk, two runs at once: results are whole or absent, raw data untouched."""
 
 from __future__ import annotations
 
 import json
 import os
 import resource
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -42,26 +40,6 @@ def test_killed_at_random_moments_a_rerun_gives_the_same_bits(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "killed" in done.stdout
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_ctrl_c_ends_with_a_message_and_leaves_no_table(small_campaign, tmp_path, workers):
-    def heed():  # a job in the background of a shell is started with interrupts ignored, and so would its children be
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-    out = tmp_path / "out"
-    process = command(
-        "identify", small_campaign, "--workers", workers, "--out", out, start_new_session=True, preexec_fn=heed
-    )
-    until = time.time() + 120
-    while not list(tmp_path.glob(".out.part-*")) and time.time() < until:
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)  # the terminal sends it to every process of the command
-    code, _, errors = end(process)
-    assert code == 130, errors
-    assert errors.count("interrupted") == 1
-    assert not [name for name in names_below(tmp_path) if name.endswith((".csv", ".parquet", "run.json"))]
-    assert not list(tmp_path.glob(".out.part-*"))
 
 
 def test_a_full_disk_is_one_message_and_nothing_is_left(small_campaign, tmp_path):

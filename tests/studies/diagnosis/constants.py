@@ -14,11 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tests.studies import results
 from tests.studies.diagnosis.bench import SKIPPED, hidden, said
-from tests.studies.diagnosis.strangers import KINDS, Stranger, draw, every_row
+from tests.studies.diagnosis.strangers import Stranger, drawn_again, every_row
 from tests.studies.diagnosis.tables import all_there, no_false
 from tpjb_ident.diagnosis.comparison.search import Comparison, _Search
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -46,8 +44,7 @@ def changed(settings: DiagnoseSettings, name: str, factor: float) -> DiagnoseSet
 
 def run(one: Stranger, number: int, seed: int) -> dict[str, Any] | None:
     """Draw and search a campaign; what is said of it with every constant changed."""
-    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
-    drawn = next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
+    kind, drawn = drawn_again(one, number, seed)
     if drawn is None:
         return None
     settings = DiagnoseSettings(workers=1, skip=SKIPPED)

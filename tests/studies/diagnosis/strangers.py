@@ -272,10 +272,15 @@ def draw(one: Stranger, kind: str, rng: np.random.Generator) -> Drawn | None:
     )  # fmt: skip
 
 
+def drawn_again(one: Stranger, number: int, seed: int) -> tuple[str, Drawn | None]:
+    """Kind and campaign of a seed, the first of twelve that has an equilibrium and can be seen."""
+    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
+    return kind, next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
+
+
 def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> dict[str, Any] | None:
     """Draw and diagnose one campaign; a flat row with what came out."""
-    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
-    drawn = next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
+    kind, drawn = drawn_again(one, number, seed)
     if drawn is None:
         return None
     began = time.process_time()
