@@ -8,9 +8,8 @@ moment and pivot balance, the heat fixed point, and for idle pads a search for a
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -235,34 +234,22 @@ LIMITS = {
 class Outcome:
     """What became of a set of cases."""
 
-    cases: int
-    converged: int
-    statuses: Counter[str]
-    worst: dict[str, float]
-    wrong: list[tuple[int, str, float]]
-    failed: list[int]
-    asymmetry: float
-    seconds: list[float]
+    converged: int = 0
+    statuses: Counter[str] = field(default_factory=Counter)  #: of those that did not converge
+    wrong: list[tuple[int, str, float]] = field(default_factory=list)
+    asymmetry: float = 0.0
 
 
 def run(cases: list[Case], turn_every: int = 20) -> Outcome:
     """Predict and check every case; every `turn_every`-th one also turned as a whole by 1 rad."""
-    statuses: Counter[str] = Counter()
-    worst = dict.fromkeys(LIMITS, 0.0)
-    out = Outcome(len(cases), 0, statuses, worst, [], [], 0.0, [])
+    out = Outcome()
     for number, case in enumerate(cases):
-        began = time.perf_counter()
         p = case.predict()
-        out.seconds.append(time.perf_counter() - began)
         if not p.converged:
-            statuses["; ".join(c for c in p.status if c.severity != "note")] += 1
-            out.failed.append(number)
+            out.statuses["; ".join(c for c in p.status if c.severity != "note")] += 1
             continue
         out.converged += 1
-        for name, value in errors(p).items():
-            worst[name] = max(worst[name], value)
-            if not value <= LIMITS[name]:
-                out.wrong.append((number, name, value))
+        out.wrong += [(number, name, value) for name, value in errors(p).items() if not value <= LIMITS[name]]
         if number % turn_every == 0:
             q = case.turned(1.0).predict()
             same = np.abs(q.pad_load - p.pad_load).max() / case.load

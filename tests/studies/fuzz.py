@@ -61,7 +61,16 @@ class Tally:
     accepted: int = 0
     refused: Counter[str] = field(default_factory=Counter)
     slowest: float = 0.0
+    peak_MB: int = 0
     findings: list[dict[str, str]] = field(default_factory=list)
+
+    def take(self, more: Tally) -> None:
+        """Add the cases of a block; its findings are counted by whoever stores them."""
+        self.cases += more.cases
+        self.accepted += more.accepted
+        self.refused.update(more.refused)
+        self.slowest = max(self.slowest, more.slowest)
+        self.peak_MB = max(self.peak_MB, more.peak_MB)
 
 
 def _expire(number: int, frame: FrameType | None) -> None:
@@ -142,9 +151,9 @@ def _child(target: Target, block: range, seed: int, corpus: Path, board: mmap.mm
             tally.findings.append({"case": str(number), "what": finding, "input": data.hex()})
         if time.time() > struct.unpack("<d", board[8:16])[0]:
             break
-    answer = json.dumps({**vars(tally), "peak_MB": peak >> 10, "lines": len(reached.lines)})
+    tally.peak_MB = peak >> 10
     with os.fdopen(pipe, "w") as stream:
-        stream.write(answer)
+        stream.write(json.dumps(vars(tally)))
 
 
 def _ended_if_it_hangs(child: int, answer: int, board: mmap.mmap) -> bool:
@@ -159,7 +168,7 @@ def _ended_if_it_hangs(child: int, answer: int, board: mmap.mmap) -> bool:
     return False
 
 
-def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap.mmap) -> dict[str, Any]:
+def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap.mmap) -> Tally:
     """One child process; what it found, a crash of the process included."""
     reading, writing = os.pipe()
     child = os.fork()
@@ -179,24 +188,17 @@ def run_block(target: Target, block: range, seed: int, corpus: Path, board: mmap
         text = stream.read()
     _, status = os.waitpid(child, 0)
     if text:
-        return dict(json.loads(text))
+        return Tally(**json.loads(text))
     (number,) = struct.unpack("<q", board[:8])
     (size,) = struct.unpack("<q", board[16:24])
     what = f"no end after {HANG:g} s, in a library" if hung else f"the process died (status {status})"
-    done = number - block.start + 1
-    return {
-        "cases": done,
-        "accepted": 0,
-        "refused": {},
-        "slowest": 0.0,
-        "peak_MB": 0,
-        "lines": 0,
-        "findings": [{"case": str(number), "what": what, "input": board[24 : 24 + size].hex()}],
-    }
+    finding = {"case": str(number), "what": what, "input": board[24 : 24 + size].hex()}
+    return Tally(cases=number - block.start + 1, findings=[finding])
 
 
-def fuzz(name: str, cases: int, seconds: float, seed: int, keep: Path) -> dict[str, Any]:
-    """Fuzz one target; the figures, findings kept as files in `keep`."""
+def fuzz(name: str, cases: int, seconds: float, seed: int, keep: Path) -> tuple[Tally, Counter[str], float]:
+    """Fuzz one target; what it answered, findings, which are kept as files, and processor seconds."""
+    total, findings, at = Tally(), Counter[str](), 0
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as scratch:
         folder, corpus = Path(scratch), Path(scratch) / "corpus"
         corpus.mkdir()
@@ -204,40 +206,19 @@ def fuzz(name: str, cases: int, seconds: float, seed: int, keep: Path) -> dict[s
         for module in target.preload:
             importlib.import_module(module)  # once, not in every child
         board = mmap.mmap(-1, 24 + LONGEST)
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-        cpu = spent.ru_utime + spent.ru_stime
-        began, until = time.time(), time.time() + seconds
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        until = time.time() + seconds
         board[8:16] = struct.pack("<d", until)
-        total: dict[str, Any] = {
-            "target": name,
-            "seed": seed,
-            "cases": 0,
-            "accepted": 0,
-            "refused": Counter(),
-            "slowest": 0.0,
-            "peak_MB": 0,
-            "lines": 0,
-            "findings": Counter(),
-        }
-        at = 0
         while at < cases and time.time() < until:
             end = GROWTH if at < GROWTH else at + BLOCK
-            got = run_block(target, range(at, min(cases, end)), seed, corpus, board)
-            at += got["cases"] or 1
-            for key in ("cases", "accepted"):
-                total[key] += got[key]
+            block = run_block(target, range(at, min(cases, end)), seed, corpus, board)
+            at += block.cases or 1
+            total.take(block)
+            _keep(keep, name, seed, block.findings, findings)
             if at % 100_000 < BLOCK:
-                print(f"{name} {at} cases, {time.time() - began:.0f} s", file=sys.stderr, flush=True)
-            for key in ("slowest", "peak_MB", "lines"):
-                total[key] = max(total[key], got[key])
-            total["refused"].update(got["refused"])
-            _keep(keep, name, seed, got["findings"], total["findings"])
-        total["corpus"] = len(list(corpus.iterdir()))
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    total["cpu_seconds"] = round(spent.ru_utime + spent.ru_stime - cpu, 1)
-    total["seconds"] = round(time.time() - began, 1)
-    total["cases_per_second"] = round(total["cases"] / max(total["seconds"], 1e-9), 1)
-    return {**total, "refused": dict(total["refused"]), "findings": dict(total["findings"])}
+                print(f"{name} {at} cases", file=sys.stderr, flush=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return total, findings, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def _keep(keep: Path, name: str, seed: int, findings: list[dict[str, str]], seen: Counter[str]) -> None:
@@ -263,7 +244,7 @@ def replay(name: str, seed: int, number: int) -> str | None:
         board[8:16] = struct.pack("<d", math.inf)
         if number >= GROWTH:
             run_block(target, range(GROWTH), seed, corpus, board)
-        found = run_block(target, range(number, number + 1), seed, corpus, board)["findings"]
+        found = run_block(target, range(number, number + 1), seed, corpus, board).findings
     return found[0]["what"] if found else None
 
 
@@ -278,11 +259,11 @@ def main() -> None:
         sys.exit(finding is not None)
     rows, failed = [], False
     for name in names:
-        result = fuzz(name, given.cases, given.seconds, given.seed, given.keep)
-        print(json.dumps(result, indent=1), flush=True)
-        cells = (result["cases"], result["accepted"], result["cpu_seconds"], f"{result['slowest']:.1f} s")
-        rows.append((name, *cells, f"{result['peak_MB']} MB", len(result["findings"])))
-        failed = failed or bool(result["findings"])
+        total, findings, spent = fuzz(name, given.cases, given.seconds, given.seed, given.keep)
+        print(name, dict(total.refused), *findings, sep="\n", flush=True)
+        cells = (name, total.cases, total.accepted, f"{spent:.1f}", f"{total.slowest:.1f} s", f"{total.peak_MB} MB")
+        rows.append((*cells, len(findings)))
+        failed = failed or bool(findings)
     head = ("reader", "cases", "taken", "CPU s", "slowest case", "peak memory", "findings")
     report(given, "fuzz", table(head, rows))
     sys.exit(failed)
