@@ -27,12 +27,13 @@ NAME = re.compile(rf"\b(?:{'|'.join(TOPS)})(?:\.\w+)*\b")
 
 @dataclass
 class Source:
-    """What one file says of others: `uses` are dotted names, `gives` where a package's names live."""
+    """What one file says of others, as dotted names."""
 
-    uses: set[str] = field(default_factory=set)
-    words: set[str] = field(default_factory=set)
-    gives: dict[str, str] = field(default_factory=dict)
-    fixtures: dict[str, set[str]] = field(default_factory=dict)
+    imports: set[str]
+    strings: set[str] = field(default_factory=set)  #: names that stand in its strings
+    words: set[str] = field(default_factory=set)  #: parts of the paths in them
+    homes: dict[str, str] = field(default_factory=dict)  #: where the names are that a package gives on first use
+    fixtures: dict[str, set[str]] = field(default_factory=dict)  #: what each of its fixtures imports
 
 
 def changed_files(revision: str, root: Path = ROOT) -> list[str]:
@@ -47,58 +48,37 @@ def module_name(path: str) -> str:
     return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
-def _dotted(node: ast.AST) -> str:
-    parts: list[str] = []
-    while isinstance(node, ast.Attribute):
-        parts.append(node.attr)
-        node = node.value
-    return ".".join([node.id, *reversed(parts)]) if isinstance(node, ast.Name) else ""
-
-
-def _imported(nodes: list[ast.AST]) -> tuple[set[str], dict[str, str]]:
-    """Dotted names that are imported or reached by an attribute; what each imported name stands for."""
-    uses: set[str] = set()
-    stands_for: dict[str, str] = {}
-    for node in nodes:
+def _imported(tree: ast.AST) -> set[str]:
+    """Dotted names that are imported at any depth."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            uses.update(a.name for a in node.names)
-            stands_for.update({a.asname or a.name.split(".")[0]: (a.asname and a.name) or "" for a in node.names})
+            found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            uses.update(f"{node.module}.{a.name}" for a in node.names)
-            stands_for.update({a.asname or a.name: f"{node.module}.{a.name}" for a in node.names})
-    for node in nodes:
-        if isinstance(node, ast.Attribute) and (name := _dotted(node)):
-            first, _, rest = name.partition(".")
-            if first in stands_for:
-                uses.add(f"{stands_for[first] or first}.{rest}")
-    return uses, stands_for
-
-
-def _strings(nodes: Iterable[ast.AST]) -> set[str]:
-    return {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return found
 
 
 def read_source(text: str, name: str) -> Source:
     """What the source of the module `name` says of others."""
-    nodes = list(ast.walk(ast.parse(text)))
-    source = Source()
-    source.uses, stands_for = _imported(nodes)
-    strings = _strings(nodes)
-    source.words = {w for s in strings if len(s) < 200 for w in s.split("/")}
-    source.uses |= {found for s in strings if len(s) < 2000 for found in NAME.findall(s) if "." in found}
-    if "tpjb_ident" in strings:  # an argument of `python -m`
-        source.uses.add("tpjb_ident.__main__")
-    for node in nodes:
-        if isinstance(node, ast.Call) and _dotted(node.func).endswith("import_module"):
-            source.uses |= {s.removesuffix(".") + ".*" for s in _strings(ast.walk(node)) if s.startswith(TOPS)}
-        if isinstance(node, ast.Dict):
+    tree = ast.parse(text)
+    source = Source(_imported(tree))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            source.words.update(node.value.split("/") if len(node.value) < 200 else ())
+            names = NAME.findall(node.value) if len(node.value) < 2000 else []
+            source.strings.update(found for found in names if "." in found)
+            if node.value == "tpjb_ident":  # an argument of `python -m`
+                source.strings.add("tpjb_ident.__main__")
+            if node.value.startswith(TOPS) and node.value.endswith("."):  # import_module(f"model.effects.{name}")
+                source.strings.add(node.value + "*")
+        elif isinstance(node, ast.Dict):
             for key, value in zip(node.keys, node.values):
                 if isinstance(key, ast.Constant) and isinstance(value, ast.Constant) and isinstance(value.value, str):
-                    home = value.value
-                    source.gives[str(key.value)] = home if home.startswith(TOPS) else f"{name}.{home}"
-        if isinstance(node, ast.FunctionDef) and any("fixture" in ast.unparse(d) for d in node.decorator_list):
-            source.fixtures[node.name] = _imported(list(ast.walk(node)))[0]
-    source.gives |= {short: full for short, full in stands_for.items() if full}
+                    home = value.value if value.value.startswith(TOPS) else f"{name}.{value.value}"
+                    source.homes[str(key.value)] = f"{home}.{key.value}"
+        elif isinstance(node, ast.FunctionDef) and any("fixture" in ast.unparse(d) for d in node.decorator_list):
+            source.fixtures[node.name] = _imported(node)
     return source
 
 
@@ -111,30 +91,20 @@ class ImportGraph:
         self.sources = {path: read_source(text, module_name(path)) for path, text in texts.items()}
         self.modules = {module_name(path): path for path in texts}
         self._above: dict[str, set[str]] = {}
-        for path, source in self.sources.items():
-            for target in self._targets(path, source, texts[path]):
-                self._above.setdefault(target, set()).add(path)
+        for path, text in texts.items():
+            for name in self._uses(path, text):
+                for target in self._files(name):
+                    self._above.setdefault(target, set()).add(path)
 
-    def _targets(self, path: str, source: Source, text: str) -> Iterator[str]:
-        if path.endswith("/__init__.py"):  # names given on first use are their users' affair
-            given = set(source.gives.values())
-            eager = {u for u in source.uses if u not in given or self._is_eager(u, text)}
-            uses = {u for u in eager if not u.endswith(".*") or not source.gives}
-        else:
-            uses = set(source.uses)
-        if path.startswith("tests/"):
-            for folder in Path(path).parents:
-                common = self.sources.get(f"{folder.as_posix()}/conftest.py")
-                if common is not None:
-                    uses |= {u for name, used in common.fixtures.items() if name in text for u in used}
-        for name in uses:
-            yield from self._files(name)
-
-    @staticmethod
-    def _is_eager(name: str, text: str) -> bool:
-        """Tell whether a package's own file imports `name` as it is imported, not on first use."""
-        owner = name.rpartition(".")[0]
-        return bool(re.search(rf"^from {re.escape(owner)} import|^import {re.escape(name)}", text, re.MULTILINE))
+    def _uses(self, path: str, text: str) -> set[str]:
+        """Dotted names that a source uses; what a package gives on first use is its users' affair."""
+        source = self.sources[path]
+        uses = source.imports | (set() if source.homes and path.endswith("/__init__.py") else source.strings)
+        for folder in Path(path).parents if path.startswith("tests/") else ():
+            common = self.sources.get(f"{folder.as_posix()}/conftest.py")
+            if common is not None:
+                uses = uses.union(*(used for name, used in common.fixtures.items() if name in text))
+        return uses
 
     def _files(self, name: str) -> Iterator[str]:
         """Files that importing the dotted `name` reads, one that is gone among them."""
@@ -144,15 +114,14 @@ class ImportGraph:
         parts = name.split(".")
         for n in range(1, len(parts) + 1):
             module = ".".join(parts[:n])
-            path = self.modules.get(module)
-            if path is not None:
-                yield path
-                if path.endswith("/__init__.py") and n < len(parts) and parts[0] != "tests":
-                    home = self.sources[path].gives.get(parts[n])
-                    if home is not None and home != name and module != home:
+            path = self.modules.get(module, module.replace(".", "/") + ".py")
+            yield path
+            if path.endswith("/__init__.py") and parts[0] != "tests":
+                homes = self.sources[path].homes
+                asked = homes.values() if n == len(parts) else [homes[parts[n]]] if parts[n] in homes else []
+                for home in asked:
+                    if not home.startswith(f"{module}.{home.rpartition('.')[2]}"):  # a file of the name it gives
                         yield from self._files(home)
-            elif parts[0] in TOPS:  # an attribute, or a file that is gone
-                yield module.replace(".", "/") + ".py"
 
     def above(self, files: Iterable[str]) -> set[str]:
         """Sources that use any of `files`, directly or through others, and these themselves."""
