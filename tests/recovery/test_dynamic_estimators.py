@@ -1,6 +1,6 @@
 """Recovery of a known H by every estimator: accuracy, bias, coverage in the study's situation.
 
-Small here, with fixed seeds; ``python -m tests.studies.estimators`` is the whole study.
+With fixed seeds; a table of every method in every case is in `tests/studies/RESULTS.md`.
 The targets are for 400 replicates; fewer leave a Monte-Carlo error of 1/sqrt(2 n) on an RMSE.
 """
 
@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.rigs.estimator_cases import H_TRUE, OMEGA, Case, draw
-from tests.studies.estimators import TRUE, score
+from tests.rigs.estimator_cases import H_TRUE, OMEGA, TRUE, Case, draw, score
 from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 
 SEED = 61

@@ -1,10 +1,12 @@
-"""The simulated situation of the estimator study: one H, eight directions, repeats, four kinds of faults."""
+"""A simulated situation for estimators: one H, eight directions, repeats, four kinds of faults; scores in it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
 
 OMEGA = 2 * np.pi * 25.0
 H_TRUE = np.array(
@@ -13,6 +15,7 @@ H_TRUE = np.array(
         [-1.5e7 + 1j * OMEGA * 1e4, 5.0e8 + 1j * OMEGA * 6.0e5],
     ]
 )
+TRUE = np.concatenate([H_TRUE.real.ravel(), H_TRUE.imag.ravel()])
 #: Actual force = this times the command: 2-4 % cross-talk that nobody knows.
 CROSS_TALK = np.array([[1.0, 0.03], [-0.02, 1.0]])
 FORCE = 500.0
@@ -84,3 +87,35 @@ def _fault(rng: np.random.Generator, n: int, unit: float) -> np.ndarray:
     angle = 2 * np.pi * rng.random(n)
     size = unit * rng.uniform(3, 10, n) * np.exp(2j * np.pi * rng.random(n))
     return size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one method does in one case."""
+
+    rmse: float  #: ||H - H_true||_F / ||H_true||_F [%]
+    bias: np.ndarray  #: (2,), of kxx, kyy [%]
+    coverage: float  #: of the 95 % intervals, all entries [%]
+    worst: float  #: largest relative error of any replicate [%]
+
+
+def score(case: Case, method: str, replicates: int, seed: int) -> Score:
+    """Run one method on `replicates` fresh draws."""
+    name, _, norm = method.partition(":")
+    errors, biases, inside = [], [], []
+    for replicate in range(replicates):
+        s = draw(case, seed, replicate)
+        command = s.command if name == "iv" else None
+        est = estimate_dynamic_stiffness(
+            s.D, s.F, OMEGA, s.direction, method=name, norm=norm or None, reference=command
+        )
+        errors.append(np.linalg.norm(est.h - H_TRUE) / np.linalg.norm(H_TRUE))
+        biases.append(np.diag(est.k) / np.diag(H_TRUE.real) - 1)
+        lo, hi = est.interval(0.95)
+        inside.append((lo <= TRUE) & (hi >= TRUE))
+    return Score(
+        100 * float(np.sqrt(np.mean(np.square(errors)))),
+        100 * np.mean(biases, axis=0),
+        100 * float(np.mean(inside)),
+        100 * float(np.max(errors)),
+    )

@@ -1,1 +1,1 @@
-"""Evidence for the diagnosis: mixtures drawn from stated tolerances, hidden effects, and what lies outside."""
+"""Evidence for the diagnosis: bearings drawn from stated tolerances, hidden effects, and what lies outside."""
