@@ -11,7 +11,7 @@ from tests.rigs.field_conditions import Row, rows
 from tests.rigs.field_judge import judge
 from tests.rigs.field_rig import Device, Rig
 from tpjb_ident.check.set_points import without_static_part
-from tpjb_ident.dynamic.corrections.cell_zero import cell_zero
+from tpjb_ident.dynamic.corrections.static_load import cell_zero
 from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect
 from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
 from tpjb_ident.dynamic.results.frequency_model import chance_of

@@ -107,7 +107,7 @@ def test_windows_of_a_point_follow_their_runs():
         blocks = [complex_normal(rng, n, 2, 2) for _ in range(3)]
         means = [rng.standard_normal((n, 2)) for _ in range(2)]
         return SimpleNamespace(
-            run=name, lines=SimpleNamespace(excitation=(SimpleNamespace(frequency=25.0),) * 2),
+            run=name, lines=SimpleNamespace(driven=(25.0, 25.0)),
             displacement=SimpleNamespace(phasors=blocks[0], mean=means[0]),
             cell_force=SimpleNamespace(mean=means[1]), oil_force=lambda line: blocks[1][:, line],
             acceleration=SimpleNamespace(phasors=blocks[2]) if accelerated else None,
@@ -117,7 +117,6 @@ def test_windows_of_a_point_follow_their_runs():
     data = point_data(at(), [(a, 1), (b, 0)])
     np.testing.assert_array_equal(data.D, np.concatenate([a.displacement.phasors[:, 1], b.displacement.phasors[:, 0]]))
     np.testing.assert_array_equal(data.F, np.concatenate([a.oil_force(1), b.oil_force(0)]))
-    np.testing.assert_array_equal(data.A, np.concatenate([a.acceleration.phasors[:, 1], np.zeros((2, 2))]))
     np.testing.assert_array_equal(data.run_index, [0, 0, 0, 1, 1])
     assert data.lines == (1, 0)
     assert data.omega == at().excitation

@@ -14,18 +14,16 @@ import numpy as np
 from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.estimate.blocks import Rig, totals, vector
+from tpjb_ident.estimate.blocks import Rig, film_force, totals, vector
 from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks
-from tpjb_ident.identification.campaign_solution import learnt_rig
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
-from tpjb_ident.terms.load_turn import LoadTurn
-from tpjb_ident.terms.registry import TERMS
+from tpjb_ident.terms.registry import campaign_terms, learnt_rig
 from tpjb_ident.terms.run_gain import RunGain
 
 #: Parts of a band whose h becomes a point.
@@ -124,11 +122,9 @@ class _Task:
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
-        chosen = [t for t in TERMS if t is not Clock and (self.correct or t is not LoadTurn)]
-        band = self.data.band[self.data.line]
-        film = Distortion(rig, blocks, self.data.bent, band, self.data.uneven)
-        given = {RunGain: RunGain(rig, blocks, deviation), Distortion: film}
-        return replace(self, terms=tuple(given.get(term) or term(rig, blocks) for term in chosen))
+        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line], self.data.uneven)
+        terms = campaign_terms(rig, blocks, self.correct, [RunGain(rig, blocks, deviation), film])
+        return replace(self, terms=tuple(term for term in terms if not isinstance(term, Clock)))
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
@@ -179,9 +175,7 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
 def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
     blocks = data.blocks
-    D, F = vector(rig, blocks, "displacement"), vector(rig, blocks, "force")
-    if len(rig.of("acceleration")) > 1:
-        F = F + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
+    D, F = vector(rig, blocks, "displacement"), film_force(rig, blocks)
     lines = len(data.band)
     h, condition = np.full((lines, 2, 2), np.nan + 0j), np.full(lines, np.inf)
     line = data.line[blocks.point]

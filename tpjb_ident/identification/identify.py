@@ -8,15 +8,15 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
+from tpjb_ident.conditions import merged
 from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
 from tpjb_ident.dynamic.results.quality import with_probe_doubts
 from tpjb_ident.dynamic.runs.baseline import DryTest, dry_test
 from tpjb_ident.dynamic.runs.checked_runs import check_finished
-from tpjb_ident.dynamic.runs.excluded_runs import named_runs
+from tpjb_ident.dynamic.runs.excluded_runs import lost_points, named_runs, without_runs
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.point_source import point_sources
+from tpjb_ident.dynamic.runs.point_data import campaign_points
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
@@ -143,22 +143,23 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
-    checked = check_finished(campaign, finished)
+    finished, checked = check_finished(campaign, finished)
     digests = finished.digests
     dry = dry or DryTest()
-    sources = point_sources(finished)
-    report("estimating", 0, len(sources))
-    solved = solve_campaign(campaign, sources, digests, workers, settings.correct, dry.stiffness)
+    gathered = campaign_points(finished)
+    report("estimating", 0, len(gathered))
+    solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
     temperatures = {digest.run: digest.temperatures for digest in digests}
     task = PointTask(settings, solved.task, temperatures, checked, dry)
-    jobs = [(source, point_share(solved, source, p)) for p, source in enumerate(sources)]
+    jobs = [(data, point_share(solved, data, p)) for p, data in enumerate(gathered)]
+    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []
     for point in map_ordered(workers, finished_point, jobs, task):
-        points.append(point)
-        report("estimating", len(points), len(sources))
-    excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
-    conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
-    named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
-    shared = shared_changes(solved.solution, range(len(sources)))
-    remarks = unstated(campaign) + conditions
+        without = without_runs(point.point, excluded, several)
+        points.append(replace(point, quality=merged(point.quality, without)))
+        report("estimating", len(points), len(gathered))
+    lost = lost_points([data.point for data in gathered], excluded, several)
+    remarks = unstated(campaign) + named_runs(excluded, len(finished.outcomes)) + lost
+    named = with_probe_doubts(checked.swept, points, settings.clearance)
+    shared = shared_changes(solved.solution, range(len(gathered)))
     return Identification(campaign.id, settings.method, named, shared.changes, remarks, calibration_names=shared.names)

@@ -14,11 +14,10 @@ from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
-from tpjb_ident.dynamic.corrections.cell_zero import cell_zero_uncertainty
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_conditions, load_misses
+from tpjb_ident.dynamic.corrections.static_load import StaticLoads, static_loads
 from tpjb_ident.dynamic.results.band_result import BandResult
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, named_runs, points_without_runs, without_runs
+from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
 from tpjb_ident.estimate.blocks import Rig, RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import found_mount, sensors_of
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
@@ -63,16 +62,20 @@ def identify_bands(
         points += [] if point is None else [point]
     if not points:
         raise remaining[0].error
-    zero = campaign_zero(points, cell_zero_uncertainty(campaign))
-    misses, common = load_misses(points, zero.force)
-    solved = _solved(campaign, points, (misses, common), settings, bare)
+    loads = static_loads(campaign, points)
+    solved = _solved(campaign, points, loads, settings, bare)
     results = []
     for b, point in enumerate(points):
-        conditions = load_conditions(misses[b], common) + zero.conditions()
-        conditions += check_conditions(checked, [s.phasors.run for s in point.spectra]) + _without(point, remaining)
-        conditions = merged(conditions, run_conditions(point, solved.first), band_conditions(point, solved, b))
-        results.append(band_result(solved, b, misses[b], conditions, settings.clearance))
-    named = named_runs(remaining, len(runs)) + _lost(points, remaining) + unstated(campaign)
+        conditions = merged(
+            loads.conditions(b),
+            check_conditions(checked, [s.phasors.run for s in point.spectra]),
+            without_runs(point.point, remaining, any_excitation=True),
+            run_conditions(point, solved.first),
+            band_conditions(point, solved, b),
+        )
+        results.append(band_result(solved, b, loads.misses[b], conditions, settings.clearance))
+    lost = lost_points([point.point for point in points], remaining, any_excitation=True, kind="run over a band")
+    named = named_runs(remaining, len(runs)) + lost + unstated(campaign)
     return IdentifiedBands(tuple(results), shared_by_bands(solved), named)
 
 
@@ -85,7 +88,7 @@ def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation
 def _solved(
     campaign: Campaign,
     points: list[BandPoint],
-    loads: tuple[list[LoadMiss], complex],
+    loads: StaticLoads,
     settings: BandSettings,
     bare: RigStiffness,
 ) -> SolvedBands:
@@ -99,10 +102,10 @@ def _solved(
     data: BandBlocks | None = None
     for turn in range(passes):
         instruments = [_INSTRUMENTS[point.method][turn] for point in points]
-        own = band_blocks(points, sensors, loads[0], temperatures, instruments)
+        own = band_blocks(points, sensors, loads.misses, temperatures, instruments)
         own = own.with_film(points, settings.clearance) if settings.clearance else own
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare, static=loads[1] != 0)
-        mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads[1])
+        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare, static=loads.common != 0)
+        mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads.common)
         solutions.append(solve_bands(replace(rig, mount=mount), own, settings.correct, _told(points, own, classic)))
         data = data or own
     assert data is not None
@@ -130,17 +133,3 @@ def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, .
         late = sensor.quantity in apart and not sensor.delay_uncertainty
         sensors.append(replace(sensor, delay_uncertainty=START / rate, device="cells") if late else sensor)
     return tuple(sensors)
-
-
-def _without(point: BandPoint, left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
-    """Name the runs of a point that take no part."""
-    members = [excluded.run for excluded in left if replace(excluded.point, excitation=0.0) == point.point]
-    return without_runs(members)
-
-
-def _lost(points: Sequence[BandPoint], left: Sequence[ExcludedRun]) -> tuple[Condition, ...]:
-    """Name the operating points that have no run left."""
-    kept = [point.point for point in points]
-    lost = [excluded for excluded in left if replace(excluded.point, excitation=0.0) not in kept]
-    places = [f"{excluded.point.static_load / 1e3:g} kN" for excluded in lost]
-    return points_without_runs(lost, places, "run over a band")

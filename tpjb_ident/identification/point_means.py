@@ -15,7 +15,6 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.sensors import alive
@@ -58,9 +57,8 @@ class MeansTask:
     temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
 
 
-def point_means(task: MeansTask, source: PointSource) -> PointMeans:
+def point_means(task: MeansTask, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
-    data = source.data
     z, channels = channel_windows(data, task)
     time = window_times(data)
     z = _driven(z * clock_turns(data, task, time), data)

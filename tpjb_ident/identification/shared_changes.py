@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,6 +33,18 @@ class SharedChanges:
                 rows[names.index(name), begin:end] = row * np.sqrt(count / len(group.names))
             begin = end
         return SharedChanges(rows, names)
+
+
+def sources_of(solution: Solution, point: int) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Covariances (8, 8) of a point of a solve by source: what scatters with the runs, and what they share."""
+    shares = {name: share[point] for name, share in solution.shares.items() if np.any(share[point])}
+    random = {"random": solution.records[point]}
+    return random | {name: shares.pop(name) for name in RUN_TERMS if name in shares}, shares
+
+
+def total(covariances: Iterable[FloatArray]) -> FloatArray:
+    """Sum of covariances (8, 8)."""
+    return np.sum([np.zeros((8, 8)), *covariances], axis=0)
 
 
 def shared_changes(solution: Solution, points: Sequence[int]) -> SharedChanges:
