@@ -87,8 +87,9 @@ def test_every_point_has_its_coefficients_and_all_their_errors(result):
         assert p.load_miss.size.shape == (5,)
         assert p.temperatures[2] == 310.0
         assert p.stiffness.weights.shape == (5 * WINDOWS, 2)
-        for est in p.by_method.values():
+        for est in p.by_method.values():  # how runs and windows scatter is no matter of the method
             np.testing.assert_array_equal(est.systematic, p.stiffness.systematic)
+            np.testing.assert_array_equal(est.covariance, p.stiffness.covariance)
     assert [p.temperatures[1] for p in result.points] == [306.0, 351.0]
     assert (result.campaign, result.method, result.conditions) == ("c", "mm-eiv", ())
 

@@ -9,7 +9,6 @@ from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-from tpjb_ident.dynamic.estimators.uncertainty import information
 from tpjb_ident.estimate.robust_constants import (
     bisquare_weight,
     efficiency_constant,
@@ -51,13 +50,6 @@ def test_trimming_weight_is_symmetric_about_the_middle():
     weight = trimming_weight(at, 2.0, 4.0)
     np.testing.assert_allclose(weight[[0, 1, 3, 5, 6]], [1.0, 1.0, 0.5, 0.0, 0.0])
     assert weight[2] + weight[4] == pytest.approx(1.0)
-
-
-def test_information_is_a_sum_of_kronecker_products():
-    rng = np.random.default_rng(10)
-    D, star, inverse = complex_normal(rng, 3, 2), complex_normal(rng, 3, 2), complex_normal(rng, 3, 2, 2)
-    whole = sum(np.kron(inverse[g], np.outer(star[g].conj(), D[g])) for g in range(3))
-    np.testing.assert_allclose(information(D, star, inverse), whole)
 
 
 def test_degrees_of_freedom_in_the_limits():

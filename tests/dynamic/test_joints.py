@@ -13,7 +13,7 @@ from tests.dynamic import phasor_cases
 from tests.dynamic.phasor_cases import H, complex_normal
 from tests.dynamic.phasor_cases import place as at
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.instrumental import instrumental_fit
+from tpjb_ident.dynamic.estimators.estimate import instrumental_fit
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.runs.point_data import finite_mean, group, point_data
 from tpjb_ident.phasors.shaft import FIRST_LOOK, MAX_DEPARTURE, shaft_speed, window_speeds
@@ -134,13 +134,13 @@ def test_what_instruments_leave_of_the_force_is_orthogonal_to_them():
     F = D @ H.T + 0.2 * complex_normal(rng, 60, 2)
     F[:6] += 20.0
     table = phasor_table(D, F, np.repeat(np.arange(6), 10), drive)
-    fit = instrumental_fit(table)
+    fit, explained = instrumental_fit(table)
     left = table.F - table.D @ fit.h.T
     np.testing.assert_allclose(table.reference.conj().T @ (fit.weights[:, None] * left), 0.0, atol=1e-8)
     assert np.abs(table.D.conj().T @ (fit.weights[:, None] * left)).max() > 0.01
-    np.testing.assert_allclose(fit.explained.F - fit.explained.D @ fit.h.T, left, atol=1e-12)
-    moved = table.D - fit.explained.D
+    np.testing.assert_allclose(explained.F - explained.D @ fit.h.T, left, atol=1e-12)
+    moved = table.D - explained.D
     np.testing.assert_allclose(table.reference.conj().T @ (fit.weights[:, None] * moved), 0.0, atol=1e-8)
-    assert np.linalg.matrix_rank(np.concatenate([fit.explained.D, table.reference], axis=1), tol=1e-9) == 2
+    assert np.linalg.matrix_rank(np.concatenate([explained.D, table.reference], axis=1), tol=1e-9) == 2
     assert (fit.weights[:6] == 0.0).all()
-    assert fit.explained.reference is table.reference
+    assert explained.reference is table.reference

@@ -25,9 +25,15 @@ def own_method(method: str) -> str:
 
 
 def all_methods(
-    data: PointData, settings: IdentifySettings, solved: dict[str, DynamicStiffness]
+    data: PointData,
+    settings: IdentifySettings,
+    solved: dict[str, DynamicStiffness],
+    known: DynamicStiffness | None,
 ) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already."""
+    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already.
+
+    `known`: the solve of the campaign, whose scatter is that of all methods.
+    """
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     estimates: dict[str, DynamicStiffness] = {}
@@ -36,7 +42,7 @@ def all_methods(
         if name in solved:
             estimates[name] = solved[name]
         elif method != "iv" or drive is not None or settings.method == "iv":
-            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"), known)
     return estimates
 
 

@@ -10,8 +10,9 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, not_locked
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
+from tpjb_ident.dynamic.estimators.solved_windows import not_locked
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
@@ -31,7 +32,7 @@ from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.campaign_solution import CampaignSolution
 from tpjb_ident.identification.methods import all_methods, disagreement
 from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
-from tpjb_ident.identification.shared_changes import RUN_TERMS, sources_of, total
+from tpjb_ident.identification.shared_changes import sources_of, total
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Name of the method that the solve stands for in the tables.
@@ -144,9 +145,7 @@ def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> P
     data = _corrected(recorded, task.means, share)
     table = phasor_table(data.D, data.F, data.run_index)
     solved = share.estimate or estimate_table(table, data.omega, SOLVED)
-    by_method = all_methods(data, settings, {SOLVED: solved})
-    if share.estimate is not None:
-        by_method = {name: _with_common(est, share) for name, est in by_method.items()}
+    by_method = all_methods(data, settings, {SOLVED: solved}, share.estimate)
     if not settings.keep_weights:  # a verdict per window in place of its weights: 1 byte instead of 16
         counted = {name: (est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None] for name, est in by_method.items()}
         by_method = {name: replace(est, weights=counted[name]) for name, est in by_method.items()}
@@ -205,11 +204,3 @@ def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData
     D, F = vectors(z, data, task)
     F = F - np.einsum("nij,nj->ni", share.run_change[data.run_index], D)
     return replace(data, D=D, F=F)
-
-
-def _with_common(est: DynamicStiffness, share: PointShare) -> DynamicStiffness:
-    """Another method's estimate with what the campaign's runs and sensors share."""
-    if share.estimate is None or est is share.estimate:
-        return est
-    wider = [share.budget[name] for name in (*RUN_TERMS, "mains") if name in share.budget]
-    return replace(est, covariance=np.sum([est.covariance, *wider], axis=0), systematic=share.estimate.systematic)

@@ -21,7 +21,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import WindowFit, real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError
 
 #: Names of the norms and the statsmodels class behind each.
@@ -134,18 +134,7 @@ def _mass_scale(model: Any, residual: FloatArray) -> float:
     return float(np.median(np.abs(residual)) / 0.6745)
 
 
-@dataclass(frozen=True)
-class RlmFit:
-    """H from two real robust regressions, one per force axis."""
-
-    h: ComplexArray  #: (2, 2) complex
-    covariance: FloatArray  #: (8, 8)
-    dof: FloatArray  #: (8,)
-    weights: FloatArray  #: (n, 2)
-    conditions: tuple[Condition, ...]
-
-
-def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> RlmFit:
+def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> WindowFit:
     """Solve Eq. (15) axis by axis with statsmodels; `D`, `F` (n, 2)."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
@@ -160,7 +149,7 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
         covariance[np.ix_(rows, rows)] = solution.covariance
         weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
         conditions += solution.conditions
-    return RlmFit(h, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), weights, conditions)
+    return WindowFit(h, weights, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), conditions)
 
 
 def robust_fit(
