@@ -91,7 +91,9 @@ def _curve(
         omega = data.line_omega[used & (data.band == b)]
         if len(omega):
             middle[b] = np.sqrt(omega.min() * omega.max())
+    chosen = chosen & np.isfinite(h).all(axis=(1, 2))
     numbers = nearest(over_frequency("K-C-M", data.band, data.line_omega, middle), h, chosen.astype(float))
+    numbers[~np.isin(np.arange(len(middle)), data.band[chosen])] = np.nan
     return lambda band, omega: over_frequency("K-C-M", band, omega, middle).change(numbers)
 
 
