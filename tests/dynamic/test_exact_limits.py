@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from statsmodels.robust.scale import HuberScale
 
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.mm import mm_fit
@@ -66,20 +67,17 @@ def test_either_complex_argument_is_refused_by_rlm():
     for a, b in ((design + 0j, response), (design, response + 0j)):
         with pytest.raises(ComplexInputError, match="Stack real and imaginary"):
             solve_rlm(a, b)
-    with pytest.raises(ValueError, match="unknown scale 'iqr'"):
-        solve_rlm(design, response, RlmSettings(scale="iqr"))
 
 
 def test_rlm_scales_are_those_of_the_normal_law():
-    """All three estimate the standard deviation of normal errors; MASS and MAD differ by 0.67448975 / 0.6745."""
+    """Both estimate the standard deviation of normal errors."""
     rng = np.random.default_rng(13)
     design = np.column_stack([np.ones(2000), rng.standard_normal(2000)])
     response = design @ [1.0, 2.0] + 0.5 * rng.standard_normal(2000)
-    found = {s: solve_rlm(design, response, RlmSettings(scale=s)).scale for s in ("mad", "mass", "huber")}
+    found = {str(s): solve_rlm(design, response, RlmSettings(scale=s)).scale for s in ("mad", HuberScale())}
     for scale in found.values():
         assert scale == pytest.approx(0.5, rel=0.05)
-    assert found["mass"] / found["mad"] == pytest.approx(0.6744897501960817 / 0.6745, rel=1e-6)
-    assert found["huber"] != pytest.approx(found["mad"], rel=1e-6)
+    assert len(set(found.values())) == 2
 
 
 def test_rlm_of_two_axes_keeps_places_weights_and_freedom():

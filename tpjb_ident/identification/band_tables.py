@@ -21,7 +21,7 @@ from tpjb_ident.estimate.shape import MODELS, real_numbers
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
-from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes, sources_of, total
+from tpjb_ident.identification.shared_changes import sources_of, total
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,6 @@ def band_result(
     period, width = point.spectra[0].period, point.plan.resolution
     result = BandResult(point.point, point.group.kind, lines, models, chosen, told, ids, period, width)
     return replace(result, points=tuple(_point(solved, q, result, miss, clearance) for q in solved.parts(b)))
-
-
-def shared_by_bands(solved: SolvedBands) -> SharedChanges:
-    """The sources of the points of all bands."""
-    parts = [q for b in range(len(solved.points)) for q in solved.parts(b)]
-    return shared_changes(solved.first.part, parts)
 
 
 def _noise_dof(solved: SolvedBands, chosen: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
 from tpjb_ident.dynamic.runs.finished_runs import RunDigest
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, film_force, vector
-from tpjb_ident.estimate.sensors import found_mount, sensors_of
+from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
@@ -90,8 +90,7 @@ def solve_campaign(
             devices = with_found_devices(sensors, blocks)
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
-        mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), loads.common)
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=loads.common != 0)
+        rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
         rates = _clock_rates(rig, blocks, _starts(rig, points, means))

@@ -21,13 +21,12 @@ from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.identification.band_point import BandSettings
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
-from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
+from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import PointTask, finished_point, point_share
-from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
+from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.runtime.executors import Workers, map_ordered
 
@@ -80,17 +79,16 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
+    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
-    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
     if any(is_broadband(run) for run in runs):
-        bands = identify_bands(campaign, _band_settings(settings), report, dry.stiffness)
-    if not sines.of_kind("dynamic"):
-        identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
-    else:
+        bands = identify_bands(campaign, settings, report, dry.stiffness)
+    identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
+    if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
         identification = assemble(sines, finished, settings, report, workers, dry)
-    identification = identification if bands is None else _with_bands(identification, bands)
+    identification = identification if bands is None else _joined(identification, bands)
     return _with_zero_uncertainty(identification, campaign)
 
 
@@ -103,26 +101,27 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
     return replace(identification, points=points)
 
 
-def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
-    """The points of sines and those of bands together, sorted as ever."""
-    points = [*result.points, *(p for band in bands.results for p in band.points)]
-    joint = SharedChanges(result.calibration_changes, result.calibration_names).beside(bands.shared)
-    changes = joint.changes.reshape(len(joint.changes), len(points), 8)
+def _joined(sines: Identification, bands: Identification) -> Identification:
+    """The points of sines and those of bands together, sorted as ever; sources of one name are one source."""
+    points = [*sines.points, *bands.points]
+    names = tuple(dict.fromkeys((*sines.calibration_names, *bands.calibration_names)))
+    changes = np.zeros((max(len(names), 1), len(points), 8))
+    place = {id(point): i for i, point in enumerate(points)}
+    for part in (sines, bands):
+        places = [place[id(point)] for point in part.points]
+        scale = np.sqrt(len(changes) / max(len(part.calibration_names), 1))
+        for name, row in zip(part.calibration_names, part.calibration_changes):
+            changes[names.index(name), places] = scale * row.reshape(-1, 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
+    conditions = {condition.sentence(): condition for condition in (*sines.conditions, *bands.conditions)}
     return replace(
-        result,
+        sines,
         points=tuple(points[i] for i in order),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
-        conditions=tuple(table.values()),
-        bands=bands.results,
-        calibration_names=joint.names,
+        conditions=tuple(conditions.values()),
+        bands=bands.bands,
+        calibration_names=names,
     )
-
-
-def _band_settings(settings: IdentifySettings) -> BandSettings:
-    phasors = settings.phasors
-    return BandSettings(phasors.lines.mains, phasors.delays, settings.correct, settings.clearance)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
@@ -161,5 +160,5 @@ def assemble(
     lost = lost_points([data.point for data in gathered], excluded, several)
     remarks = unstated(campaign) + named_runs(excluded, len(finished.outcomes)) + lost
     named = with_probe_doubts(checked.swept, points, settings.clearance)
-    shared = shared_changes(solved.solution, range(len(gathered)))
-    return Identification(campaign.id, settings.method, named, shared.changes, remarks, calibration_names=shared.names)
+    changes, names = shared_changes(solved.solution, range(len(gathered)))
+    return Identification(campaign.id, settings.method, named, changes, remarks, calibration_names=names)

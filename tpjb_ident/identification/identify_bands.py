@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
-from rigdata.run import Run
-from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.check.observation import observe
+from tpjb_ident.conditions import merged
 from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
 from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
 from tpjb_ident.dynamic.corrections.static_load import StaticLoads, static_loads
-from tpjb_ident.dynamic.results.band_result import BandResult
+from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
-from tpjb_ident.estimate.blocks import Rig, RigStiffness, Sensor
-from tpjb_ident.estimate.sensors import found_mount, sensors_of
+from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.estimate.blocks import RigStiffness, Sensor
+from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
-from tpjb_ident.identification.band_point import BandPoint, BandSettings, band_groups, read_point
+from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
-from tpjb_ident.identification.band_tables import SolvedBands, band_result, shared_by_bands
+from tpjb_ident.identification.band_tables import SolvedBands, band_result
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
-from tpjb_ident.identification.shared_changes import SharedChanges
+from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.terms.clock import START
 
 Progress = Callable[[str, int, int], None]
@@ -36,28 +36,22 @@ _INSTRUMENTS = {"periods": ("periods", "periods"), "iv": ("command", "command"),
 _LEAST_COHERENCE = 0.5
 
 
-@dataclass(frozen=True)
-class IdentifiedBands:
-    """What a campaign's broadband runs give."""
-
-    results: tuple[BandResult, ...]
-    shared: SharedChanges = field(repr=False)
-    conditions: tuple[Condition, ...] = ()
-
-
 def identify_bands(
-    campaign: Campaign, settings: BandSettings, progress: Progress, bare: RigStiffness
-) -> IdentifiedBands:
+    campaign: Campaign, settings: IdentifySettings, progress: Progress, bare: RigStiffness
+) -> Identification:
     """Identify every operating point of a campaign that was excited over a band."""
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
-    seen = list(_observed(runs, progress))
+    seen = []
+    for done, run in enumerate(runs):
+        progress(run.id, done, len(runs))
+        seen.append(observe(run))
     checked = campaign_verdicts(campaign, seen)
     remaining = [
         ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
     ]
     points: list[BandPoint] = []
     for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
-        point, bad = read_point(group, campaign.housing_mass, settings)
+        point, bad = read_point(group, campaign.housing_mass, settings.phasors)
         remaining += bad
         points += [] if point is None else [point]
     if not points:
@@ -76,25 +70,25 @@ def identify_bands(
         results.append(band_result(solved, b, loads.misses[b], conditions, settings.clearance))
     lost = lost_points([point.point for point in points], remaining, any_excitation=True, kind="run over a band")
     named = named_runs(remaining, len(runs)) + lost + unstated(campaign)
-    return IdentifiedBands(tuple(results), shared_by_bands(solved), named)
-
-
-def _observed(runs: tuple[Run, ...], progress: Progress) -> Iterator[Observation]:
-    for done, run in enumerate(runs):
-        progress(run.id, done, len(runs))
-        yield observe(run)
+    found = tuple(point for band in results for point in band.points)
+    parts = [q for b in range(len(points)) for q in solved.parts(b)]
+    changes, names = shared_changes(solved.first.part, parts)
+    return Identification(campaign.id, settings.method, found, changes, named, tuple(results), names)
 
 
 def _solved(
     campaign: Campaign,
     points: list[BandPoint],
     loads: StaticLoads,
-    settings: BandSettings,
+    settings: IdentifySettings,
     bare: RigStiffness,
 ) -> SolvedBands:
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
     sensors = _sensors(campaign, points)
-    classic = [_classic(point, k) for point in points for k in range(len(point.plan.groups))]
+    classic = []
+    for point in points:
+        ends = point.group.kind in OPEN_ENDS
+        classic += [classic_line(point.spectra, point.plan.bins(k), ends) for k in range(len(point.plan.groups))]
     measured = [(s.phasors.run, s.temperatures) for point in points for s in point.spectra]
     temperatures = run_temperatures(campaign, measured)
     passes = 2 if any(point.method == "hv" for point in points) else 1
@@ -104,9 +98,8 @@ def _solved(
         instruments = [_INSTRUMENTS[point.method][turn] for point in points]
         own = band_blocks(points, sensors, loads.misses, temperatures, instruments)
         own = own.with_film(points, settings.clearance) if settings.clearance else own
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, bare=bare, static=loads.common != 0)
-        mount = found_mount(sensors, own.blocks, getattr(campaign, "mount", None), loads.common)
-        solutions.append(solve_bands(replace(rig, mount=mount), own, settings.correct, _told(points, own, classic)))
+        rig = campaign_rig(campaign, sensors, own.blocks, loads.common, bare)
+        solutions.append(solve_bands(rig, own, settings.correct, _told(points, own, classic)))
         data = data or own
     assert data is not None
     return SolvedBands(tuple(points), data, tuple(classic), tuple(solutions))
@@ -117,10 +110,6 @@ def _told(points: Sequence[BandPoint], data: BandBlocks, classic: Sequence[Class
     quiet = np.array([points[b].method == "hv" for b in data.band], dtype=bool)
     coherence = np.array([float(np.min(line.coherence)) for line in classic])
     return np.where(quiet, np.nan_to_num(coherence) > _LEAST_COHERENCE, data.strength > STRONG)
-
-
-def _classic(point: BandPoint, k: int) -> ClassicLine:
-    return classic_line(point.spectra, point.plan.bins(k), point.group.kind in OPEN_ENDS)
 
 
 def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, ...]:

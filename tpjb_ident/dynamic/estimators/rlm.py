@@ -67,7 +67,7 @@ class RlmSettings:
     """How statsmodels is to be run."""
 
     norm: str = "huber"
-    scale: str = "mad"
+    scale: Any = "mad"  #: as `RLM.fit` takes it
     max_iterations: int = 200
     tolerance: float = 1e-10
     library: bool = False
@@ -97,7 +97,7 @@ def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> Rlm
     from statsmodels.robust.robust_linear_model import RLM
 
     fit = RLM(response, design, M=_norm(settings.norm)).fit(
-        maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=_scale(settings.scale)
+        maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=settings.scale
     )
     return RlmSolution(
         np.asarray(fit.params), np.asarray(fit.bcov_scaled), np.asarray(fit.weights), float(fit.scale),
@@ -115,23 +115,6 @@ def _norm(name: str) -> Any:
     if name == "mquantile":  # the symmetric one; others estimate quantiles, not H
         return norms.MQuantileNorm(0.5, norms.HuberT())
     return getattr(norms, NORMS[name])()
-
-
-def _scale(name: str) -> Any:
-    from statsmodels.robust import scale
-
-    if name == "mad":
-        return "mad"
-    if name == "huber":
-        return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
-    if name == "mass":
-        return _mass_scale
-    raise ArgumentError(unknown_name("scale", name, ["mad", "mass", "huber"]))
-
-
-def _mass_scale(model: Any, residual: FloatArray) -> float:
-    """MASS::rlm divides the median by 0.6745, not by the normal quantile."""
-    return float(np.median(np.abs(residual)) / 0.6745)
 
 
 def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> WindowFit:
