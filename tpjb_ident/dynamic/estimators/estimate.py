@@ -161,7 +161,7 @@ def _exact(table: PhasorTable) -> WindowFit:
 
 
 def _rlm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
-    return rlm_fit(table.D, table.F, settings)
+    return rlm_fit(table.D, table.F, replace(settings, quick=not scatter))
 
 
 def _ols(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
