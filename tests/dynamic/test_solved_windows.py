@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tests.dynamic.phasor_cases import NOISE, H, complex_normal, hermitian, windows
-from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
+from tpjb_ident.dynamic.estimators.r_matrix import complex_to_real_covariance, phasor_table
 from tpjb_ident.dynamic.estimators.solved_windows import solved_windows
-from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
 from tpjb_ident.estimate.window_means import attenuation
 
 

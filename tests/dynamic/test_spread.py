@@ -18,8 +18,7 @@ from tpjb_ident.dynamic.estimators.least_trimmed import (
     scatter,
 )
 from tpjb_ident.dynamic.estimators.mm import mm_fit
-from tpjb_ident.dynamic.estimators.r_matrix import displacement_condition
-from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
+from tpjb_ident.dynamic.estimators.r_matrix import complex_to_real_covariance, displacement_condition
 from tpjb_ident.estimate.window_means import LOCKED, aligned
 
 

@@ -25,7 +25,7 @@ from tpjb_ident.identification.band_conditions import band_conditions, run_condi
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
 from tpjb_ident.identification.band_tables import SolvedBands, band_result
-from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
+from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated, with_start
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.terms.clock import START
 
@@ -117,8 +117,5 @@ def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, .
     spectra = [s for point in points for s in point.spectra]
     apart = frozenset().union(*(s.clocks for s in spectra))
     rate = min(run.sample_rate for point in points for run in point.group.runs)
-    sensors = []
-    for sensor in sensors_of(campaign):
-        late = sensor.quantity in apart and not sensor.delay_uncertainty
-        sensors.append(replace(sensor, delay_uncertainty=START / rate, device="cells") if late else sensor)
-    return tuple(sensors)
+    devices = [replace(s, device="cells") if s.quantity in apart else s for s in sensors_of(campaign)]
+    return with_start(devices, START / rate) if apart else tuple(devices)

@@ -16,7 +16,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.dynamic.broadband.responses import end_columns, place_in_line
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra
-from tpjb_ident.dynamic.estimators.uncertainty import complex_to_real_covariance
+from tpjb_ident.dynamic.estimators.r_matrix import complex_to_real_covariance
 
 #: Highest power of frequency, over the bins of a line.
 _ORDER = 2

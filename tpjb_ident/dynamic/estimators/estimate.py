@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import (
     PhasorTable,
     WindowFit,
+    complex_to_real_covariance,
     displacement_condition,
     ols_fit,
     phasor_table,
@@ -22,7 +23,6 @@ from tpjb_ident.dynamic.estimators.r_matrix import (
 from tpjb_ident.dynamic.estimators.rlm import NORMS, RlmSettings, rlm_fit
 from tpjb_ident.dynamic.estimators.solved_windows import solved_windows
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.estimators.uncertainty import homoscedastic
 from tpjb_ident.errors import ArgumentError
 
 #: Condition number of the displacement directions beyond which entries cannot be told apart.
@@ -113,7 +113,7 @@ def estimate_table(
         raise ArgumentError(unknown_name("method", method, METHODS))
     settings = rlm_settings or RlmSettings()
     name = f"rlm:{settings.norm}" if method == "rlm" else method
-    obstacle = _obstacle(table) or _no_reference(table, method)
+    obstacle = _obstacle(table, method)
     if obstacle is not None:
         nothing, condition = np.full((8, 8), np.nan), displacement_condition(table.D)
         none, weights = np.full((2, 2), np.nan + 0j), np.zeros((len(table.valid), 2))
@@ -137,7 +137,7 @@ def _si(value: Any, unit: str, name: str) -> Any:
         raise ArgumentError(f"{name} must be convertible to {unit}, got {value.units}") from error
 
 
-def _obstacle(table: PhasorTable) -> Condition | None:
+def _obstacle(table: PhasorTable, method: str) -> Condition | None:
     if len(table) < 2 or table.n_directions < 2:
         return Condition(
             "fewer-than-two-directions",
@@ -145,13 +145,10 @@ def _obstacle(table: PhasorTable) -> Condition | None:
         )
     if not np.isfinite(displacement_condition(table.D)):
         return Condition("fewer-than-two-directions", "all displacements are collinear: H needs two directions in them")
+    if method == "iv" and table.reference is None:
+        text = "instruments are missing: the runs do not state two excitation directions"
+        return Condition("no-reference", text)
     return None
-
-
-def _no_reference(table: PhasorTable, method: str) -> Condition | None:
-    if method != "iv" or table.reference is not None:
-        return None
-    return Condition("no-reference", "instruments are missing: the runs do not state two excitation directions")
 
 
 def _exact(table: PhasorTable) -> WindowFit:
@@ -218,9 +215,18 @@ def _regression(table: PhasorTable, fit: WindowFit, scatter: bool, variance: flo
     if solved is not None:
         covariance = variance * solved.covariance
         return replace(fit, covariance=covariance, dof=solved.dof, chi_square=solved.chi_square)
-    covariance, dof = homoscedastic(table.D, table.F - table.D @ fit.h.T, fit.weights)
+    covariance, dof = _homoscedastic(table.D, table.F - table.D @ fit.h.T, fit.weights)
     plain = "no-robust-start" in fit.conditions
     return replace(fit, covariance=(1.0 if plain else variance) * covariance, dof=dof)
+
+
+def _homoscedastic(D: ComplexArray, residual: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance (8, 8) and dof (8,) of a weighted regression; `D`, `residual` (n, 2), `weights` (n,)."""
+    spare = max(float(weights.sum()) - 2.0, 1e-12)
+    scatter = (weights[:, None] * residual).T @ residual.conj() / spare
+    inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
+    # Two real residuals per spare complex one; both parts of a row share its scale.
+    return complex_to_real_covariance(np.kron(scatter, inverse)), np.full(8, max(2.0 * spare, 1.0))
 
 
 def _in_units(table: PhasorTable, omega: float, name: str, fit: WindowFit) -> DynamicStiffness:

@@ -192,3 +192,9 @@ def displacement_condition(D: ComplexArray, weights: FloatArray | None = None) -
         return np.inf
     singular = np.linalg.svd(rows, compute_uv=False)
     return float(singular[0] / singular[1]) if singular[1] > 1e-14 * singular[0] else np.inf
+
+
+def complex_to_real_covariance(hermitian: ComplexArray) -> FloatArray:
+    """Covariance of [Re h, Im h] from E[e e^H] of circular errors, (2 m, 2 m); `hermitian` (m, m)."""
+    real = 0.5 * np.block([[hermitian.real, -hermitian.imag], [hermitian.imag, hermitian.real]])
+    return 0.5 * (real + real.T)  # rounding apart, it is symmetric

@@ -13,7 +13,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
-from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_force, mains_line
+from tpjb_ident.phasors.line_means import FilmLines, film_lines, mains_lines
 from tpjb_ident.phasors.run_data import RunPhasors
 
 
@@ -49,8 +49,7 @@ def digest(
     """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy())
-    mains = mains_line(phasors), mains_force(phasors)
-    return RunDigest(excitation, *mains, temperatures, film_lines(phasors), sample_rate, seen)
+    return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, seen)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest, digest
@@ -31,10 +30,6 @@ from tpjb_ident.phasors.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import Workers
 
 Progress = Callable[[str, int, int], None]
-#: A channel whose lines are below this share of the vector's may be dead.
-_NOTHING = 1e-6
-#: The same of its mean: what rounding leaves of a constant.
-_ROUNDING = 1e-10
 
 
 def all_runs(
@@ -124,10 +119,11 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
             phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, _dead_channels(cached, phasors), _repaired(run))
-        phasors = _without_spares(phasors)
+        seen = _seen(run, cached, phasors)
+        phasors, dead = _without_dead(phasors, seen[0])
+        conditions = merged(phasors.conditions, dead, _repaired(run))
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
-        return digest(result, mean_temperatures(cached), run.sample_rate, _seen(run, cached, phasors))
+        return digest(result, mean_temperatures(cached), run.sample_rate, seen)
 
 
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
@@ -154,47 +150,25 @@ def _repaired(run: Run) -> tuple[Condition, ...]:
     return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
 
 
-def _dead_channels(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
-    """Refuse a run with a dead probe or cell; tell of a dead accelerometer.
+def _without_dead(phasors: RunPhasors, seen: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+    """The run without spare channels that the checks call dead; refused with a dead probe or cell.
 
-    Only where a channel shows no line is the run read once more and held against the rules of `rigdata.check_campaign`,
-    which know a computed record without noise from a dead sensor.
+    What is said of a dead accelerometer: the run may do without.
     """
-    dead = _dead(run, phasors)
-    grave = [p for name, p in dead.items() if run.channels[name].quantity != "acceleration"]
+    dead = {finding.key: finding.problem for finding in seen.report.found if finding.key.startswith("dead ")}
+    grave, said, spare = [], [], []
+    for k, channel in enumerate(phasors.channels):
+        problem = dead.get(f"dead {channel.name}")
+        if problem is None:
+            continue
+        if problem.severity != "error":
+            spare.append(k)
+        elif channel.quantity == "acceleration":
+            said.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
+        else:
+            grave.append(problem)
     if grave:
         raise RigDataError(grave)
-    return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in dead.values())
-
-
-def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
-    silent = [c.name for k, c in enumerate(phasors.channels) if _silent(phasors, k)]
-    if not silent:
-        return {}
-    errors = {f.key: f.problem for f in observe(run, phasors).report.found if f.problem.severity == "error"}
-    return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
-
-
-def _without_spares(phasors: RunPhasors) -> RunPhasors:
-    """The run without channels that show nothing where the others of their quantity tell the plane."""
-    silent = [k for k in range(len(phasors.channels)) if _silent(phasors, k)]
-    alive = [channel for k, channel in enumerate(phasors.channels) if k not in silent]
-    spare = [k for k in silent if is_spare(phasors.channels[k], alive)]
-    if not spare:
-        return phasors
     z, mean = phasors.z.copy(), phasors.mean.copy()
     z[:, :, spare], mean[:, spare] = np.nan, np.nan
-    return replace(phasors, z=z, mean=mean)
-
-
-def _silent(phasors: RunPhasors, channel: int) -> bool:
-    """Whether no window shows any line in a channel; False where no window shows anything at all."""
-    quantity = phasors.pick(phasors.channels[channel].quantity)
-    finite = np.isfinite(phasors.z[:, :, quantity]).any(axis=(1, 2))
-    if not finite.any():
-        return False
-    largest = float(np.nanmax(np.abs(phasors.z[finite][:, :, quantity])))
-    own = np.abs(phasors.z[finite, :, channel])
-    size = float(np.max(own, initial=0.0, where=np.isfinite(own)))
-    mean = float(np.nanmax(np.abs(phasors.mean[finite][:, quantity])))
-    return size <= max(_NOTHING * largest, _ROUNDING * mean)
+    return replace(phasors, z=z, mean=mean), tuple(said)
