@@ -59,13 +59,16 @@ def run_with_lines(excitation, z, seed=1, settings=None):
     phasors = complex_normal(np.random.default_rng(seed), 5, len(lines.frequencies), 2)
     if "mains" in names:
         phasors[:, 1 + names.index("mains")] = z
-    return SimpleNamespace(lines=lines, displacement=SimpleNamespace(phasors=phasors))
+    displacement = SimpleNamespace(phasors=phasors)
+    return SimpleNamespace(lines=lines, displacement=displacement, oil_force=lambda line: 1e8 * phasors[:, line])
 
 
 def test_the_mains_line_of_a_run_is_its_typical_phasor():
     z = np.array([[1, 1j], [1, 1j], [50, 50j], [1, 1j], [np.nan, 0]])
-    np.testing.assert_allclose(mains_lines(run_with_lines(30.0, z))[0], [1, 1j])
-    assert mains_lines(run_with_lines(30.0, np.full((5, 2), np.nan)))[0] is None
+    displacement, force = mains_lines(run_with_lines(30.0, z))
+    np.testing.assert_allclose(displacement, [1, 1j])
+    np.testing.assert_allclose(force, [1e8, 1e8j])
+    assert mains_lines(run_with_lines(30.0, np.full((5, 2), np.nan))) == (None, None)
     # on the excitation, or under one of its harmonics, it is no mains line
     for excitation in (50.0, 25.0, 50.0 / 3):
         assert mains_lines(run_with_lines(excitation, z[:1], settings=LineSettings(drive_harmonics=3)))[0] is None
