@@ -51,10 +51,6 @@ class LinePlan:
     frequencies: FloatArray  #: (n_lines,), Hz
     resolution: float  #: Hz: width of a line
 
-    def bins(self, k: int) -> IntArray:
-        """All bins of a line."""
-        return np.concatenate(self.groups[k])
-
 
 @dataclass(frozen=True)
 class BandPoint:

@@ -88,7 +88,7 @@ def _solved(
     classic = []
     for point in points:
         ends = point.group.kind in OPEN_ENDS
-        classic += [classic_line(point.spectra, point.plan.bins(k), ends) for k in range(len(point.plan.groups))]
+        classic += [classic_line(point.spectra, groups, ends) for groups in point.plan.groups]
     measured = [(s.phasors.run, s.temperatures) for point in points for s in point.spectra]
     temperatures = run_temperatures(campaign, measured)
     passes = 2 if any(point.method == "hv" for point in points) else 1

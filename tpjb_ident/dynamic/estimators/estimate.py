@@ -14,7 +14,7 @@ from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import (
     PhasorTable,
-    WindowFit,
+    TableFit,
     complex_to_real_covariance,
     displacement_condition,
     ols_fit,
@@ -151,27 +151,27 @@ def _obstacle(table: PhasorTable, method: str) -> Condition | None:
     return None
 
 
-def _exact(table: PhasorTable) -> WindowFit:
+def _exact(table: PhasorTable) -> TableFit:
     """Two windows: H solves them exactly, whatever the method, and no residual is left to tell an error from."""
     none = Condition("no-residual", "as many windows as unknowns: there is no interval. Record more windows")
-    return WindowFit(ols_fit(table.D, table.F), np.ones(2), conditions=(none,))
+    return TableFit(ols_fit(table.D, table.F), np.ones(2), conditions=(none,))
 
 
-def _rlm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
+def _rlm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
     return rlm_fit(table.D, table.F, replace(settings, quick=not scatter))
 
 
-def _ols(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
-    return _regression(table, WindowFit(ols_fit(table.D, table.F), np.ones(len(table))), scatter)
+def _ols(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
+    return _regression(table, TableFit(ols_fit(table.D, table.F), np.ones(len(table))), scatter)
 
 
-def _mm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
+def _mm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
     fit = mm_fit(table.D, table.F, table.direction)
-    found = WindowFit(fit.coefficients, fit.weights, conditions=fit.conditions)
+    found = TableFit(fit.coefficients, fit.weights, conditions=fit.conditions)
     return _regression(table, found, scatter, _VARIANCE["mm"])
 
 
-def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
+def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
     start = mm_fit(table.D, table.F, table.direction, tolerance=1e-7)  # tells which windows are good, no more
     solved = solved_windows(table, start.coefficients, within_directions(start.weights, table.direction))
     if solved is not None:
@@ -181,11 +181,11 @@ def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowF
     return replace(plain, conditions=merged(plain.conditions, (Condition("no-repeats", text),)))
 
 
-def _iv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> WindowFit:
+def _iv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
     return instrumental_fit(table, scatter)[0]
 
 
-def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[WindowFit, PhasorTable]:
+def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[TableFit, PhasorTable]:
     """Robust instrumental variables: reference channels against noise on the displacements.
 
     All four measured phasors are regressed, robustly and jointly, on the two references; the noise of D then sits on
@@ -203,11 +203,11 @@ def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[WindowFi
     h = plain + np.linalg.solve(B_D.T, B_left.T).T
     D = table.reference @ B_D.T
     explained = replace(table, D=D, F=table.F - (table.D - D) @ h.T)
-    found = WindowFit(h, fit.weights, conditions=fit.conditions)
+    found = TableFit(h, fit.weights, conditions=fit.conditions)
     return _regression(explained, found, scatter, _VARIANCE["iv"]), explained
 
 
-def _regression(table: PhasorTable, fit: WindowFit, scatter: bool, variance: float = 1.0) -> WindowFit:
+def _regression(table: PhasorTable, fit: TableFit, scatter: bool, variance: float = 1.0) -> TableFit:
     """A weighted regression with its scatter as the default method has it: that of the repeats and of the runs."""
     if not scatter:
         return fit
@@ -229,7 +229,7 @@ def _homoscedastic(D: ComplexArray, residual: ComplexArray, weights: FloatArray)
     return complex_to_real_covariance(np.kron(scatter, inverse)), np.full(8, max(2.0 * spare, 1.0))
 
 
-def _in_units(table: PhasorTable, omega: float, name: str, fit: WindowFit) -> DynamicStiffness:
+def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> DynamicStiffness:
     """Back to SI, weights back on all given windows, status from what the numbers say."""
     per_axis = np.repeat(fit.weights[:, None], 2, axis=1) if fit.weights.ndim == 1 else fit.weights
     joint = per_axis.min(axis=1)
@@ -269,7 +269,7 @@ def fit_conditions(condition: float, weights: FloatArray, directions: int) -> li
 
 
 #: What solves Eq. (15) by each method, whether its scatter is asked for: a new estimator is a function here.
-SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings, bool], WindowFit]] = {
+SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings, bool], TableFit]] = {
     "ols": _ols,
     "rlm": _rlm,
     "mm": _mm,

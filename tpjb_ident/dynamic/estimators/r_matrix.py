@@ -71,7 +71,7 @@ class PhasorTable:
 
 
 @dataclass(frozen=True)
-class WindowFit:
+class TableFit:
     """One method's answer on a table of n windows, in the table's scale."""
 
     h: ComplexArray  #: (2, 2)

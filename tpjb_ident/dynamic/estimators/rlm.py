@@ -21,7 +21,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.r_matrix import WindowFit, real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import TableFit, real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError
 from tpjb_ident.estimate.robust_constants import bisquare_weight
 
@@ -114,7 +114,7 @@ def _norm(name: str) -> Any:
     return getattr(norms, NORMS[name])()
 
 
-def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> WindowFit:
+def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> TableFit:
     """Solve Eq. (15) axis by axis with statsmodels; `D`, `F` (n, 2)."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
@@ -129,7 +129,7 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
         covariance[np.ix_(rows, rows)] = solution.covariance
         weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
         conditions += solution.conditions
-    return WindowFit(h, weights, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), conditions)
+    return TableFit(h, weights, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), conditions)
 
 
 def _reweighted(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:

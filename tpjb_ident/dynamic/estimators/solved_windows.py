@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, WindowFit
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, TableFit
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
@@ -30,7 +30,7 @@ _QUANTITIES = ("displacement", "displacement", "force", "force")
 _RIG = Rig(tuple(Sensor(quantity, quantity) for quantity in _QUANTITIES), mass=0.0, mount="unknown")
 
 
-def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray) -> WindowFit | None:
+def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray) -> TableFit | None:
     """Solve from a start of H (2, 2) with window weights (n,); None where repeats are too few for a noise."""
     z = np.concatenate([table.D, table.F], axis=1)
     present = np.ones((table.n_directions, 4), dtype=bool)
@@ -46,7 +46,7 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
         return None
     run_weights = np.zeros(table.n_directions)
     run_weights[blocks.run] = solution.weights
-    return WindowFit(
+    return TableFit(
         solution.h[0],
         means.weights * run_weights[table.direction],
         solution.records[0],
