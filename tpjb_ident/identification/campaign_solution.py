@@ -21,8 +21,6 @@ from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_m
 from tpjb_ident.identification.unstated_clocks import with_found_devices
 from tpjb_ident.runtime.executors import Workers, map_ordered
 from tpjb_ident.terms.clock import START, Clock
-from tpjb_ident.terms.gain import Gain
-from tpjb_ident.terms.housing import Housing
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
@@ -80,6 +78,11 @@ def solve_campaign(
     task = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
     loads = static_loads(campaign, points)
     offsets: dict[str, float] = {}
+
+    def solved(rig: Rig, blocks: Blocks, start: ComplexArray) -> Solution:
+        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, offsets)])
+        return Solver(rig, blocks, terms, start, correct).run()
+
     for count in range(_CLOCK_PASSES + 1):
         means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
@@ -91,26 +94,21 @@ def solve_campaign(
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
         rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
+        start = _starts(rig, points, means)
+        solution = solved(rig, blocks, start)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
-        rates = _clock_rates(rig, blocks, _starts(rig, points, means))
+        rates = Clock(rig, blocks).rates(solution.fitted[Clock.name].value)
         offsets = {device: offsets.get(device, 0.0) + rate for device, rate in rates.items()}
         task = replace(task, sensors=sensors, rates=offsets)
-    start = _starts(rig, points, means)
-
-    def solved(rig: Rig, blocks: Blocks) -> Solution:
-        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, offsets)])
-        return Solver(rig, blocks, terms, start, correct).run()
-
-    solution = solved(rig, blocks)
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        rig, solution = learnt, solved(learnt, blocks)
+        rig, solution = learnt, solved(learnt, blocks, start)
     pickup, fits = _mains(points, digests, rig, blocks, solution) if correct else (None, {})
     shift = np.zeros_like(blocks.z)
     if fits:
         shift = _mains_readings(rig, blocks, fits)
-        solution = solved(rig, replace(blocks, z=blocks.z - shift))
+        solution = solved(rig, replace(blocks, z=blocks.z - shift), start)
     force = force_pickup([digest.mains_force for digest in digests])
     in_cells = _in_cells(points, rig, blocks, force)
     size = float(np.linalg.norm(force))
@@ -126,13 +124,6 @@ def _starts(rig: Rig, points: Sequence[PointData], means: Sequence[PointMeans]) 
     """H of the film to start from at every point, (P, 2, 2) [N/m]."""
     omega = np.array([data.omega for data in points])
     return np.array([point.start for point in means]) - rig.bare.at(omega)
-
-
-def _clock_rates(rig: Rig, blocks: Blocks, start: ComplexArray) -> dict[str, float]:
-    """Rates of the devices' clocks that the blocks show, relative."""
-    clock = Clock(rig, blocks)
-    fitted = Solver(rig, blocks, [Gain(rig, blocks), clock, Housing(rig, blocks)], start).run().fitted
-    return clock.rates(fitted[clock.name].value)
 
 
 def _mains(

@@ -66,20 +66,19 @@ def finite_mean(rows: FloatArray) -> FloatArray:
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
-def gather(runs: list[RunPhasors]) -> list[PointData]:
+def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    lines = [(run.point, run.lines.driven) for run in runs]
-    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
+    points = []
+    for point, members in group([(run.point, run.lines.driven) for run in runs]):
+        data = point_data(point, [(runs[k], i) for k, i in members])
+        points.append(replace(data, digests=tuple(digests[k] for k, _ in members) if digests else ()))
+    return points
 
 
 def campaign_points(finished: FinishedRuns) -> list[PointData]:
     """Operating points of all runs of a campaign that can be used."""
     digests = finished.digests
-    points = []
-    for point, members in group([(digest.point, digest.phasors.lines.driven) for digest in digests]):
-        data = point_data(point, [(digests[k].phasors, i) for k, i in members])
-        points.append(replace(data, digests=tuple(digests[k] for k, _ in members)))
-    return points
+    return gather([digest.phasors for digest in digests], digests)
 
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
