@@ -23,8 +23,8 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 #: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
     "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
-    "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
-    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
+    "tpjb_ident/identification/campaign_solution.py": {"Clock"},
+    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {

@@ -122,9 +122,8 @@ def estimate_table(
     estimate = _in_units(table, omega, name, fit)
     if known is None:
         return estimate
-    covariance = _VARIANCE.get(method, 1.0) * known.covariance
-    figures = {"dof": known.dof, "chi_square": known.chi_square, "systematic": known.systematic}
-    return replace(estimate, covariance=covariance, **figures)
+    covariance, systematic = _VARIANCE.get(method, 1.0) * known.covariance, known.systematic
+    return replace(estimate, covariance=covariance, dof=known.dof, chi_square=known.chi_square, systematic=systematic)
 
 
 def _si(value: Any, unit: str, name: str) -> Any:
@@ -226,7 +225,8 @@ def _homoscedastic(D: ComplexArray, residual: ComplexArray, weights: FloatArray)
     scatter = (weights[:, None] * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
     # Two real residuals per spare complex one; both parts of a row share its scale.
-    return complex_to_real_covariance(np.kron(scatter, inverse)), np.full(8, max(2.0 * spare, 1.0))
+    covariance = complex_to_real_covariance(np.asarray(np.kron(scatter, inverse), dtype=complex))
+    return covariance, np.full(8, max(2.0 * spare, 1.0))
 
 
 def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> DynamicStiffness:

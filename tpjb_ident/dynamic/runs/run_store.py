@@ -54,7 +54,7 @@ _RECORDS = (
     RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLines, FilmLine,
     Observation, RecordLines, Reporter, Finding, Problem,
 )  # fmt: skip
-_MADE = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
+_MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
 
 
 def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
