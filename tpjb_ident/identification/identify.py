@@ -29,6 +29,7 @@ from tpjb_ident.identification.point import PointTask, finished_point, point_sha
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.runtime.executors import Workers, map_ordered
+from tpjb_ident.terms.registry import cell_stiffness
 
 
 def identify(
@@ -121,6 +122,7 @@ def _joined(sines: Identification, bands: Identification) -> Identification:
         conditions=tuple(conditions.values()),
         bands=bands.bands,
         calibration_names=names,
+        cell_stiffness=sines.cell_stiffness or bands.cell_stiffness,
     )
 
 
@@ -161,4 +163,5 @@ def assemble(
     remarks = unstated(campaign) + named_runs(excluded, len(finished.outcomes)) + lost
     named = with_probe_doubts(checked.swept, points, settings.clearance)
     changes, names = shared_changes(solved.solution, range(len(gathered)))
-    return Identification(campaign.id, settings.method, named, changes, remarks, calibration_names=names)
+    springs = cell_stiffness(solved.solution)
+    return Identification(campaign.id, settings.method, named, changes, remarks, (), names, springs)

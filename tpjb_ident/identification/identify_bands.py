@@ -28,6 +28,7 @@ from tpjb_ident.identification.band_tables import SolvedBands, band_result
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated, with_start
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.terms.clock import START
+from tpjb_ident.terms.registry import cell_stiffness
 
 Progress = Callable[[str, int, int], None]
 #: What each method takes for the source of motion; without an instrument first one, then the other of these.
@@ -73,7 +74,9 @@ def identify_bands(
     found = tuple(point for band in results for point in band.points)
     parts = [q for b in range(len(points)) for q in solved.parts(b)]
     changes, names = shared_changes(solved.first.part, parts)
-    return Identification(campaign.id, settings.method, found, changes, named, tuple(results), names)
+    return Identification(
+        campaign.id, settings.method, found, changes, named, tuple(results), names, cell_stiffness(solved.first.part)
+    )
 
 
 def _solved(

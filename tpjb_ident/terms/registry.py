@@ -67,3 +67,9 @@ def learnt_rig(rig: Rig, solution: Solution) -> Rig:
             contradicted = {**rig.contradicted, term.name: term.conditions(fitted)}
             rig = replace(rig, sensors=sensors, contradicted=contradicted)
     return rig
+
+
+def cell_stiffness(solution: Solution) -> tuple[float, float] | None:
+    """Stiffness of what the housing stands on along X and Y [N/m]; None where no accelerometer shows it."""
+    housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
+    return None if housing is None else housing.springs(solution.fitted[housing.name])
