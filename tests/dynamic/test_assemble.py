@@ -14,8 +14,7 @@ from rigdata.operating_point import OperatingPoint
 from tests.dynamic.phasor_cases import OMEGA, WINDOWS, run_phasors
 from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
-from tpjb_ident.dynamic.runs.finished_runs import digest
-from tpjb_ident.dynamic.runs.run_store import RunResult
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, digest
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import assemble
 
@@ -47,13 +46,9 @@ def run_at(name, direction, load, turn, rng, noise):
     return run_phasors(name, direction, load, D, F, load * np.array([np.sin(turn), -np.cos(turn)]), CHANNELS)
 
 
-class Kept:
+def finished(runs, left_out=()):
     """Finished runs."""
-
-    def __init__(self, runs, left_out=()):
-        self.left_out = left_out
-        self.digests = [digest(RunResult(run, {1: 300.0 + k * k, 2: 310.0})) for k, run in enumerate(runs)]
-        self.places = list(range(len(runs)))
+    return FinishedRuns((*(digest(run, {1: 300.0 + k * k, 2: 310.0}) for k, run in enumerate(runs)), *left_out))
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +67,8 @@ def found(runs, left_out=(), channels=CHANNELS, progress=None, **settings):
     campaign = SimpleNamespace(
         id="c", channels=named, of_kind=lambda kind: [], housing_mass=3.0, mass_uncertainty=0.0, mount=None
     )
-    chosen = IdentifySettings(**{"methods": ("ols",), "n_calibration": 200} | settings)
-    return assemble(campaign, Kept(runs, left_out), chosen, progress or (lambda text, done, total: None))
+    chosen = IdentifySettings(**{"methods": ("ols",)} | settings)
+    return assemble(campaign, finished(runs, left_out), chosen, progress or (lambda text, done, total: None))
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +87,9 @@ def test_every_point_has_its_coefficients_and_all_their_errors(result):
         assert p.load_miss.size.shape == (5,)
         assert p.temperatures[2] == 310.0
         assert p.stiffness.weights.shape == (5 * WINDOWS, 2)
-        for est in p.by_method.values():
+        for est in p.by_method.values():  # how runs and windows scatter is no matter of the method
             np.testing.assert_array_equal(est.systematic, p.stiffness.systematic)
+            np.testing.assert_array_equal(est.covariance, p.stiffness.covariance)
     assert [p.temperatures[1] for p in result.points] == [306.0, 351.0]
     assert (result.campaign, result.method, result.conditions) == ("c", "mm-eiv", ())
 

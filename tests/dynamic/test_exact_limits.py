@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from statsmodels.robust.scale import HuberScale
 
 from tests.dynamic.phasor_cases import H, complex_normal
 from tpjb_ident.dynamic.estimators.mm import mm_fit
 from tpjb_ident.dynamic.estimators.r_matrix import real_rows
 from tpjb_ident.dynamic.estimators.rlm import ComplexInputError, RlmSettings, rlm_fit, solve_rlm
-from tpjb_ident.dynamic.estimators.uncertainty import information
 from tpjb_ident.estimate.robust_constants import (
     bisquare_weight,
     efficiency_constant,
@@ -53,13 +53,6 @@ def test_trimming_weight_is_symmetric_about_the_middle():
     assert weight[2] + weight[4] == pytest.approx(1.0)
 
 
-def test_information_is_a_sum_of_kronecker_products():
-    rng = np.random.default_rng(10)
-    D, star, inverse = complex_normal(rng, 3, 2), complex_normal(rng, 3, 2), complex_normal(rng, 3, 2, 2)
-    whole = sum(np.kron(inverse[g], np.outer(star[g].conj(), D[g])) for g in range(3))
-    np.testing.assert_allclose(information(D, star, inverse), whole)
-
-
 def test_degrees_of_freedom_in_the_limits():
     between, one = np.full(8, 4.0), np.ones(8)
     np.testing.assert_allclose(mixed_dof(one, one, 30.0, between), 30.0)
@@ -74,20 +67,17 @@ def test_either_complex_argument_is_refused_by_rlm():
     for a, b in ((design + 0j, response), (design, response + 0j)):
         with pytest.raises(ComplexInputError, match="Stack real and imaginary"):
             solve_rlm(a, b)
-    with pytest.raises(ValueError, match="unknown scale 'iqr'"):
-        solve_rlm(design, response, RlmSettings(scale="iqr"))
 
 
 def test_rlm_scales_are_those_of_the_normal_law():
-    """All three estimate the standard deviation of normal errors; MASS and MAD differ by 0.67448975 / 0.6745."""
+    """Both estimate the standard deviation of normal errors."""
     rng = np.random.default_rng(13)
     design = np.column_stack([np.ones(2000), rng.standard_normal(2000)])
     response = design @ [1.0, 2.0] + 0.5 * rng.standard_normal(2000)
-    found = {s: solve_rlm(design, response, RlmSettings(scale=s)).scale for s in ("mad", "mass", "huber")}
+    found = {str(s): solve_rlm(design, response, RlmSettings(scale=s)).scale for s in ("mad", HuberScale())}
     for scale in found.values():
         assert scale == pytest.approx(0.5, rel=0.05)
-    assert found["mass"] / found["mad"] == pytest.approx(0.6744897501960817 / 0.6745, rel=1e-6)
-    assert found["huber"] != pytest.approx(found["mad"], rel=1e-6)
+    assert len(set(found.values())) == 2
 
 
 def test_rlm_of_two_axes_keeps_places_weights_and_freedom():

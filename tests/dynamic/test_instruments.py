@@ -10,8 +10,7 @@ from tests.rigs.campaign_file import plans_of, write_campaign
 from tests.rigs.field_conditions import Row, judge, rows
 from tests.rigs.field_rig import Device, Rig
 from tpjb_ident.check.set_points import without_static_part
-from tpjb_ident.dynamic.corrections.cell_zero import cell_zero
-from tpjb_ident.dynamic.estimators.uncertainty import DirectionMeans, pooled_effect
+from tpjb_ident.dynamic.corrections.static_load import cell_zero
 from tpjb_ident.dynamic.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
 from tpjb_ident.dynamic.results.frequency_model import chance_of
 from tpjb_ident.dynamic.settings import IdentifySettings
@@ -76,16 +75,6 @@ def test_cells_without_static_part_are_no_cells_of_wrong_gain():
 def test_chance_knows_how_well_covariances_are_known():
     assert chance_of(30.0, 20, (np.inf,) * 3) == pytest.approx(0.0699, abs=1e-3)
     assert chance_of(60.0, 20, (8.0,) * 3) > 100 * chance_of(60.0, 20, (np.inf,) * 3)
-
-
-def test_a_pooled_effect_is_the_runs_own_scatter():
-    rng = np.random.default_rng(5)
-    angle = np.arange(400) * np.pi / 400
-    D = np.stack([np.cos(angle), np.sin(angle)], axis=1) + 0j
-    residual = 0.01 * (rng.standard_normal((400, 2)) + 1j * rng.standard_normal((400, 2))) / np.sqrt(2)
-    found = pooled_effect(residual, DirectionMeans(D, D, np.full(400, 7.0)))
-    # 200 per column of D, half of each error's variance in its real part
-    np.testing.assert_allclose(np.diag(found), 0.5 * 1e-4 / 200, rtol=0.1)
 
 
 @pytest.mark.slow

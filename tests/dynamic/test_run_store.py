@@ -20,7 +20,6 @@ from tests.dynamic.test_identify import rig
 from tests.good_campaigns import directions, written
 from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.dynamic.runs import run_jobs
-from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
 from tpjb_ident.dynamic.runs.run_jobs import all_runs as gathered_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.phasors.run_phasors import PhasorSettings
@@ -110,12 +109,13 @@ def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, t
 
 
 @pytest.mark.slow
-def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_path):
-    campaign, settings = load_campaign(path), PhasorSettings()
-    runs, mass = campaign.of_kind("dynamic"), campaign.housing_mass
-    finished = FinishedRuns(runs, mass, lambda run: run_jobs.one_run(run, mass, settings), RunStore(tmp_path / "kept"))
-    finished.put(3, None, "the fingerprint that it had")
-    assert same([(finished.digests[0].phasors, finished.digests[0])], [whole[3]])
+def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_path, counted, monkeypatch):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    all_runs(campaign, settings, silent, store=store)
+    counted.clear()
+    monkeypatch.setattr(RunStore, "load", lambda store, run, mark: None)
+    assert same(all_runs(campaign, settings, silent, store=store), whole)
+    assert len(counted) == len(whole)
 
 
 @pytest.mark.slow
@@ -220,7 +220,7 @@ def without_mark(meta):
 
 
 def of_another_kind(meta):
-    meta["lines"] = 5
+    meta["result"]["RunDigest"]["phasors"] = {"set": 5}
 
 
 def with_a_mark_that_is_none(meta):
@@ -228,7 +228,7 @@ def with_a_mark_that_is_none(meta):
 
 
 def without_blocks(meta):
-    meta["conditions"] = [["one"]]
+    del meta["result"]["RunDigest"]["phasors"]
 
 
 @pytest.mark.slow

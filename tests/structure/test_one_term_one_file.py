@@ -20,13 +20,11 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 #: Terms that code outside their files asks for: clocks are put right before windows are averaged, with gains and the
 #: housing in the way; a load's direction is not learnt where nothing is to be corrected; a lag is the housing's. Over a
 #: band the clocks are put right before the transform, and how much runs' gains scatter is learnt from them. The check
-#: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own. The
-#: springs under the housing, which the diagnosis asks for, are read off the solved housing.
+#: of a rig holds its sensors against one another with the film left free, by the terms that are the sensors' own.
 CLASSES = {
     "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
-    "tpjb_ident/identification/campaign_solution.py": {"Clock", "Gain", "Housing", "LoadTurn"},
-    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "LoadTurn", "RunGain"},
-    "tpjb_ident/identification/shared_changes.py": {"Housing"},
+    "tpjb_ident/identification/campaign_solution.py": {"Clock"},
+    "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.
 NAMES = {

@@ -11,13 +11,14 @@ import pytest
 
 from tests.dynamic.phasor_cases import FILM_H as H
 from tests.dynamic.phasor_cases import complex_normal
-from tpjb_ident.phasors.line_means import mains_line
+from tpjb_ident.phasors.line_means import mains_lines
 from tpjb_ident.phasors.lines import LineSettings, known_lines
-from tpjb_ident.terms import mains_angles
+from tpjb_ident.terms import mains
 from tpjb_ident.terms.mains import (
     _LOCKED,
     MAINS_CORRECTED,
     MIN_RUNS,
+    MainsEquations,
     MainsFit,
     Pickup,
     fit_mains,
@@ -25,7 +26,6 @@ from tpjb_ident.terms.mains import (
     force_pickup_spread,
     mains_pickup,
 )
-from tpjb_ident.terms.mains_angles import MainsEquations
 
 PATTERN = 1e-7 * np.array([1.0 + 0.5j, -0.6j])
 AXES = np.radians([45.0, 135.0])
@@ -35,8 +35,8 @@ PROBES = np.stack([np.cos(AXES), np.sin(AXES)], axis=1)
 @pytest.fixture(autouse=True)
 def _few_starts(monkeypatch):
     """Six runs with little pick-up need neither two thousand starts nor thirty of them polished."""
-    monkeypatch.setattr(mains_angles, "_STARTS", 40)
-    monkeypatch.setattr(mains_angles, "_POLISHED", 6)
+    monkeypatch.setattr(mains, "_STARTS", 40)
+    monkeypatch.setattr(mains, "_POLISHED", 6)
 
 
 def shaken(n=6, seed=1, force=500.0):
@@ -59,18 +59,21 @@ def run_with_lines(excitation, z, seed=1, settings=None):
     phasors = complex_normal(np.random.default_rng(seed), 5, len(lines.frequencies), 2)
     if "mains" in names:
         phasors[:, 1 + names.index("mains")] = z
-    return SimpleNamespace(lines=lines, displacement=SimpleNamespace(phasors=phasors))
+    displacement = SimpleNamespace(phasors=phasors)
+    return SimpleNamespace(lines=lines, displacement=displacement, oil_force=lambda line: 1e8 * phasors[:, line])
 
 
 def test_the_mains_line_of_a_run_is_its_typical_phasor():
     z = np.array([[1, 1j], [1, 1j], [50, 50j], [1, 1j], [np.nan, 0]])
-    np.testing.assert_allclose(mains_line(run_with_lines(30.0, z)), [1, 1j])
-    assert mains_line(run_with_lines(30.0, np.full((5, 2), np.nan))) is None
+    displacement, force = mains_lines(run_with_lines(30.0, z))
+    np.testing.assert_allclose(displacement, [1, 1j])
+    np.testing.assert_allclose(force, [1e8, 1e8j])
+    assert mains_lines(run_with_lines(30.0, np.full((5, 2), np.nan))) == (None, None)
     # on the excitation, or under one of its harmonics, it is no mains line
     for excitation in (50.0, 25.0, 50.0 / 3):
-        assert mains_line(run_with_lines(excitation, z[:1], settings=LineSettings(drive_harmonics=3))) is None
+        assert mains_lines(run_with_lines(excitation, z[:1], settings=LineSettings(drive_harmonics=3)))[0] is None
     lines = known_lines((30.0,), 22.0, 1000.0, LineSettings(mains=0.0))
-    assert mains_line(SimpleNamespace(lines=lines, displacement=None)) is None
+    assert mains_lines(SimpleNamespace(lines=lines, displacement=None))[0] is None
 
 
 def test_pickup_of_probes_that_keep_their_phases_is_one_pattern():
@@ -213,7 +216,7 @@ def test_two_answers_that_are_equally_good_share_by_their_breadth(monkeypatch, o
 
     def minimum(cost, k):
         x = np.concatenate([entries[k] / scale, np.zeros(6)])
-        return mains_angles.Minimum(cost, x, (k + 1) * 1e10 * np.eye(8), (math.log(3.0), 0.0)[k] + off)
+        return mains.Minimum(cost, x, (k + 1) * 1e10 * np.eye(8), (math.log(3.0), 0.0)[k] + off)
 
     scale = float(np.linalg.norm(F) / np.linalg.norm(D))
     monkeypatch.setattr(MainsEquations, "solve", lambda self: [minimum(5.0, 0), minimum(5.0, 1)])

@@ -71,7 +71,7 @@ def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
         return PlainPoint(data, R, f, none, np.full(8, np.nan), ("fewer-than-two-directions",))
     # statsmodels' tolerance is absolute: the system is brought to order one, and its answer back
     displacement, force = float(np.abs(D).max()), float(np.abs(F).max())
-    fit = rlm_fit(D / displacement, F / force, RlmSettings(settings.norm, library=True))
+    fit = rlm_fit(D / displacement, F / force, RlmSettings(settings.norm))
     scale = force / displacement
     error = np.sqrt(np.diag(fit.covariance)) * scale
     return PlainPoint(data, R, f, fit.h * scale, error, tuple(str(c) for c in fit.conditions))

@@ -28,10 +28,6 @@ class IdentifySettings:
     correct : bool
         Bring every run to its set-point load (measured miss, slope over the campaign's loads) and take
         mains off the excitation line where its size is known.
-    n_calibration : int
-        Monte-Carlo draws over the calibration uncertainties.
-    seed : int
-        Of those draws.
     keep_weights : bool
         Keep the weight of every window and method; without, only whether the window counted (nearly no memory).
 
@@ -47,8 +43,6 @@ class IdentifySettings:
     phasors: PhasorSettings = field(default_factory=PhasorSettings)
     clearance: float | None = None
     correct: bool = True
-    n_calibration: int = 400
-    seed: int = 20190722
     keep_weights: bool = True
 
     def __repr__(self) -> str:

@@ -150,6 +150,14 @@ def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
     return result
 
 
+def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:
+    """X and Y of the force of the film (n, 2), without the housing's inertia where accelerometers measure it."""
+    force = vector(rig, blocks, "force")
+    if len(rig.of("acceleration")) < 2:
+        return force
+    return force + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
+
+
 def totals(place: IntArray, values: FloatArray | BoolArray, number: int) -> FloatArray:
     """Sums of values (n,) by place (n,), (number,)."""
     return np.asarray(np.bincount(place, weights=values, minlength=number), dtype=float)

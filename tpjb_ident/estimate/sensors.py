@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, Sensor, vector
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, vector
 
 #: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
 _FLOATS = 0.3
@@ -60,6 +60,14 @@ def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
     """Unit vectors of the axes (m, 2); zero where a run has no such channel."""
     rows = [(0.0, 0.0) if c is None else (np.cos(c.axis or 0.0), np.sin(c.axis or 0.0)) for c in channels]
     return np.array(rows)
+
+
+def campaign_rig(
+    campaign: Campaign, sensors: tuple[Sensor, ...], blocks: Blocks, ratio: complex, bare: RigStiffness
+) -> Rig:
+    """The rig of a campaign's dynamic runs; `ratio`: cells over set points of all runs, zero where they show none."""
+    mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), ratio)
+    return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=ratio != 0)
 
 
 def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:

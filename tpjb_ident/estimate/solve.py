@@ -151,31 +151,24 @@ class Solver:
 
     def _housing_misfit(self) -> ComplexArray:
         """What the housing's equations leave at the fitted motion, (n, 2)."""
-        slope, known = self._load_slopes()
-        parts = []
-        for places in self._slices():
-            blocks = self.blocks.part(places)
-            state = self._state(blocks, places, slope, known)
-            parts.append(state.reading(self.rig, blocks)[:, blocks.z.shape[1] :])
-        return np.concatenate(parts)
+        m = self.blocks.z.shape[1]
+        return np.concatenate([state.reading(self.rig, blocks)[:, m:] for _, blocks, state in self._states()])
 
-    def _load_slopes(self) -> tuple[ComplexArray, BoolArray]:
+    def _states(self) -> Iterator[tuple[slice, Blocks, State]]:
+        """Places of some blocks at a time, the blocks, and the last iterate for them."""
         h = np.where(self.solvable[:, None, None], self.h, np.nan)
         slope, known = slopes_over_load(self.blocks.points, h)
-        return slope, known & self.to_set_point
-
-    def _slices(self) -> Iterator[slice]:
         for first in range(0, max(len(self.blocks), 1), _CHUNK):
-            yield slice(first, first + _CHUNK)
+            places = slice(first, first + _CHUNK)
+            blocks = self.blocks.part(places)
+            yield places, blocks, self._state(blocks, places, slope, known & self.to_set_point)
 
     def _sums(self, first: bool = False) -> tuple[Sums, Residuals]:
         numbers = self.shape.numbers + self.own.value.shape[1]
         sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
         fits = []
-        slope, known = self._load_slopes()
-        for places in self._slices():
-            blocks, group = self.blocks.part(places), self.group[places]
-            state = self._state(blocks, places, slope, known)
+        for places, blocks, state in self._states():
+            group = self.group[places]
             rows = self._rows(blocks, state, self.scatter.variance[group])
             self.u[places] = state.u
             weight = np.sqrt(self.scatter.weights[places] * self.solvable[blocks.point])
@@ -328,11 +321,8 @@ class Solver:
 
     def _apart(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Factor and shift of the blocks' readings (n, m), and how their H differs from their point's (n, 2, 2)."""
-        slope, known = self._load_slopes()
         factors, shifts, changes = [], [], []
-        for places in self._slices():
-            blocks = self.blocks.part(places)
-            state = self._state(blocks, places, slope, known)
+        for _, blocks, state in self._states():
             change = state.at_run(blocks) - self.h[blocks.point]
             shift = np.zeros_like(blocks.z)
             for term in self.terms:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State
 
 #: Largest logarithm of a factor.
@@ -106,6 +106,10 @@ class Term:
     def slope_columns(self, blocks: Blocks, reading: ComplexArray) -> ComplexArray:
         """Change of the readings' slope over time [1/s] per unit of every parameter, (n, m, q); `reading` (n, m)."""
         return np.zeros((*reading.shape, len(self.parameters)), complex)
+
+    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+        """The sensors as uncertain as the records show them; None where they are as stated."""
+        return None
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """What to say where the records contradict what was stated."""

@@ -47,7 +47,8 @@ class WindowMeans:
     motion: ComplexArray  #: (m, m): covariance of what moves from window to window
     spare: float  #: degrees of freedom of the noise
     weights: FloatArray  #: (n,): of the windows
-    wandering: int
+    residual: ComplexArray  #: (n, m): what differs from their runs' drift
+    wandering: int = 0
 
 
 def window_means(
@@ -73,41 +74,26 @@ def window_means(
     turned, wandering = aligned(z / scale, run, good)
     readings = replace(readings, film=readings.film * scale / scale[:, None])
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
-    state = _pooled(turned, run, time, readings, good, present)
+    means = _pooled(turned, run, time, readings, good, present)
     for _ in range(_ROUNDS):
-        distance = _distances(state, state.noise)
-        size = totals(run, good, len(state.mean))[run]
+        solved = np.linalg.solve(means.noise, means.residual.T)
+        distance = 2 * np.einsum("na,an->n", means.residual.conj(), solved).real
+        size = means.count[run]
         inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
         trimmed = np.where(whole & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
-        lost = totals(run, trimmed, len(state.mean)) < 1.0
+        lost = totals(run, trimmed, len(present)) < 1.0
         good = np.where(lost[run], good, trimmed)
-        state = _pooled(turned, run, time, readings, good, present)
-    noise = state.noise / shrinkage * np.outer(scale, scale)
-    return WindowMeans(
-        state.mean * scale,
-        state.slope * scale,
-        state.time,
-        state.count,
-        state.spread,
-        noise,
-        state.motion * np.outer(scale, scale),
-        state.spare,
-        good,
-        wandering,
+        means = _pooled(turned, run, time, readings, good, present)
+    outer = np.outer(scale, scale)
+    return replace(
+        means,
+        mean=means.mean * scale,
+        slope=means.slope * scale,
+        noise=means.noise / shrinkage * outer,
+        motion=means.motion * outer,
+        residual=means.residual * scale,
+        wandering=wandering,
     )
-
-
-@dataclass(frozen=True)
-class _State:
-    mean: ComplexArray
-    slope: ComplexArray
-    time: FloatArray
-    count: FloatArray
-    spread: FloatArray
-    noise: ComplexArray
-    motion: ComplexArray
-    spare: float
-    residual: ComplexArray  #: (n, m)
 
 
 def _pooled(
@@ -117,7 +103,7 @@ def _pooled(
     readings: Readings,
     weights: FloatArray,
     present: BoolArray,
-) -> _State:
+) -> WindowMeans:
     """Weighted mean and slope of every run, and the covariance of a window about them."""
     g = len(present)
     total = totals(run, weights, g)
@@ -144,7 +130,7 @@ def _pooled(
     noise = (weights[:, None] * residual).T @ residual.conj() * np.outer(root, root)
     noise = noise + (1e-24 + _FLOOR * float(np.trace(noise).real)) * np.eye(z.shape[1])
     moved = (weights[:, None] * motion).T @ motion.conj() / max(spare, 1.0)
-    return _State(mean, slope, middle, total, spread, noise, moved, spare, residual)
+    return WindowMeans(mean, slope, middle, total, spread, noise, moved, spare, weights, residual)
 
 
 def _sums(rows: ComplexArray, run: IntArray, g: int) -> ComplexArray:
@@ -163,12 +149,6 @@ def _drift(mean: ComplexArray, slope: ComplexArray, devices: Sequence[str]) -> C
         rate = np.sum(mean[:, columns].conj() * slope[:, columns], axis=1) / np.maximum(power, 1e-300)
         drift[:, columns] = rate[:, None] * mean[:, columns]
     return drift
-
-
-def _distances(state: _State, noise: ComplexArray) -> FloatArray:
-    """Squared distance of every window from its run's others, (n,)."""
-    solved = np.linalg.solve(noise, state.residual.T)
-    return np.asarray(2 * np.einsum("na,an->n", state.residual.conj(), solved).real)
 
 
 def aligned(z: ComplexArray, direction: IntArray, weights: FloatArray) -> tuple[ComplexArray, int]:

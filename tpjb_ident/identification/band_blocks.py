@@ -16,7 +16,7 @@ from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
-from tpjb_ident.identification.campaign_blocks import calibration_numbers, run_miss
+from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
@@ -86,7 +86,7 @@ def band_blocks(
             warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth[0], "miss": run_miss(miss, members)}
+            row |= {"run": len(runs), "temperature": warmth[0], "miss": miss.of(members)}
             for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
                 rows.append(response | row | {"point": first + place, "omega": omega[first + place]})
             runs.append(", ".join(s.phasors.run for s in spectra))

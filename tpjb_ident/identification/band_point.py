@@ -1,24 +1,36 @@
-"""One operating point's broadband runs: which belong together, read and transformed."""
+"""One operating point's broadband runs: which belong together, read and transformed, and the lines that they give.
+
+No bin belongs to two lines, so lines err apart from each other.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.dynamic.broadband.clock_rate import common_rates
-from tpjb_ident.dynamic.broadband.line_plan import LinePlan, line_plan
 from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
 from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.phasors.run_data import PhasorSettings
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
 _TELL_CLOCKS = ("multisine", "random", "impact")
+#: Lines over a band where a record resolves more, and bins that a line takes at least.
+_LINES, _BINS = 60, 18
+#: Bins that one response is fitted to, about: over so few it is a straight line, and enough are left for the noise.
+_GROUP = 12
+#: Bins of a line that must be left when those of shaft and mains are gone.
+_LEAST_BINS = 12
+#: Lines that a band must give.
+_LEAST_LINES = 3
 
 
 @dataclass(frozen=True)
@@ -32,13 +44,12 @@ class BandGroup:
 
 
 @dataclass(frozen=True)
-class BandSettings:
-    """Choices, as those for sines."""
+class LinePlan:
+    """Groups of bins that belong to each line: one bin of a period, or some neighbouring bins of a whole record."""
 
-    mains: float = 50.0
-    delays: dict[str, float] = field(default_factory=dict)
-    correct: bool = True
-    clearance: float | None = None
+    groups: tuple[tuple[IntArray, ...], ...]
+    frequencies: FloatArray  #: (n_lines,), Hz
+    resolution: float  #: Hz: width of a line
 
 
 @dataclass(frozen=True)
@@ -68,13 +79,13 @@ class BandPoint:
 
 
 def read_point(
-    group: BandGroup, housing_mass: float, settings: BandSettings
+    group: BandGroup, housing_mass: float, settings: PhasorSettings
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
     """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
     spectra: list[RunSpectra] = []
     remaining = []
     seconds = min(run.length / run.sample_rate for run in group.runs)
-    chosen = _with_clocks(group, SpectraSettings(group.band, seconds, settings.mains, settings.delays))
+    chosen = _with_clocks(group, SpectraSettings(group.band, seconds, settings.lines.mains, settings.delays))
     for run in group.runs:
         try:
             spectra.append(run_spectra(run, housing_mass, chosen))
@@ -129,3 +140,28 @@ def _group(runs: list[Run]) -> BandGroup:
         text = f"runs at {first.point} have no common excitation_band"
         raise RigDataError(Problem("error", first.file, "excitation_band", text, "Check the bands", first.id))
     return BandGroup(replace(first.point, excitation=0.0), first.excitation_kind, (low, high), tuple(runs))
+
+
+def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
+    """Lines of runs that have the same bins."""
+    frequencies = spectra[0].frequencies
+    free = ~np.any([s.taken for s in spectra], axis=0)
+    period = spectra[0].period
+    if period is not None:
+        chosen = np.flatnonzero(free)
+        return LinePlan(tuple((np.array([k]),) for k in chosen), frequencies[chosen], 1 / period)
+    n = len(frequencies)
+    width = max(_BINS, math.ceil(n / _LINES))
+    count = n // width
+    if count < _LEAST_LINES:
+        have = 1 / (frequencies[1] - frequencies[0]) if n > 1 else 0.0
+        need = have * _LEAST_LINES * _BINS / max(n, 1)
+        raise BadInputError(
+            f"run {spectra[0].phasors.run}: {have:.3g} s resolve {n} bins of its band, {_LEAST_LINES * _BINS} are "
+            f"needed; record {need:.3g} s or excite a wider band"
+        )
+    lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
+    lines = [part for part in lines if len(part) >= _LEAST_BINS]
+    groups = tuple(tuple(np.array_split(part, max(round(len(part) / _GROUP), 1))) for part in lines)
+    middles = np.array([0.5 * (frequencies[part[0]] + frequencies[part[-1]]) for part in lines])
+    return LinePlan(groups, middles, width * float(frequencies[1] - frequencies[0]))

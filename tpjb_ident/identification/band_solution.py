@@ -1,31 +1,29 @@
-"""The solve of all bands of a campaign: h of every line, then K-C and K-C-M over each band, and h of its parts.
+"""The solve of all bands of a campaign: h of every line, then h of the parts of each band.
 
-All are one equation and one set of blocks; only what the points share differs. Scatter, weights and what the sensors
-share are found with the lines, whose h is free, and stay: a model that does not hold must not pass for runs that
-differ, nor for a gain or a load's direction.
+Both are one equation and one set of blocks; only what the points share differs. Scatter, weights and what the sensors
+share are found with the lines, whose h is free, and stay. A part's lines share one departure from the curve of K-C-M
+that is nearest to the band's lines: it need not hold over the band, only bend h within the part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.estimate.blocks import Rig, totals, vector
+from tpjb_ident.estimate.blocks import Rig, film_force, vector
 from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.band_blocks import BandBlocks
-from tpjb_ident.identification.campaign_solution import learnt_rig
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
-from tpjb_ident.terms.load_turn import LoadTurn
-from tpjb_ident.terms.registry import TERMS
+from tpjb_ident.terms.registry import campaign_terms, learnt_rig
 from tpjb_ident.terms.run_gain import RunGain
 
 #: Parts of a band whose h becomes a point.
@@ -50,28 +48,17 @@ class BandPart:
 
 
 @dataclass(frozen=True)
-class ModelFit:
-    """One model over all bands, B of them, k numbers each."""
-
-    numbers: FloatArray  #: (B, k), N/m: K, omega C, omega^2 M at the band's middle
-    solution: Solution = field(repr=False)
-    at_parts: ComplexArray = field(repr=False)  #: (Q, 2, 2), N/m
-
-
-@dataclass(frozen=True)
 class BandSolution:
     """All bands of a campaign; L lines, B bands, Q parts."""
 
     rig: Rig
     h: ComplexArray  #: (L, 2, 2), N/m: NaN where the excitation does not tell it
     lines: Solution = field(repr=False)
-    models: dict[str, ModelFit] = field(repr=False)
     parts: tuple[BandPart, ...] = field(repr=False)
     part_h: ComplexArray = field(repr=False)  #: (Q, 2, 2), N/m
     part: Solution = field(repr=False)
-    middle: FloatArray = field(repr=False)  #: (B,), rad/s: where the models' numbers are
     condition: FloatArray = field(repr=False)  #: (L,): condition number of the motions
-    used: BoolArray = field(repr=False)  #: (L,): lines that the models take
+    used: BoolArray = field(repr=False)  #: (L,): lines that the parts take
     run_scatter: float  #: of the runs' gains
 
 
@@ -80,8 +67,9 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     crude, condition = _crude(rig, data)
     regular = data.driven & (condition < _ONE_LINE)
     usable, used = regular & told, regular
-    middle = _middles(data, used)
-    start = _start(data, crude, usable, middle)
+    curve = _curve(data, used, crude, usable)
+    bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
+    start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)
     task = _Task(rig, data, (), correct, None)
     solution, task, size = _lines(task, start, used)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
@@ -89,19 +77,24 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> B
     away = (solution.h - start)[np.searchsorted(data.line, np.arange(len(data.band)))]
     usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     h[usable] = crude[usable] + away[usable]
-    task = replace(task, kept=solution)
-    models: dict[str, ModelFit] = {}
     parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
-    at = np.array([part.omega for part in parts]), np.array([part.band for part in parts], dtype=np.intp)
-    for name in MODELS:
-        shape = over_frequency(name, data.band[data.line], data.omega, middle)
-        numbers, fit = _model(task, shape, h[data.line], used[data.line])
-        models[name] = ModelFit(numbers, fit, over_frequency(name, at[1], at[0], middle).change(numbers))
-    # a tone by itself has no curve but its own h
-    curve, last = np.where(np.isfinite(fit.h), fit.h, h[data.line]), models[name].at_parts
-    last = np.where(np.isfinite(last), last, h[[part.lines[0] for part in parts]])
-    part, off = _part_solution(task, parts, curve)
-    return BandSolution(task.rig, h, solution, models, parts, last + off, part, middle, condition, used, size)
+    part, part_h = _part_solution(replace(task, kept=solution), parts, h, used)
+    return BandSolution(task.rig, h, solution, parts, part_h, part, condition, used, size)
+
+
+def _curve(
+    data: BandBlocks, used: BoolArray, h: ComplexArray, chosen: BoolArray
+) -> Callable[[IntArray, FloatArray], ComplexArray]:
+    """K-C-M over every band, nearest to h (L, 2, 2) of chosen lines (L,): H at frequencies of some bands."""
+    middle = np.ones(int(data.band.max(initial=-1)) + 1)
+    for b in range(len(middle)):
+        omega = data.line_omega[used & (data.band == b)]
+        if len(omega):
+            middle[b] = np.sqrt(omega.min() * omega.max())
+    chosen = chosen & np.isfinite(h).all(axis=(1, 2))
+    numbers = nearest(over_frequency("K-C-M", data.band, data.line_omega, middle), h, chosen.astype(float))
+    numbers[~np.isin(np.arange(len(middle)), data.band[chosen])] = np.nan
+    return lambda band, omega: over_frequency("K-C-M", band, omega, middle).change(numbers)
 
 
 @dataclass(frozen=True)
@@ -124,11 +117,9 @@ class _Task:
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
-        chosen = [t for t in TERMS if t is not Clock and (self.correct or t is not LoadTurn)]
-        band = self.data.band[self.data.line]
-        film = Distortion(rig, blocks, self.data.bent, band, self.data.uneven)
-        given = {RunGain: RunGain(rig, blocks, deviation), Distortion: film}
-        return replace(self, terms=tuple(given.get(term) or term(rig, blocks) for term in chosen))
+        film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line], self.data.uneven)
+        terms = campaign_terms(rig, blocks, self.correct, [RunGain(rig, blocks, deviation), film])
+        return replace(self, terms=tuple(term for term in terms if not isinstance(term, Clock)))
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
@@ -179,9 +170,7 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
 def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
     blocks = data.blocks
-    D, F = vector(rig, blocks, "displacement"), vector(rig, blocks, "force")
-    if len(rig.of("acceleration")) > 1:
-        F = F + rig.mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
+    D, F = vector(rig, blocks, "displacement"), film_force(rig, blocks)
     lines = len(data.band)
     h, condition = np.full((lines, 2, 2), np.nan + 0j), np.full(lines, np.inf)
     line = data.line[blocks.point]
@@ -193,40 +182,6 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
         if condition[k] < _ONE_LINE:
             h[k] = np.linalg.lstsq(D[mine], F[mine], rcond=None)[0].T
     return h - rig.bare.at(data.line_omega), condition
-
-
-def _middles(data: BandBlocks, used: BoolArray) -> FloatArray:
-    """Frequency of every band [rad/s] at which its models' numbers are, (B,)."""
-    middles = np.ones(int(data.band.max(initial=-1)) + 1)
-    for b in range(len(middles)):
-        omega = data.line_omega[used & (data.band == b)]
-        if len(omega):
-            middles[b] = np.sqrt(omega.min() * omega.max())
-    return middles
-
-
-def _start(data: BandBlocks, crude: ComplexArray, usable: BoolArray, middle: FloatArray) -> ComplexArray:
-    """H to start from at every point (P, 2, 2), curved within its line as the band is; `crude` (L, 2, 2)."""
-    curve = tuple(MODELS)[-1]
-    of_lines = over_frequency(curve, data.band, data.line_omega, middle)
-    numbers = nearest(of_lines, crude, usable.astype(float))
-    of_points = over_frequency(curve, data.band[data.line], data.omega, middle)
-    start = crude[data.line] + of_points.change(numbers) - of_lines.change(numbers)[data.line]
-    return np.where(usable[data.line][:, None, None], start, np.nan)
-
-
-def _model(task: _Task, shape: Shape, h: ComplexArray, used: BoolArray) -> tuple[FloatArray, Solution]:
-    """Numbers of a model over every band (B, k), and its solve; NaN where lines are too few."""
-    assert shape.columns is not None
-    lines = totals(shape.group, used & np.isfinite(h).all(axis=(1, 2)), shape.groups)
-    enough = lines >= shape.numbers / 2
-    numbers = nearest(shape, h, used.astype(float))
-    start = np.where((used & enough[shape.group])[:, None, None], shape.change(numbers), np.nan)
-    solution = task.solved(start, shape)
-    told = np.isfinite(solution.h).all(axis=(1, 2))
-    numbers = nearest(shape, solution.h, told.astype(float))
-    numbers[~enough] = np.nan
-    return numbers, solution
 
 
 def _parts(data: BandBlocks, used: BoolArray, told: BoolArray) -> tuple[BandPart, ...]:
@@ -242,16 +197,22 @@ def _parts(data: BandBlocks, used: BoolArray, told: BoolArray) -> tuple[BandPart
     return tuple(parts)
 
 
-def _part_solution(task: _Task, parts: Sequence[BandPart], curve: ComplexArray) -> tuple[Solution, ComplexArray]:
-    """The solve of the parts, and by how much each part's h is off the curve (P, 2, 2) of the model, (Q, 2, 2)."""
+def _part_solution(
+    task: _Task, parts: Sequence[BandPart], h: ComplexArray, used: BoolArray
+) -> tuple[Solution, ComplexArray]:
+    """The solve of the parts, and h of each at its frequency (Q, 2, 2); `h` (L, 2, 2) of the lines."""
     data = task.data
+    curve = _curve(data, used, h, used)
+    start = curve(data.band[data.line], data.omega)
+    part_h = curve(np.array([part.band for part in parts], dtype=np.intp), np.array([part.omega for part in parts]))
     of_line = np.full(len(data.band), -1, dtype=np.intp)
     for q, part in enumerate(parts):
         of_line[part.lines] = q
+        if len(part.lines) == 1:  # a tone by itself has no curve but its own h
+            start[data.line == part.lines[0]] = part_h[q] = h[part.lines[0]]
     group = of_line[data.line]
-    start = np.where((group >= 0)[:, None, None], curve, np.nan)
+    start[group < 0] = np.nan
     solution = task.solved(start, Shape(np.maximum(group, 0), count=max(len(parts), 1)))
-    off = np.zeros((len(parts), 2, 2), complex)
     for q in range(len(parts)):
-        off[q] = (solution.h - start)[np.flatnonzero(group == q)[0]]
-    return solution, off
+        part_h[q] += (solution.h - start)[np.flatnonzero(group == q)[0]]
+    return solution, part_h

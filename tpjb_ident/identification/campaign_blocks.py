@@ -12,7 +12,7 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.dynamic.runs.point_source import PointSource
+from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
@@ -22,8 +22,6 @@ from tpjb_ident.identification.point_means import PointMeans
 _FREEDOM = 60.0
 #: Error of a run's mean load where its windows do not tell, relative.
 _LOAD_ERROR = 2e-4
-#: Misses that no scatter of loads explains say nothing of how H changes with the load.
-_MAX_MISS = 0.05
 
 
 def unstated(campaign: Campaign) -> tuple[Condition, ...]:
@@ -51,30 +49,30 @@ def with_start(sensors: Sequence[Sensor], start: float) -> tuple[Sensor, ...]:
 
 
 def campaign_blocks(
-    sources: Sequence[PointSource],
+    points: Sequence[PointData],
     means: Sequence[PointMeans],
     misses: Sequence[LoadMiss],
     bent: FloatArray,
     temperatures: Mapping[str, float],
 ) -> Blocks:
     """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
-    noises, freedoms = _pooled_noise(means, [source.data.runs[0].length for source in sources])
+    noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
     known: list[list[Hashable]] = []
     rows: list[dict[str, object]] = []
-    for p, (source, point, miss) in enumerate(zip(sources, means, misses)):
+    for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
-        for g, (digest, line) in enumerate(zip(source.digests, source.data.lines)):
+        for g, (run, line) in enumerate(zip(data.runs, data.lines)):
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]
             known = known or [[] for _ in channels]
-            load = max(source.point.static_load, 1e-9)
+            load = data.point.static_load
             present = np.array([channel is not None for channel in channels])
             row: dict[str, object] = {
                 "point": p,
                 "run": len(names),
-                "omega": 2 * np.pi * digest.excitations[line],
+                "omega": 2 * np.pi * run.lines.driven[line],
                 "z": w.mean[g] * present,
                 "present": present,
                 "along": axes_of(channels),
@@ -85,20 +83,14 @@ def campaign_blocks(
                 "slope_noise": (noises[p] + w.motion) / max(float(w.spread[g]), 1e-12),
                 "windows": w.count[g],
                 "time": w.time[g],
-                "temperature": temperatures.get(digest.run, np.nan),
-                "miss": run_miss(miss, [g]),
-                "miss_error": point.load_error[g] / load if source.point.static_load > 0 else _LOAD_ERROR,
+                "temperature": temperatures.get(run.run, np.nan),
+                "miss": miss.of([g]),
+                "miss_error": point.load_error[g] / max(load, 1e-9) if load > 0 else _LOAD_ERROR,
                 "shaft": point.shaft[g],
             }
-            names.append(digest.run)
+            names.append(run.run)
             rows.append(row)
-    return stacked([source.point for source in sources], names, len(means[0].channels[0]), rows, bent)
-
-
-def run_miss(miss: LoadMiss, members: Sequence[int]) -> complex:
-    """Missed load of some runs together, relative size + i turn [rad]; none where no scatter of loads explains it."""
-    size, turn = float(np.mean(miss.size[members])), float(np.mean(miss.sideways[members]))
-    return complex(size, turn) if abs(size) < _MAX_MISS and abs(turn) < _MAX_MISS else 0j
+    return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
 
 
 def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:

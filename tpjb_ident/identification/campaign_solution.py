@@ -9,23 +9,18 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero_uncertainty
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss, campaign_zero, load_misses
+from tpjb_ident.dynamic.corrections.static_load import StaticLoads, static_loads
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
 from tpjb_ident.dynamic.runs.finished_runs import RunDigest
-from tpjb_ident.dynamic.runs.point_source import PointSource
-from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, vector
-from tpjb_ident.estimate.sensors import found_mount, sensors_of
+from tpjb_ident.dynamic.runs.point_data import PointData
+from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, film_force, vector
+from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
-from tpjb_ident.estimate.term import Term
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
 from tpjb_ident.identification.unstated_clocks import with_found_devices
 from tpjb_ident.runtime.executors import Workers, map_ordered
 from tpjb_ident.terms.clock import START, Clock
-from tpjb_ident.terms.gain import Gain
-from tpjb_ident.terms.housing import Housing
-from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
@@ -35,7 +30,7 @@ from tpjb_ident.terms.mains import (
     force_pickup_spread,
     mains_pickup,
 )
-from tpjb_ident.terms.registry import TERMS
+from tpjb_ident.terms.registry import campaign_terms, learnt_rig
 
 #: Passes over the windows in which the clocks' rates are found.
 _CLOCK_PASSES = 2
@@ -51,9 +46,7 @@ class CampaignSolution:
     task: MeansTask
     blocks: Blocks = field(repr=False)
     means: tuple[PointMeans, ...] = field(repr=False)
-    misses: tuple[LoadMiss, ...] = field(repr=False)
-    common: complex  #: cells over set points, all runs together
-    zero: CellZero
+    loads: StaticLoads = field(repr=False)
     film: tuple[FilmChange, ...]
     solution: Solution = field(repr=False)
     pickup: Pickup | None
@@ -73,7 +66,7 @@ class CampaignSolution:
 
 def solve_campaign(
     campaign: Campaign,
-    sources: Sequence[PointSource],
+    points: Sequence[PointData],
     digests: Sequence[RunDigest],
     workers: Workers,
     correct: bool,
@@ -83,112 +76,65 @@ def solve_campaign(
     sensors = sensors_of(campaign)
     temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
     task = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
-    zero = campaign_zero(sources, cell_zero_uncertainty(campaign))
-    misses, common = load_misses(sources, zero.force)
+    loads = static_loads(campaign, points)
     offsets: dict[str, float] = {}
+
+    def solved(rig: Rig, blocks: Blocks, start: ComplexArray) -> Solution:
+        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, offsets)])
+        return Solver(rig, blocks, terms, start, correct).run()
+
     for count in range(_CLOCK_PASSES + 1):
-        means = tuple(map_ordered(workers, point_means, [(source,) for source in sources], task))
-        film = tuple(_film(source, point) for source, point in zip(sources, means))
+        means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
+        film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
-        blocks = campaign_blocks(sources, means, misses, bent, temperatures)
+        blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
         if count == 0:
             rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
             devices = with_found_devices(sensors, blocks)
             # devices that the manifest states are taken at their times; one that was found started when nobody knows
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
-        mount = found_mount(sensors, blocks, getattr(campaign, "mount", None), common)
-        rig = Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=common != 0)
+        rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
+        start = _starts(rig, points, means)
+        solution = solved(rig, blocks, start)
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
-        rates = _clock_rates(rig, blocks, _starts(rig, sources, means))
+        rates = Clock(rig, blocks).rates(solution.fitted[Clock.name].value)
         offsets = {device: offsets.get(device, 0.0) + rate for device, rate in rates.items()}
         task = replace(task, sensors=sensors, rates=offsets)
-    start = _starts(rig, sources, means)
-
-    def solved(rig: Rig, blocks: Blocks) -> Solution:
-        used = [term for term in TERMS if correct or term is not LoadTurn]
-        terms = [Clock(rig, blocks, offsets) if term is Clock else term(rig, blocks) for term in used]
-        return Solver(rig, blocks, terms, start, correct).run()
-
-    solution = solved(rig, blocks)
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        rig, solution = learnt, solved(learnt, blocks)
-    pickup, fits = _mains(sources, digests, rig, blocks, solution) if correct else (None, {})
+        rig, solution = learnt, solved(learnt, blocks, start)
+    pickup, fits = _mains(points, digests, rig, blocks, solution) if correct else (None, {})
     shift = np.zeros_like(blocks.z)
     if fits:
         shift = _mains_readings(rig, blocks, fits)
-        solution = solved(rig, replace(blocks, z=blocks.z - shift))
+        solution = solved(rig, replace(blocks, z=blocks.z - shift), start)
     force = force_pickup([digest.mains_force for digest in digests])
-    in_cells = _in_cells(sources, rig, blocks, force)
+    in_cells = _in_cells(points, rig, blocks, force)
     size = float(np.linalg.norm(force))
-    return CampaignSolution(
-        rig, task, blocks, means, tuple(misses), common, zero, film, solution, pickup, fits, in_cells, size, shift
-    )
+    return CampaignSolution(rig, task, blocks, means, loads, film, solution, pickup, fits, in_cells, size, shift)
 
 
-def learnt_rig(rig: Rig, solution: Solution) -> Rig:
-    """The rig, as uncertain as a solve shows it to be where that contradicts what is stated; itself where not."""
-    return _with_gain_spread(_with_lag(rig, solution), solution)
+def _film(data: PointData, point: PointMeans) -> FilmChange:
+    lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
+    return film_change([line for line in lines if line is not None], point.start)
 
 
-def _with_lag(rig: Rig, solution: Solution) -> Rig:
-    """The rig, its cells as uncertain in time as the housing shows them late, where the manifest says nothing."""
-    housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
-    if housing is None or any(sensor.delay_uncertainty for sensor in rig.sensors):
-        return rig
-    lag = housing.lag_of_cells(solution.fitted[housing.name])
-    if not lag:
-        return rig
-    sensors = tuple(replace(s, delay_uncertainty=lag) if s.quantity == "force" else s for s in rig.sensors)
-    return _contradicted(replace(rig, sensors=sensors), housing, solution)
-
-
-def _with_gain_spread(rig: Rig, solution: Solution) -> Rig:
-    """The rig, gains of a quantity as uncertain as its channels show where they contradict what is stated."""
-    gain = next((term for term in solution.terms if isinstance(term, Gain)), None)
-    if gain is None:
-        return rig
-    spread = gain.spread(solution.fitted[gain.name])
-    if not spread:
-        return rig
-    wide = {s.name: max(spread.get(s.quantity, 0.0), s.uncertainty or 0.0) or None for s in rig.sensors}
-    sensors = tuple(replace(s, uncertainty=wide[s.name]) for s in rig.sensors)
-    return _contradicted(replace(rig, sensors=sensors), gain, solution)
-
-
-def _contradicted(rig: Rig, term: Term, solution: Solution) -> Rig:
-    """The rig, with what a term's test said of sensors that are now taken as more uncertain."""
-    return replace(rig, contradicted={**rig.contradicted, term.name: term.conditions(solution.fitted[term.name])})
-
-
-def _film(source: PointSource, point: PointMeans) -> FilmChange:
-    pairs = [digest.harmonics[line] for digest, line in zip(source.digests, source.data.lines) if digest.harmonics]
-    return film_change([pair for pair in pairs if pair is not None], point.start)
-
-
-def _starts(rig: Rig, sources: Sequence[PointSource], means: Sequence[PointMeans]) -> ComplexArray:
+def _starts(rig: Rig, points: Sequence[PointData], means: Sequence[PointMeans]) -> ComplexArray:
     """H of the film to start from at every point, (P, 2, 2) [N/m]."""
-    omega = np.array([source.data.omega for source in sources])
+    omega = np.array([data.omega for data in points])
     return np.array([point.start for point in means]) - rig.bare.at(omega)
 
 
-def _clock_rates(rig: Rig, blocks: Blocks, start: ComplexArray) -> dict[str, float]:
-    """Rates of the devices' clocks that the blocks show, relative."""
-    clock = Clock(rig, blocks)
-    fitted = Solver(rig, blocks, [Gain(rig, blocks), clock, Housing(rig, blocks)], start).run().fitted
-    return clock.rates(fitted[clock.name].value)
-
-
 def _mains(
-    sources: Sequence[PointSource],
+    points: Sequence[PointData],
     digests: Sequence[RunDigest],
     rig: Rig,
     blocks: Blocks,
     solution: Solution,
 ) -> tuple[Pickup | None, dict[int, MainsFit]]:
     """Angles of the mains at every point on whose line it is."""
-    coincident = [p for p, source in enumerate(sources) if source.found(MAINS_ON_LINE)]
+    coincident = [p for p, data in enumerate(points) if data.says(MAINS_ON_LINE)]
     if not coincident:
         return None, {}
     across = blocks.along[0, rig.of("displacement")]
@@ -216,10 +162,8 @@ def _mains(
 def at_set_point(rig: Rig, blocks: Blocks, solution: Solution) -> tuple[ComplexArray, ComplexArray]:
     """Displacement and oil force (n, 2) of every block, as they would be at the set point."""
     clean = replace(blocks, z=(blocks.z - solution.shift) / solution.factor)
-    D, F = vector(rig, clean, "displacement"), vector(rig, clean, "force")
-    if len(rig.of("acceleration")) > 1:
-        F = F + rig.mass * np.nan_to_num(vector(rig, clean, "acceleration"))
-    return D, F - np.einsum("nij,nj->ni", solution.run_change, D)
+    D = vector(rig, clean, "displacement")
+    return D, film_force(rig, clean) - np.einsum("nij,nj->ni", solution.run_change, D)
 
 
 def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> ComplexArray:
@@ -232,14 +176,14 @@ def _mains_readings(rig: Rig, blocks: Blocks, fits: Mapping[int, MainsFit]) -> C
     return shift
 
 
-def _in_cells(sources: Sequence[PointSource], rig: Rig, blocks: Blocks, size: FloatArray) -> dict[int, FloatArray]:
+def _in_cells(points: Sequence[PointData], rig: Rig, blocks: Blocks, size: FloatArray) -> dict[int, FloatArray]:
     """Covariance (8, 8) by point of mains in the cells, whose phase is another one in every run; `size` (2,) [N]."""
     if not size.any():
         return {}
     D = vector(rig, blocks, "displacement")
     spreads = {}
-    for p, source in enumerate(sources):
+    for p, data in enumerate(points):
         mine = blocks.point == p
-        if source.found(MAINS_ON_LINE) and mine.any():
+        if data.says(MAINS_ON_LINE) and mine.any():
             spreads[p] = force_pickup_spread(D[mine], size)
     return spreads

@@ -8,28 +8,28 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
+from tpjb_ident.conditions import merged
 from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
 from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.point_result import lost_points, named_at_points
 from tpjb_ident.dynamic.results.quality import with_probe_doubts
 from tpjb_ident.dynamic.runs.baseline import DryTest, dry_test
 from tpjb_ident.dynamic.runs.checked_runs import check_finished
-from tpjb_ident.dynamic.runs.excluded_runs import named_runs
+from tpjb_ident.dynamic.runs.excluded_runs import lost_points, named_runs, without_runs
 from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.point_source import point_sources
+from tpjb_ident.dynamic.runs.point_data import campaign_points
 from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
 from tpjb_ident.dynamic.runs.run_store import RunStore
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.identification.band_point import BandSettings
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
-from tpjb_ident.identification.identify_bands import IdentifiedBands, identify_bands
+from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import PointTask, finished_point, point_share
-from tpjb_ident.identification.shared_changes import SharedChanges, shared_changes
+from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
 from tpjb_ident.runtime.executors import Workers, map_ordered
+from tpjb_ident.terms.registry import cell_stiffness
 
 
 def identify(
@@ -80,17 +80,16 @@ def identify(
         raise BadInputError(f"campaign {campaign.id} has no dynamic runs; there is nothing to identify")
     report = progress or (lambda text, done, total: None)
     settings = _with_mains(replace(chosen, method=method or chosen.method), campaign)
+    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
     sines = replace(campaign, runs=tuple(run for run in campaign.runs if not is_broadband(run)))
     bands = None
-    dry = dry_test(campaign, settings.phasors, own_method(settings.method))
     if any(is_broadband(run) for run in runs):
-        bands = identify_bands(campaign, _band_settings(settings), report, dry.stiffness)
-    if not sines.of_kind("dynamic"):
-        identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
-    else:
+        bands = identify_bands(campaign, settings, report, dry.stiffness)
+    identification = Identification(campaign.id, settings.method, (), np.zeros((1, 0)))
+    if sines.of_kind("dynamic"):
         finished = all_runs(sines, settings.phasors, report, workers, store)
         identification = assemble(sines, finished, settings, report, workers, dry)
-    identification = identification if bands is None else _with_bands(identification, bands)
+    identification = identification if bands is None else _joined(identification, bands)
     return _with_zero_uncertainty(identification, campaign)
 
 
@@ -103,28 +102,28 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
     return replace(identification, points=points)
 
 
-def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
-    """The points of sines and those of bands together, sorted as ever."""
-    points = [*result.points, *(p for band in bands.results for p in band.points)]
-    sines = SharedChanges(result.calibration_changes, result.calibration_names, result.cell_stiffness)
-    joint = sines.beside(bands.shared)
-    changes = joint.changes.reshape(len(joint.changes), len(points), 8)
+def _joined(sines: Identification, bands: Identification) -> Identification:
+    """The points of sines and those of bands together, sorted as ever; sources of one name are one source."""
+    points = [*sines.points, *bands.points]
+    names = tuple(dict.fromkeys((*sines.calibration_names, *bands.calibration_names)))
+    changes = np.zeros((max(len(names), 1), len(points), 8))
+    place = {id(point): i for i, point in enumerate(points)}
+    for part in (sines, bands):
+        places = [place[id(point)] for point in part.points]
+        scale = np.sqrt(len(changes) / max(len(part.calibration_names), 1))
+        for name, row in zip(part.calibration_names, part.calibration_changes):
+            changes[names.index(name), places] = scale * row.reshape(-1, 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
-    table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
+    conditions = {condition.sentence(): condition for condition in (*sines.conditions, *bands.conditions)}
     return replace(
-        result,
+        sines,
         points=tuple(points[i] for i in order),
         calibration_changes=changes[:, order].reshape(len(changes), -1),
-        conditions=tuple(table.values()),
-        bands=bands.results,
-        calibration_names=joint.names,
-        cell_stiffness=joint.cell_stiffness,
+        conditions=tuple(conditions.values()),
+        bands=bands.bands,
+        calibration_names=names,
+        cell_stiffness=sines.cell_stiffness or bands.cell_stiffness,
     )
-
-
-def _band_settings(settings: IdentifySettings) -> BandSettings:
-    phasors = settings.phasors
-    return BandSettings(phasors.lines.mains, phasors.delays, settings.correct, settings.clearance)
 
 
 def _with_mains(settings: IdentifySettings, campaign: Campaign) -> IdentifySettings:
@@ -145,24 +144,24 @@ def assemble(
 ) -> Identification:
     """Estimate all points from runs already turned to phasors."""
     workers = workers or Workers()
-    checked = check_finished(campaign, finished)
+    finished, checked = check_finished(campaign, finished)
     digests = finished.digests
     dry = dry or DryTest()
-    sources = point_sources(finished)
-    report("estimating", 0, len(sources))
-    solved = solve_campaign(campaign, sources, digests, workers, settings.correct, dry.stiffness)
+    gathered = campaign_points(finished)
+    report("estimating", 0, len(gathered))
+    solved = solve_campaign(campaign, gathered, digests, workers, settings.correct, dry.stiffness)
     temperatures = {digest.run: digest.temperatures for digest in digests}
     task = PointTask(settings, solved.task, temperatures, checked, dry)
-    jobs = [(source, point_share(solved, source, p)) for p, source in enumerate(sources)]
+    jobs = [(data, point_share(solved, data, p)) for p, data in enumerate(gathered)]
+    excluded, several = finished.excluded, bool(settings.phasors.excitation_lines)
     points = []
     for point in map_ordered(workers, finished_point, jobs, task):
-        points.append(point)
-        report("estimating", len(points), len(sources))
-    excluded, several = finished.left_out, bool(settings.phasors.excitation_lines)
-    conditions = named_runs(excluded, len(digests) + len(excluded)) + lost_points(points, excluded, several)
-    named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
-    shared = shared_changes(solved.solution, range(len(sources)))
-    remarks = unstated(campaign) + conditions
-    return Identification(
-        campaign.id, settings.method, named, shared.changes, remarks, (), shared.names, shared.cell_stiffness
-    )
+        without = without_runs(point.point, excluded, several)
+        points.append(replace(point, quality=merged(point.quality, without)))
+        report("estimating", len(points), len(gathered))
+    lost = lost_points([data.point for data in gathered], excluded, several)
+    remarks = unstated(campaign) + named_runs(excluded, len(finished.outcomes)) + lost
+    named = with_probe_doubts(checked.swept, points, settings.clearance)
+    changes, names = shared_changes(solved.solution, range(len(gathered)))
+    springs = cell_stiffness(solved.solution)
+    return Identification(campaign.id, settings.method, named, changes, remarks, (), names, springs)

@@ -1,27 +1,15 @@
-"""Every method's answer on the windows of one operating point, and what is said of the default one."""
+"""Every method's answer on the windows of one operating point."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray
-from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.estimate import estimate_table
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
 from tpjb_ident.dynamic.estimators.rlm import RlmSettings
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope, amplitude_slope
-from tpjb_ident.dynamic.results.point_result import WindowVerdict
-from tpjb_ident.dynamic.results.quality import (
-    amplitude,
-    coherence,
-    directional_pattern,
-    disagreeing_runs,
-    flags,
-    rejected_windows,
-)
 from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -36,45 +24,16 @@ def own_method(method: str) -> str:
     return "mm-eiv" if method == "iv" else method.partition(":")[0]
 
 
-@dataclass(frozen=True)
-class Figures:
-    """What the windows of a point say before its uncertainties are known."""
-
-    outlier_fraction: float
-    coherence: float
-    amplitude: float
-    linearity: AmplitudeSlope | None
-    conditions: tuple[Condition, ...]
-    rejected: tuple[WindowVerdict, ...]
-
-
-def point_figures(
-    data: PointData, settings: IdentifySettings, by_method: dict[str, DynamicStiffness], known: float = 0.0
-) -> Figures:
-    """What the windows of a point say of the default method; `known` [N]: force of random phase that the runs hold."""
-    best = by_method[settings.method]
-    weights = best.weights.min(axis=1)
-    figure = coherence(data.D, data.F, best.h, weights)
-    size = amplitude(data, weights)
-    linearity = amplitude_slope(data, best.h, weights)
-    patterns = (directional_pattern(data, weights), disagreeing_runs(data, best.h, weights, known))
-    conditions = merged(
-        *(run.conditions for run in data.runs),
-        best.status,
-        flags(data, best, figure),
-        tuple(pattern for pattern in patterns if pattern is not None),
-        () if linearity is None else linearity.condition(),
-        disagreement(by_method, settings.method),
-    )
-    rejected = rejected_windows(data, best.h, weights)
-    share = float((weights < REJECTED_WEIGHT).mean())
-    return Figures(share, figure, size, linearity, conditions, rejected)
-
-
 def all_methods(
-    data: PointData, settings: IdentifySettings, solved: dict[str, DynamicStiffness]
+    data: PointData,
+    settings: IdentifySettings,
+    solved: dict[str, DynamicStiffness],
+    known: DynamicStiffness | None,
 ) -> dict[str, DynamicStiffness]:
-    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already."""
+    """Every method that was asked for and applies, the default one in any case; those of `solved` are there already.
+
+    `known`: the solve of the campaign, whose scatter is that of all methods.
+    """
     drive = _nominal_drive(data)
     table = phasor_table(data.D, data.F, data.run_index, drive)
     estimates: dict[str, DynamicStiffness] = {}
@@ -83,7 +42,7 @@ def all_methods(
         if name in solved:
             estimates[name] = solved[name]
         elif method != "iv" or drive is not None or settings.method == "iv":
-            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"))
+            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"), known)
     return estimates
 
 

@@ -9,28 +9,31 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss, load_conditions
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions, not_locked
+from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions
 from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
+from tpjb_ident.dynamic.estimators.solved_windows import not_locked
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
 from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
-from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.dynamic.results.point_result import PointResult, mean_position
+from tpjb_ident.dynamic.results.quality import (
+    amplitude,
+    coherence,
+    directional_pattern,
+    disagreeing_runs,
+    flags,
+    rejected_windows,
+)
 from tpjb_ident.dynamic.runs.baseline import DryTest
 from tpjb_ident.dynamic.runs.checked_runs import check_conditions
 from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
-from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.methods import Figures, all_methods, point_figures
-from tpjb_ident.identification.point_means import (
-    MeansTask,
-    PointMeans,
-    channel_windows,
-    clock_turns,
-    vectors,
-    window_times,
-)
-from tpjb_ident.identification.shared_changes import RUN_TERMS
+from tpjb_ident.identification.methods import all_methods, disagreement
+from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
+from tpjb_ident.identification.shared_changes import sources_of, total
+from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"
@@ -49,8 +52,15 @@ class PointShare:
     shaft: bool
     miss: LoadMiss
     film: FilmChange
-    amplitude_left: float  #: share of H by which the amplitude may still change it
     mains_in_cells: float  #: N
+
+    def amplitude_left(self) -> float:
+        """Share of H by which the amplitude may still change it."""
+        amplitude = self.budget.get("amplitude")
+        if amplitude is None or self.estimate is None or not self.film.share:
+            return self.film.share
+        size = float(np.linalg.norm(self.estimate.h)) / np.sqrt(2)
+        return min(float(1.96 * np.sqrt(np.diag(amplitude).max()) / size), self.film.share)
 
 
 @dataclass(frozen=True)
@@ -64,49 +74,26 @@ class PointTask:
     dry: DryTest
 
 
-def point_share(solved: CampaignSolution, source: PointSource, p: int) -> PointShare:
+def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare:
     """The part of a campaign's solution that belongs to point `p`."""
     blocks, solution, means = solved.blocks, solved.solution, solved.means[p]
-    runs = len(source.digests)
-    m = len(solved.rig)
+    runs, m = len(data.runs), len(solved.rig)
     shift, factor = np.zeros((runs, m), complex), np.ones((runs, m), complex)
     change, weight = np.zeros((runs, 2, 2), complex), np.zeros(runs)
-    places = np.flatnonzero(blocks.point == p)
-    names = [digest.run for digest in source.digests]
-    for b in places:
+    names = [run.run for run in data.runs]
+    for b in np.flatnonzero(blocks.point == p):
         g = names.index(blocks.runs[blocks.run[b]])
         shift[g] = solution.shift[b] + solved.mains_shift[b]
         factor[g], change[g], weight[g] = solution.factor[b], solution.run_change[b], solution.weights[b]
-    window_weight = np.zeros(0) if means.means is None else means.means.weights
-    estimate, budget = _estimate(solved, p, window_weight, weight, source)
-    amplitude = budget.get("amplitude")
-    left = 0.0
-    if amplitude is not None and estimate is not None:
-        size = float(np.linalg.norm(estimate.h)) / np.sqrt(2)
-        left = float(1.96 * np.sqrt(np.diag(amplitude).max()) / size)
-    film = solved.film[p]
+    estimate, budget = _estimate(solved, p, weight, data)
     in_cells = solved.cell_pickup if p in solved.in_cells else 0.0
-    return PointShare(
-        shift,
-        factor,
-        change,
-        estimate,
-        budget,
-        _conditions(solved, p),
-        bool(means.shaft_conditions),
-        solved.misses[p],
-        film,
-        min(left, film.share) if film.share else 0.0,
-        in_cells,
-    )
+    said, shaft = _conditions(solved, p), bool(means.shaft_conditions)
+    miss, film = solved.loads.misses[p], solved.film[p]
+    return PointShare(shift, factor, change, estimate, budget, said, shaft, miss, film, in_cells)
 
 
 def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
-    found = [
-        *load_conditions(solved.misses[p], solved.common),
-        *solved.zero.conditions(),
-        *solved.solution.conditions(),
-    ]
+    found = [*solved.loads.conditions(p), *solved.solution.conditions()]
     if p in solved.mains and solved.pickup is not None:
         found.append(solved.mains[p].condition(solved.pickup))
     found += solved.means[p].shaft_conditions
@@ -116,88 +103,97 @@ def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
 
 
 def _estimate(
-    solved: CampaignSolution, p: int, window_weight: FloatArray, run_weight: FloatArray, source: PointSource
+    solved: CampaignSolution, p: int, run_weight: FloatArray, data: PointData
 ) -> tuple[DynamicStiffness | None, dict[str, FloatArray]]:
     """H of the solve with its budget; None where the runs do not tell it."""
     solution, means = solved.solution, solved.means[p]
-    if not np.isfinite(solution.h[p]).all() or means.means is None:
+    windows = means.means
+    if not np.isfinite(solution.h[p]).all() or windows is None:
         return None, {}
-    budget = {"random": solution.records[p]}
-    for name in RUN_TERMS:
-        if name in solution.shares:
-            budget[name] = solution.shares[name][p]
+    random, common = sources_of(solution, p)
     mine = solved.blocks.point == p
     dof = solution.freedom(p, mine, 2 * float(np.median(solved.blocks.dof[mine])))
     if p in solved.mains:
         fit = solved.mains[p]
-        budget["mains"] = fit.covariance
+        random["mains"] = fit.covariance
         dof = np.minimum(dof, fit.dof)
-    random = np.sum(list(budget.values()), axis=0)
-    common = {name: share[p] for name, share in solution.shares.items() if name not in RUN_TERMS}
-    common = {name: share for name, share in common.items() if np.any(share)}
     if p in solved.in_cells:
         common["mains on the cells"] = solved.in_cells[p]
-    weights = window_weight * run_weight[_run_index(source, window_weight)]
-    omega = float(np.median(solved.blocks.omega[mine]))
+    weights = windows.weights * run_weight[data.run_index]
+    runs = int((run_weight > 0).sum())
+    said = fit_conditions(means.condition, weights[means.usable], runs)
     estimate = DynamicStiffness(
         solved.h[p],
-        omega,
-        random,
+        float(np.median(solved.blocks.omega[mine])),
+        total(random.values()),
         dof,
         SOLVED,
         np.repeat(weights[:, None], 2, axis=1),
-        (*means.status, *_status(means.condition, weights, int((run_weight > 0).sum()), means)),
+        (*means.status, *said, *not_locked(windows.wandering, runs)),
         means.condition,
         float(solution.chi_square[p]),
         int(max(solution.spare[p], 0)),
         means.attenuation,
-        np.sum(list(common.values()), axis=0) if common else np.zeros((8, 8)),
+        total(common.values()),
     )
-    return estimate, {**budget, **common}
+    return estimate, random | common
 
 
-def _run_index(source: PointSource, window_weight: FloatArray) -> np.ndarray:
-    index = source.data.run_index
-    return index if len(index) == len(window_weight) else np.zeros(len(window_weight), dtype=int)
-
-
-def _status(condition: float, weights: FloatArray, runs: int, means: PointMeans) -> tuple[Condition, ...]:
-    counted = weights[means.usable] if len(weights) == len(means.usable) else weights
-    wandering = 0 if means.means is None else means.means.wandering
-    return (*fit_conditions(condition, counted, runs), *not_locked(wandering, runs))
-
-
-def finished_point(task: PointTask, source: PointSource, share: PointShare) -> PointResult:
+def finished_point(task: PointTask, recorded: PointData, share: PointShare) -> PointResult:
     """The point with every method, its uncertainties and what is to be said of it."""
     settings = task.settings
-    recorded = source.data
-    corrected = _corrected(recorded, task.means, share)
-    table = phasor_table(corrected.D, corrected.F, corrected.run_index)
-    solved = share.estimate or estimate_table(table, corrected.omega, SOLVED)
-    by_method = all_methods(corrected, settings, {SOLVED: solved})
-    if share.estimate is not None:
-        by_method = {name: _with_common(est, share) for name, est in by_method.items()}
-    if not settings.keep_weights:
-        by_method = {name: _counted_only(est) for name, est in by_method.items()}
+    data = _corrected(recorded, task.means, share)
+    table = phasor_table(data.D, data.F, data.run_index)
+    solved = share.estimate or estimate_table(table, data.omega, SOLVED)
+    by_method = all_methods(data, settings, {SOLVED: solved}, share.estimate)
+    if not settings.keep_weights:  # a verdict per window in place of its weights: 1 byte instead of 16
+        counted = {name: (est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None] for name, est in by_method.items()}
+        by_method = {name: replace(est, weights=counted[name]) for name, est in by_method.items()}
     best = by_method[settings.method]
-    figures = point_figures(_without_shaft_remarks(corrected, share), settings, by_method, share.mains_in_cells)
-    bent = change_conditions(share.film, share.amplitude_left, best, figures.amplitude, settings.clearance)
-    checks = check_conditions(task.checked, [run.run for run in recorded.runs])
-    missing = task.dry.missing(recorded.omega)
-    conditions = merged(share.conditions, missing, bent, checks)
-    figures = replace(figures, conditions=merged(figures.conditions, conditions))
-    return _result(task, recorded, by_method, figures, share)
+    weights = best.weights.min(axis=1)
+    size, coherent = amplitude(data, weights), coherence(data.D, data.F, best.h, weights)
+    linearity = amplitude_slope(data, best.h, weights)
+    conditions = merged(
+        *(_remarks(run, share) for run in recorded.runs),
+        best.status,
+        flags(data, best, coherent),
+        directional_pattern(data, weights),
+        disagreeing_runs(data, best.h, weights, share.mains_in_cells),
+        () if linearity is None else linearity.condition(),
+        disagreement(by_method, settings.method),
+        share.conditions,
+        task.dry.missing(recorded.omega),
+        change_conditions(share.film, share.amplitude_left(), best, size, settings.clearance),
+        check_conditions(task.checked, [run.run for run in recorded.runs]),
+    )
+    position, position_se = mean_position(recorded.mean_positions)
+    return PointResult(
+        point=recorded.point,
+        stiffness=best,
+        by_method=by_method,
+        static_load_measured=float(np.linalg.norm(recorded.mean_loads.mean(axis=0))),
+        position=position,
+        position_se=position_se,
+        temperatures=pad_means([task.temperatures.get(run.run, {}) for run in recorded.runs]),
+        n_records=len(recorded.runs),
+        n_windows=len(recorded.D),
+        outlier_fraction=float((weights < REJECTED_WEIGHT).mean()),
+        coherence=coherent,
+        amplitude=size,
+        quality=conditions,
+        rejected=rejected_windows(data, best.h, weights),
+        runs=tuple(run.run for run in recorded.runs),
+        load_miss=share.miss,
+        linearity=linearity,
+        inertia_corrected=recorded.runs[0].acceleration is not None,
+        clearance=settings.clearance,
+        budget=share.budget,
+    )
 
 
-def _without_shaft_remarks(data: PointData, share: PointShare) -> PointData:
-    """The point without its runs' own remarks on the shaft's line, where the solve has more to say of it."""
-    if not share.shaft:
-        return data
-    runs = []
-    for run in data.runs:
-        kept = tuple(c for c in run.conditions if not str(c).endswith("X on excitation line"))
-        runs.append(replace(run, conditions=kept))
-    return replace(data, runs=tuple(runs))
+def _remarks(run: RunPhasors, share: PointShare) -> tuple[Condition, ...]:
+    """A run's own remarks, without those on the shaft's line where the solve has more to say of it."""
+    return tuple(c for c in run.conditions if not (share.shaft and str(c).endswith("X on excitation line")))
 
 
 def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData:
@@ -208,51 +204,3 @@ def _corrected(data: PointData, task: MeansTask, share: PointShare) -> PointData
     D, F = vectors(z, data, task)
     F = F - np.einsum("nij,nj->ni", share.run_change[data.run_index], D)
     return replace(data, D=D, F=F)
-
-
-def _with_common(est: DynamicStiffness, share: PointShare) -> DynamicStiffness:
-    """Another method's estimate with what the campaign's runs and sensors share."""
-    if share.estimate is None or est is share.estimate:
-        return est
-    wider = [share.budget[name] for name in (*RUN_TERMS, "mains") if name in share.budget]
-    covariance = np.sum([est.covariance, *wider], axis=0)
-    return replace(est, covariance=covariance, systematic=share.estimate.systematic)
-
-
-def _counted_only(est: DynamicStiffness) -> DynamicStiffness:
-    """The estimate with a verdict per window in place of its weights: 1 byte instead of 16."""
-    return replace(est, weights=(est.weights.min(axis=1) >= REJECTED_WEIGHT)[:, None])
-
-
-def _result(
-    task: PointTask,
-    data: PointData,
-    by_method: dict[str, DynamicStiffness],
-    figures: Figures,
-    share: PointShare,
-) -> PointResult:
-    positions = data.mean_positions
-    number = len(positions)
-    spread = positions.std(axis=0, ddof=1) / np.sqrt(number) if number > 1 else np.full(2, np.nan)
-    return PointResult(
-        point=data.point,
-        stiffness=by_method[task.settings.method],
-        by_method=by_method,
-        static_load_measured=float(np.linalg.norm(data.mean_loads.mean(axis=0))),
-        position=positions.mean(axis=0),
-        position_se=spread,
-        temperatures=pad_means([task.temperatures.get(run.run, {}) for run in data.runs]),
-        n_records=len(data.runs),
-        n_windows=len(data.D),
-        outlier_fraction=figures.outlier_fraction,
-        coherence=figures.coherence,
-        amplitude=figures.amplitude,
-        quality=figures.conditions,
-        rejected=figures.rejected,
-        runs=tuple(run.run for run in data.runs),
-        load_miss=share.miss,
-        linearity=figures.linearity,
-        inertia_corrected=data.runs[0].acceleration is not None,
-        clearance=task.settings.clearance,
-        budget=share.budget,
-    )

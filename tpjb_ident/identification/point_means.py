@@ -15,7 +15,6 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.estimators.mm import mm_fit, within_directions
 from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, displacement_condition, phasor_table
 from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.runs.point_source import PointSource
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.sensors import alive
@@ -25,8 +24,6 @@ from tpjb_ident.terms.shaft import SHAFT_FITTED, not_told
 
 #: Share of the windows of a run's best channel in which a channel has a phasor, at least, to count as recorded.
 _LEAST_WINDOWS = 0.4
-#: A window whose phasors are below this share of its run's loud ones (nine in ten are less loud) has no drive.
-_RESTS, _LOUD = 0.1, 0.9
 #: Condition number of the displacement directions from which one direction is missing.
 _ONE_LINE = 1e6
 
@@ -58,12 +55,11 @@ class MeansTask:
     temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
 
 
-def point_means(task: MeansTask, source: PointSource) -> PointMeans:
+def point_means(task: MeansTask, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
-    data = source.data
     z, channels = channel_windows(data, task)
     time = window_times(data)
-    z = _driven(z * clock_turns(data, task, time), data)
+    z = z * clock_turns(data, task, time)
     present = np.array([[channel is not None for channel in run] for run in channels])
     D, F = vectors(z, data, task)
     table = phasor_table(D, F, data.run_index)
@@ -166,17 +162,6 @@ def _without_dead(z: ComplexArray, task: MeansTask) -> ComplexArray:
     """Phasors (n, m) without channels that show nothing of what others of their quantity do."""
     sizes = np.nanmax(np.abs(np.nan_to_num(z)), axis=0, initial=0.0)
     z[:, ~alive(task.sensors, sizes)] = np.nan
-    return z
-
-
-def _driven(z: ComplexArray, data: PointData) -> ComplexArray:
-    """Phasors (n, m) without windows in which the drive rests, beside the others of their run."""
-    usual = np.nanmax(np.abs(z), axis=0, initial=0.0) + 1e-300
-    size = np.nanmax(np.abs(z) / usual, axis=1, initial=0.0)
-    for g in range(len(data.runs)):
-        places = np.flatnonzero(data.run_index == g)
-        rests = size[places] < _RESTS * np.nanquantile(size[places], _LOUD, method="higher")
-        z[places[rests]] = np.nan
     return z
 
 

@@ -86,31 +86,23 @@ def _plane(run: RunPhasors, phasors: ComplexArray) -> tuple[ComplexArray, Comple
     return plane["displacement"], plane["force"] + np.where(np.isfinite(inertia), inertia, 0.0)
 
 
-def mains_line(run: RunPhasors) -> ComplexArray | None:
-    """Typical displacement phasor (2,) at a run's mains line [m]; None where something else sits on it."""
-    place = _place(run)
-    return None if place is None else _typical_phasor(run.displacement.phasors[:, place])
+def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | None]:
+    """Typical displacement [m] and oil force [N] (2,) at a run's mains line.
 
-
-def mains_force(run: RunPhasors) -> ComplexArray | None:
-    """The same of the oil force [N]."""
-    place = _place(run)
-    return None if place is None else _typical_phasor(run.oil_force(place))
-
-
-def _place(run: RunPhasors) -> int | None:
-    """Place of the mains line; None where a drive harmonic was merged into it, or it is not fitted."""
+    None where a drive harmonic was merged into it, where it is not fitted, or where no window has them.
+    """
     place = run.lines.place("mains")
     if place is None:
-        return None
+        return None, None
     mains = run.lines.whole[place]
     harmonics = (n * e.frequency for e in run.lines.excitation for n in (2, 3))
-    return None if any(abs(f - mains.frequency) <= mains.wander for f in harmonics) else place
-
-
-def _typical_phasor(z: ComplexArray) -> ComplexArray | None:
-    z = z[np.isfinite(z).all(axis=1)]
-    return complex_median(z) if len(z) else None
+    if any(abs(f - mains.frequency) <= mains.wander for f in harmonics):
+        return None, None
+    typical: list[ComplexArray | None] = []
+    for z in (run.displacement.phasors[:, place], run.oil_force(place)):
+        whole = z[np.isfinite(z).all(axis=1)]
+        typical.append(complex_median(whole) if len(whole) else None)
+    return typical[0], typical[1]
 
 
 def complex_median(z: ComplexArray) -> ComplexArray:

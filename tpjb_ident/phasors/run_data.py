@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -101,11 +101,6 @@ class RunPhasors:
             means[rows] = mean[rows][:, members] @ inverse.T
             noise[rows] = np.sqrt(scale[rows][:, members] ** 2 @ (inverse**2).T)
         return PhasorBlock(phasors, means, noise, self.lost[:, places].max(axis=1, initial=0.0))
-
-    def changed(self, change: Callable[[str, ComplexArray], ComplexArray]) -> RunPhasors:
-        """The run with other phasors, changed quantity by quantity (n_windows, n_lines, n_channels of the quantity)."""
-        parts = [change(q, self.z[:, :, self.pick(q)]) for q in QUANTITIES]
-        return replace(self, z=np.concatenate(parts, axis=2))
 
     def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
         """The run without delays of whole quantities."""

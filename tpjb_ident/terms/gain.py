@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
@@ -41,17 +43,21 @@ class Gain(Factor):
             exponent[:, j, q] = blocks.calibration[:, j] == k
         return exponent
 
-    def spread(self, fitted: Fitted) -> dict[str, float]:
-        """Standard deviation of the gains of a quantity (by its name) whose channels differ beyond what is stated."""
-        outliers = {self.rig.sensors[self._places[k][0]].quantity for k in beyond(fitted, self.parameters)}
-        table = {}
-        for quantity in outliers:
-            values = self._values(fitted, quantity)
-            table[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
-        return table
+    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+        """Gains of a quantity whose channels differ beyond what is stated, as uncertain as they differ."""
+        spread = {}
+        for quantity, values in self._differing(fitted).items():
+            spread[quantity] = float(np.sqrt(np.sum(np.square(values)) / max(len(values) - 1, 1)))
+        if not spread:
+            return None
+        wide = [max(spread.get(s.quantity, 0.0), s.uncertainty or 0.0) or None for s in sensors]
+        return tuple(replace(sensor, uncertainty=size) for sensor, size in zip(sensors, wide))
 
-    def _values(self, fitted: Fitted, quantity: str) -> list[float]:
-        return [float(v) for (j, _), v in zip(self._places, fitted.value) if self.rig.sensors[j].quantity == quantity]
+    def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
+        """Gains by quantity, of those whose channels differ beyond what is stated."""
+        quantities = [self.rig.sensors[j].quantity for j, _ in self._places]
+        differing = {quantities[k] for k in beyond(fitted, self.parameters)}
+        return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Sensors that differ from the others beyond what is stated."""
@@ -59,5 +65,5 @@ class Gain(Factor):
         if not outliers:
             return self.rig.contradicted.get(self.name, ())
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
-        apart = max(np.ptp(self._values(fitted, quantity)) for quantity in self.spread(fitted))
+        apart = max(np.ptp(values) for values in self._differing(fitted).values())
         return (Condition("records-contradicted" if apart > _NO_GAIN else "probe-gains-differ", text),)

@@ -5,11 +5,13 @@ Standing on cells, a = -omega^2 C F_cell: swapped, inverted or late acceleromete
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
 from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.term import Fitted, Parameter, Term
 
@@ -146,12 +148,16 @@ class Housing(Term):
         x, y = (1 / (_NANOMETRE * max(float(c), _STIFFEST)) for c in fitted.value[:2])
         return x, y
 
-    def lag_of_cells(self, fitted: Fitted) -> float:
-        """By how much the cells come late [s]: a spring's loss is positive, late cells make it negative."""
-        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
-            return 0.0
+    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+        """Cells as uncertain in time as they come late: a spring's loss is positive, late cells make it negative."""
+        stated = any(sensor.delay_uncertainty for sensor in sensors)
+        if stated or self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+            return None
         loss, error = float(fitted.value[3]), float(fitted.deviation[3])
-        return -loss / self._omega if loss < -2 * error else 0.0
+        if not loss < -2 * error:
+            return None
+        late = -loss / self._omega
+        return tuple(replace(s, delay_uncertainty=late) if s.quantity == "force" else s for s in sensors)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:

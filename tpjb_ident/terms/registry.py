@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimate.term import Term
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.axis import Axis
@@ -38,3 +43,33 @@ TERMS: tuple[type[Term], ...] = (
     Amplitude,
     Distortion,
 )
+
+
+def campaign_terms(rig: Rig, blocks: Blocks, correct: bool, made: Sequence[Term]) -> list[Term]:
+    """All terms of a campaign, those that are `made` of more than rig and blocks as they are.
+
+    Without corrections a load's direction is not asked for.
+    """
+    given = {type(term): term for term in made}
+    used = [term for term in TERMS if correct or term is not LoadTurn]
+    return [given.get(term) or term(rig, blocks) for term in used]
+
+
+def learnt_rig(rig: Rig, solution: Solution) -> Rig:
+    """The rig, its sensors as uncertain as a solve shows them where that contradicts what is stated; itself where not.
+
+    What the term's test says of them stays said.
+    """
+    for term in solution.terms:
+        fitted = solution.fitted[term.name]
+        sensors = term.widened(rig.sensors, fitted)
+        if sensors is not None:
+            contradicted = {**rig.contradicted, term.name: term.conditions(fitted)}
+            rig = replace(rig, sensors=sensors, contradicted=contradicted)
+    return rig
+
+
+def cell_stiffness(solution: Solution) -> tuple[float, float] | None:
+    """Stiffness of what the housing stands on along X and Y [N/m]; None where no accelerometer shows it."""
+    housing = next((term for term in solution.terms if isinstance(term, Housing)), None)
+    return None if housing is None else housing.springs(solution.fitted[housing.name])

@@ -58,7 +58,7 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
     u = np.concatenate([_source(run, instrument)[:, bins] for run in runs])
     place = place_in_line(runs[0].frequencies[bins])
     sloped = (u * place[None, :, None]).reshape(-1, u.shape[2])
-    columns = np.concatenate([sloped, end_columns(len(runs), place, 1)[:, : None if ends else 0]], axis=1)
+    columns = np.concatenate([sloped, end_columns(len(runs), place)[:, : None if ends else 0]], axis=1)
     return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), columns)
 
 
@@ -68,10 +68,9 @@ def place_in_line(frequencies: FloatArray) -> FloatArray:
     return np.asarray(place / max(float(np.abs(place).max()), 1e-300))
 
 
-def end_columns(runs: int, place: FloatArray, order: int) -> ComplexArray:
-    """What the ends of each run's record leak into its bins: powers of their place, (runs n, runs (order + 1))."""
-    powers = np.vander(place, order + 1, increasing=True)
-    return np.asarray(np.kron(np.eye(runs), powers), dtype=complex)
+def end_columns(runs: int, place: FloatArray) -> ComplexArray:
+    """What the ends of each run's record leak into its bins: straight lines over their place, (runs n, 2 runs)."""
+    return np.asarray(np.kron(np.eye(runs), np.vander(place, 2, increasing=True)), dtype=complex)
 
 
 def _source(spectra: RunSpectra, instrument: str) -> ComplexArray:

@@ -7,6 +7,10 @@ solve takes every run at its own load.
 What the cells say is taken relative to the campaign's own mean: a gain error of the cells would
 look like a miss of all runs alike, and the set point is met by the actuators' own transducers.
 Misses in direction have a slope of their own, which only the runs' own misses tell: `terms.load_turn`.
+
+Cells that were not tared hold a constant in their mean that no set point explains. The mean force of the runs is
+regressed on the set points, with an intercept: F_mean = g W + z, both complex (X + i Y). Without the intercept a zero
+that is off looks like a load that misses its set point by more the smaller it is.
 """
 
 from __future__ import annotations
@@ -18,10 +22,10 @@ from typing import Protocol
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.set_points import without_static_part
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.corrections.cell_zero import CellZero, cell_zero
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
@@ -31,6 +35,13 @@ MAX_SIDEWAYS = 0.05
 _CONTRADICTS = (0.7, 1.4)
 #: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
 _CONTRADICTS_TURN = 0.5
+#: Set points must differ by this share for a zero to be told from a gain.
+_MIN_RANGE = 0.15
+#: Standard errors beyond which an intercept is one,
+_CLEAR = 5.0
+#: and share of the smallest load that it must have.
+_NOTABLE = 0.004
+_MIN_RUNS = 4
 
 
 @dataclass(frozen=True)
@@ -40,9 +51,30 @@ class LoadMiss:
     size: FloatArray  #: (n_runs,)
     sideways: FloatArray  #: (n_runs,), rad: the same across it
 
+    def of(self, members: Sequence[int]) -> complex:
+        """Missed load of some runs together, relative size + i turn [rad]; none where no scatter explains it."""
+        size, turn = float(np.mean(self.size[members])), float(np.mean(self.sideways[members]))
+        return complex(size, turn) if abs(size) < MAX_MISS and abs(turn) < MAX_SIDEWAYS else 0j
+
+
+@dataclass(frozen=True)
+class CellZero:
+    """What the cells read at no load."""
+
+    force: complex = 0.0
+    error: float = 0.0
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """What to say of it at the points."""
+        if not self.force:
+            return ()
+        size, angle = abs(self.force), np.degrees(np.angle(self.force))
+        text = f"over the loads of the campaign the cells' mean holds a constant of {size:.0f} N at {angle:.0f} deg "
+        return (Condition("cells-not-tared", f"{text}(standard error {self.error:.0f} N); it was taken off"),)
+
 
 class LoadCase(Protocol):
-    """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: `PointData`, `PointSource`."""
+    """Where a point was run, and the mean cell force of its runs (n_runs, 2) [N]: of sines, or over a band."""
 
     @property
     def point(self) -> OperatingPoint:
@@ -64,14 +96,6 @@ def load_ratio(data: LoadCase, zero: complex = 0.0) -> ComplexArray:
 
 def _set_point(data: LoadCase) -> complex:
     return complex(data.point.static_load * np.exp(1j * data.point.static_load_direction))
-
-
-def campaign_zero(points: Sequence[LoadCase], stated: float = 0.0) -> CellZero:
-    """Zero of the cells from all runs of a campaign; see `cell_zero`."""
-    loads = [data.mean_loads for data in points]
-    means = np.concatenate([load[:, 0] + 1j * load[:, 1] for load in loads] or [np.empty(0)])
-    set_points = np.concatenate([np.full(len(load), _set_point(d)) for load, d in zip(loads, points)] or [np.empty(0)])
-    return cell_zero(means, set_points, stated)
 
 
 def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
@@ -145,3 +169,55 @@ def _common_conditions(common: complex) -> tuple[Condition, ...]:
             )
         )
     return tuple(conditions)
+
+
+@dataclass(frozen=True)
+class StaticLoads:
+    """What the cells say of the static load of all runs."""
+
+    misses: list[LoadMiss]  #: by point
+    common: complex  #: cells over set points, all runs together
+    zero: CellZero
+
+    def conditions(self, point: int) -> tuple[Condition, ...]:
+        """What to say of one point."""
+        return load_conditions(self.misses[point], self.common) + self.zero.conditions()
+
+
+def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
+    """Zero of the cells, and the misses of all runs of a campaign's points."""
+    cells = [channel for channel in campaign.channels.values() if channel.quantity == "force"]
+    stated = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
+    means, set_points = [], []
+    for data in points:
+        means += list(data.mean_loads @ [1.0, 1j])
+        set_points += [_set_point(data)] * len(data.mean_loads)
+    zero = cell_zero(np.array(means, complex), np.array(set_points, complex), stated)
+    return StaticLoads(*load_misses(points, zero.force), zero)
+
+
+def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0) -> CellZero:
+    """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
+    good = np.isfinite(means) & (np.abs(set_points) > 0)
+    y, x = means[good], set_points[good]
+    if len(y) < _MIN_RUNS or (np.ptp(np.abs(x)) < _MIN_RANGE * np.abs(x).max() and _one_direction(x)):
+        return CellZero()
+    size = np.abs(x)
+    design = np.stack([x, np.ones_like(x)], axis=1) / size[:, None]
+    answer, weight = y / size, np.ones(len(y))
+    for _ in range(10):
+        root = np.sqrt(weight)[:, None]
+        coefficients = np.linalg.lstsq(design * root, answer * root[:, 0], rcond=None)[0]
+        residual = np.abs(answer - design @ coefficients)
+        scale = 1.4826 * float(np.median(residual)) + 1e-9
+        weight = np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-300))
+    spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
+    covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
+    zero, error = complex(coefficients[1]), float(np.sqrt(covariance[1, 1]))
+    there = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
+    allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
+    return CellZero(zero, error) if there and allowed else CellZero()
+
+
+def _one_direction(set_points: ComplexArray) -> bool:
+    return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < _MIN_RANGE)

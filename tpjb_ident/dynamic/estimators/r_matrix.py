@@ -17,12 +17,13 @@ estimator.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import ArgumentError
 
 
@@ -67,6 +68,19 @@ class PhasorTable:
     def h_scale(self) -> float:
         """Factor from scaled h to N/m."""
         return self.f_scale / self.d_scale
+
+
+@dataclass(frozen=True)
+class TableFit:
+    """One method's answer on a table of n windows, in the table's scale."""
+
+    h: ComplexArray  #: (2, 2)
+    weights: FloatArray  #: (n,), or (n, 2) by force axis
+    covariance: FloatArray = field(default_factory=lambda: np.full((8, 8), np.nan))
+    dof: FloatArray = field(default_factory=lambda: np.full(8, np.nan))
+    conditions: tuple[Condition, ...] = ()
+    chi_square: float = np.nan
+    attenuation: FloatArray = field(default_factory=lambda: np.full(2, np.nan))
 
 
 def r_matrix(D: ArrayLike, F: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -178,3 +192,9 @@ def displacement_condition(D: ComplexArray, weights: FloatArray | None = None) -
         return np.inf
     singular = np.linalg.svd(rows, compute_uv=False)
     return float(singular[0] / singular[1]) if singular[1] > 1e-14 * singular[0] else np.inf
+
+
+def complex_to_real_covariance(hermitian: ComplexArray) -> FloatArray:
+    """Covariance of [Re h, Im h] from E[e e^H] of circular errors, (2 m, 2 m); `hermitian` (m, m)."""
+    real = 0.5 * np.block([[hermitian.real, -hermitian.imag], [hermitian.imag, hermitian.real]])
+    return 0.5 * (real + real.T)  # rounding apart, it is symmetric

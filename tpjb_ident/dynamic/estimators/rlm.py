@@ -1,8 +1,8 @@
 """statsmodels' robust linear model on the stacked real rows of Eq. (15): the paper's choice.
 
 Every identification solves Huber's and Tukey's norms with the MAD scale, and the import of statsmodels would make it
-1.2 times as long: these two are `robust_fit`, equal to statsmodels to the last bit. For all other norms and scales,
-and where its own numbers are promised (`plain`), statsmodels itself is run.
+1.2 times as long: there, where its covariance is not asked for, these two are reweighted here, equal to statsmodels to
+the last bit. Else statsmodels itself is run.
 
 Kept as a reference with its traps guarded: complex input is refused (statsmodels takes it and returns false standard
 errors), the system is scaled before (``conv="coefs"`` has an absolute tolerance and never ends in SI units), and
@@ -21,8 +21,9 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.r_matrix import real_rows
+from tpjb_ident.dynamic.estimators.r_matrix import TableFit, real_rows
 from tpjb_ident.errors import ArgumentError, TpjbError
+from tpjb_ident.estimate.robust_constants import bisquare_weight
 
 #: Names of the norms and the statsmodels class behind each.
 NORMS = {
@@ -42,8 +43,6 @@ NORMS = {
 _HUBER, _TUKEY = 1.345, 4.685
 #: Median of the absolute value of a standard normal variable.
 _NORMAL_MAD = 0.6744897501960817
-#: Weight psi(z) / z, psi(z) and its derivative of residuals z over their scale.
-_NormValues = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -51,10 +50,10 @@ class RlmSolution:
     """One real robust regression: what statsmodels' ``RLM(...).fit(conv="coefs")`` tells of it."""
 
     params: FloatArray  #: (p,)
-    covariance: FloatArray  #: (p, p): H1, scaled
     weights: FloatArray  #: (m,)
     scale: float
     iterations: int
+    covariance: FloatArray  #: (p, p): H1, scaled; NaN where it is not asked for
     conditions: tuple[Condition, ...] = ()
 
 
@@ -67,10 +66,10 @@ class RlmSettings:
     """How statsmodels is to be run."""
 
     norm: str = "huber"
-    scale: str = "mad"
+    scale: Any = "mad"  #: as `RLM.fit` takes it
     max_iterations: int = 200
     tolerance: float = 1e-10
-    library: bool = False
+    quick: bool = False  #: whether its covariance is not asked for
 
 
 def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | None = None) -> RlmSolution:
@@ -92,17 +91,15 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
 
 
 def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
-    if settings.norm in _QUICK_NORMS and settings.scale == "mad" and not settings.library:
-        return robust_fit(design, response, settings.norm, settings.max_iterations, settings.tolerance)
+    if settings.quick and settings.norm in _WEIGHTS and settings.scale == "mad":
+        return _reweighted(design, response, settings)
     from statsmodels.robust.robust_linear_model import RLM
 
     fit = RLM(response, design, M=_norm(settings.norm)).fit(
-        maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=_scale(settings.scale)
+        maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=settings.scale
     )
-    return RlmSolution(
-        np.asarray(fit.params), np.asarray(fit.bcov_scaled), np.asarray(fit.weights), float(fit.scale),
-        int(fit.fit_history["iteration"]),
-    )  # fmt: skip
+    params, weights, covariance = (np.asarray(values) for values in (fit.params, fit.weights, fit.bcov_scaled))
+    return RlmSolution(params, weights, float(fit.scale), int(fit.fit_history["iteration"]), covariance)
 
 
 def _norm(name: str) -> Any:
@@ -117,35 +114,7 @@ def _norm(name: str) -> Any:
     return getattr(norms, NORMS[name])()
 
 
-def _scale(name: str) -> Any:
-    from statsmodels.robust import scale
-
-    if name == "mad":
-        return "mad"
-    if name == "huber":
-        return scale.HuberScale(d=1.345, tol=1e-13, maxiter=500)  # as MASS::rlm's proposal 2
-    if name == "mass":
-        return _mass_scale
-    raise ArgumentError(unknown_name("scale", name, ["mad", "mass", "huber"]))
-
-
-def _mass_scale(model: Any, residual: FloatArray) -> float:
-    """MASS::rlm divides the median by 0.6745, not by the normal quantile."""
-    return float(np.median(np.abs(residual)) / 0.6745)
-
-
-@dataclass(frozen=True)
-class RlmFit:
-    """H from two real robust regressions, one per force axis."""
-
-    h: ComplexArray  #: (2, 2) complex
-    covariance: FloatArray  #: (8, 8)
-    dof: FloatArray  #: (8,)
-    weights: FloatArray  #: (n, 2)
-    conditions: tuple[Condition, ...]
-
-
-def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> RlmFit:
+def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> TableFit:
     """Solve Eq. (15) axis by axis with statsmodels; `D`, `F` (n, 2)."""
     n = len(D)
     h = np.zeros((2, 2), dtype=complex)
@@ -160,59 +129,37 @@ def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = Non
         covariance[np.ix_(rows, rows)] = solution.covariance
         weights[:, axis] = np.minimum(solution.weights[:n], solution.weights[n:])
         conditions += solution.conditions
-    return RlmFit(h, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), weights, conditions)
+    return TableFit(h, weights, covariance, np.full(8, max(2.0 * n - 4.0, 1.0)), conditions)
 
 
-def robust_fit(
-    design: FloatArray, response: FloatArray, norm: str, max_iterations: int, tolerance: float
-) -> RlmSolution:  # fmt: skip
-    """Robust regression by iteratively reweighted least squares with the MAD scale.
-
-    `design` (m, p), `response` (m,).
-    """
-    norm_of = _QUICK_NORMS[norm]
-    inverse = np.linalg.pinv(design)
-    params, weights = inverse.dot(response), np.ones(len(response))
+def _reweighted(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
+    """Robust regression by iteratively reweighted least squares; `design` (m, p), `response` (m,)."""
+    params, weights = np.linalg.pinv(design).dot(response), np.ones(len(response))
     residual = response - design.dot(params)
     scale, iterations = _mad(residual), 1
     while scale != 0.0:
-        weights = norm_of(residual / scale)[0]
+        weights = _WEIGHTS[settings.norm](residual / scale)
         half = np.sqrt(weights)
         before, params = params, np.linalg.pinv(half[:, None] * design).dot(half * response)
         residual = response - design.dot(params)
         scale = _mad(residual)
         iterations += 1
-        if iterations >= max_iterations or not np.any(np.abs(params - before) > tolerance):
+        if iterations >= settings.max_iterations or not np.any(np.abs(params - before) > settings.tolerance):
             break
-    sizes = residual / scale if scale != 0.0 else np.zeros(len(response))
-    rank = int(np.linalg.matrix_rank(design))
-    covariance = _variance_factor(norm_of(sizes), scale, rank) * inverse.dot(inverse.T)
-    return RlmSolution(params, covariance, weights, scale, iterations)
+    return RlmSolution(params, weights, scale, iterations, np.full((len(params), len(params)), np.nan))
 
 
 def _mad(residual: FloatArray) -> float:
     return float(np.median(np.abs(residual) / _NORMAL_MAD))
 
 
-def _variance_factor(norm: _NormValues, scale: float, rank: int) -> float:
-    """Variance of a coefficient over that of the plain design: H1 of Huber 1973 with the small-sample factor k."""
-    _, psi, slope = norm
-    n = len(slope)
-    k = 1 + rank / n * np.var(slope) / np.mean(slope) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):  # no spare row: no covariance
-        square = np.divide(1.0, n - rank) * np.sum(psi**2) * scale**2
-    return float(k**2 * square / ((1 / n * np.sum(slope)) ** 2))
+def _huber(z: FloatArray) -> FloatArray:
+    return np.asarray(_HUBER / np.maximum(np.abs(z), _HUBER))
 
 
-def _huber(z: FloatArray) -> _NormValues:
-    size = np.abs(z)
-    return _HUBER / np.maximum(size, _HUBER), np.clip(z, -_HUBER, _HUBER), (size <= _HUBER).astype(float)
+def _tukey(z: FloatArray) -> FloatArray:
+    return bisquare_weight(z, _TUKEY)
 
 
-def _tukey(z: FloatArray) -> _NormValues:
-    inside = np.abs(z) <= _TUKEY
-    root = inside * (1 - (z / _TUKEY) ** 2)
-    return root**2, z * root**2, root**2 - (4 * z**2 / _TUKEY**2) * root
-
-
-_QUICK_NORMS: dict[str, Callable[[FloatArray], _NormValues]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}
+#: Weight psi(z) / z of residuals z over their scale.
+_WEIGHTS: dict[str, Callable[[FloatArray], FloatArray]] = {"huber": _huber, "tukey": _tukey, "bisquare": _tukey}

@@ -7,13 +7,14 @@ the others loses its weight: `tpjb_ident.estimate.solve`, without terms.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable
+from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.estimators.r_matrix import PhasorTable, TableFit
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.scatter import Scatter
@@ -29,20 +30,7 @@ _QUANTITIES = ("displacement", "displacement", "force", "force")
 _RIG = Rig(tuple(Sensor(quantity, quantity) for quantity in _QUANTITIES), mass=0.0, mount="unknown")
 
 
-@dataclass(frozen=True)
-class WindowSolution:
-    """Result of the solve in the table's scale."""
-
-    h: ComplexArray  #: (2, 2)
-    covariance: FloatArray  #: (8, 8)
-    dof: FloatArray  #: (8,)
-    chi_square: float
-    weights: FloatArray  #: (n,): of the windows
-    attenuation: FloatArray  #: (2,)
-    wandering: int
-
-
-def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray) -> WindowSolution | None:
+def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray) -> TableFit | None:
     """Solve from a start of H (2, 2) with window weights (n,); None where repeats are too few for a noise."""
     z = np.concatenate([table.D, table.F], axis=1)
     present = np.ones((table.n_directions, 4), dtype=bool)
@@ -58,15 +46,23 @@ def solved_windows(table: PhasorTable, start: ComplexArray, weights: FloatArray)
         return None
     run_weights = np.zeros(table.n_directions)
     run_weights[blocks.run] = solution.weights
-    return WindowSolution(
+    return TableFit(
         solution.h[0],
+        means.weights * run_weights[table.direction],
         solution.records[0],
         solution.freedom(0, np.ones(len(blocks), dtype=bool), 2 * means.spare),
+        not_locked(means.wandering, table.n_directions),
         float(solution.chi_square[0]),
-        means.weights * run_weights[table.direction],
         attenuation(means.mean[:, :2], means.count, means.noise[:2, :2]),
-        means.wandering,
     )
+
+
+def not_locked(wandering: int, directions: int) -> tuple[Condition, ...]:
+    """Say in how many directions the drive's phase wanders."""
+    if not wandering:
+        return ()
+    text = f"drive phase wanders in {wandering} of {directions} directions; their windows were turned to one phase"
+    return (Condition("drive-not-locked", text),)
 
 
 def _blocks(means: WindowMeans) -> Blocks:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.conditions import Condition
 from tpjb_ident.dynamic.corrections.static_load import LoadMiss
 from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
 from tpjb_ident.dynamic.instruments.amplitude import AmplitudeSlope
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, points_without_runs, without_runs
 
 
 @dataclass(frozen=True)
@@ -106,29 +105,8 @@ def by_static_point(points: Sequence[PointResult]) -> list[list[PointResult]]:
     return list(groups.values())
 
 
-def named_at_points(
-    points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
-) -> tuple[PointResult, ...]:
-    """The points, each saying which of its runs were left out."""
-    return tuple(
-        _named(point, [excluded.run for excluded in left if _same(excluded, point, any_excitation)]) for point in points
-    )
-
-
-def lost_points(
-    points: Sequence[PointResult], left: Sequence[ExcludedRun], any_excitation: bool
-) -> tuple[Condition, ...]:
-    """Name the operating points that have no run left."""
-    lost = [excluded for excluded in left if not any(_same(excluded, point, any_excitation) for point in points)]
-    points_lost = [excluded.point for excluded in lost]
-    return points_without_runs(lost, [f"{p.static_load / 1e3:g} kN, {p.excitation_hz:g} Hz" for p in points_lost])
-
-
-def _named(point: PointResult, runs: list[str]) -> PointResult:
-    return replace(point, quality=merged(point.quality, without_runs(runs))) if runs else point
-
-
-def _same(one: ExcludedRun, result: PointResult, any_excitation: bool) -> bool:
-    run_point, result_point = one.point, result.point
-    alike = run_point.static_key == result_point.static_key
-    return alike and (any_excitation or run_point.excitation_hz == result_point.excitation_hz)
+def mean_position(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean position of a point's runs and its standard error (2,); `positions` (n_runs, 2) [m]."""
+    runs = len(positions)
+    error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
+    return positions.mean(axis=0), error

@@ -142,7 +142,7 @@ def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
     return (Condition("negative-damping", text),)
 
 
-def directional_pattern(data: PointData, weights: FloatArray) -> Condition | None:
+def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition, ...]:
     """Point out rejected windows that gather in some directions: physics may do that, glitches do not; `weights` (n,).
 
     A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
@@ -162,14 +162,20 @@ def directional_pattern(data: PointData, weights: FloatArray) -> Condition | Non
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
             named.append(f"{run.run}{angle} ({hits} of {n})")
     if not named:
-        return None
-    return Condition("directional-rejection", f"rejected windows gather in {', '.join(named)}: look before discarding")
+        return ()
+    text = f"rejected windows gather in {', '.join(named)}: look before discarding"
+    return (Condition("directional-rejection", text),)
 
 
-def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0) -> Condition | None:
-    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not."""
-    if len(data.runs) < 3 or not np.isfinite(h).all():
-        return None
+def disagreeing_runs(
+    data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0
+) -> tuple[Condition, ...]:
+    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
+
+    `known` [N]: force of random phase that the runs hold.
+    """
+    if not np.isfinite(h).all():
+        return ()
     good = data.whole & (weights > 0)
     shares, sizes = [], []
     for i in range(len(data.runs)):
@@ -183,13 +189,13 @@ def disagreeing_runs(data: PointData, h: ComplexArray, weights: FloatArray, know
             sizes.append(float(np.linalg.norm(data.F[selected], axis=1).mean()))
             shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
     if len(shares) < 3:
-        return None
+        return ()
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
     if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * known / float(np.mean(sizes))):
-        return None
+        return ()
     text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
-    return Condition("runs-disagree", text)
+    return (Condition("runs-disagree", text),)
 
 
 def with_probe_doubts(

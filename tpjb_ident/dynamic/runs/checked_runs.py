@@ -19,16 +19,13 @@ _STATIC = ("dry_pivot", "clearance", "locus")
 _CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful", "run-gain-off"
 
 
-def check_finished(campaign: Campaign, finished: FinishedRuns) -> Verdicts:
+def check_finished(campaign: Campaign, finished: FinishedRuns) -> tuple[FinishedRuns, Verdicts]:
     """Judge all finished runs beside each other; those with an error of their own are left out."""
     observed = [observation for digest in finished.digests for observation in digest.seen]
     if not observed:  # runs that are no files
-        return Verdicts()
+        return finished, Verdicts()
     result = campaign_verdicts(campaign, observed)
-    finished.leave_out_unusable(result.unusable)
-    if not finished.places:
-        raise finished.left_out[0].error
-    return result
+    return finished.without(result.unusable), result
 
 
 def campaign_verdicts(campaign: Campaign, observations: Sequence[Observation]) -> Verdicts:

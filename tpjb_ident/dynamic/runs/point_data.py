@@ -10,6 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.run import Run
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest
 from tpjb_ident.phasors.run_phasors import RunPhasors
 
 #: Samples from which a run's temperatures are taken.
@@ -25,14 +26,14 @@ class PointData:
     lines: tuple[int, ...]
     D: ComplexArray  #: (n, 2) complex, m
     F: ComplexArray  #: (n, 2) complex, N
-    A: ComplexArray  #: (n, 2) complex, m/s^2
     run_index: IntArray  #: (n,): windows of one run are repeats of one excitation
-    found: float = 0.0
+    digests: tuple[RunDigest, ...] = ()  #: of the runs, where they are those of a campaign
 
     @property
     def omega(self) -> float:
         """Excitation frequency as found in the runs, else as set [rad/s]."""
-        return self.found or self.point.excitation
+        found = float(np.median([run.lines.driven[i] for run, i in zip(self.runs, self.lines)]))
+        return self.point.excitation if abs(found - self.point.excitation_hz) < 1e-6 else 2 * np.pi * found
 
     @property
     def whole(self) -> BoolArray:
@@ -54,6 +55,10 @@ class PointData:
         """Mean displacement of every run, shape (n_runs, 2) [m]."""
         return np.array([finite_mean(run.displacement.mean) for run in self.runs])
 
+    def says(self, condition: str) -> bool:
+        """Whether one of the runs carries a condition of this name."""
+        return any(condition in run.conditions for run in self.runs)
+
 
 def finite_mean(rows: FloatArray) -> FloatArray:
     """Mean of the complete rows, (2,); NaN where there is none; `rows` (n, 2)."""
@@ -61,10 +66,19 @@ def finite_mean(rows: FloatArray) -> FloatArray:
     return good.mean(axis=0) if len(good) else np.full(2, np.nan)
 
 
-def gather(runs: list[RunPhasors]) -> list[PointData]:
+def gather(runs: list[RunPhasors], digests: Sequence[RunDigest] = ()) -> list[PointData]:
     """Group runs by operating point; a record with several excitation lines feeds several points."""
-    lines = [(run.point, run.lines.driven) for run in runs]
-    return [point_data(point, [(runs[k], i) for k, i in members]) for point, members in group(lines)]
+    points = []
+    for point, members in group([(run.point, run.lines.driven) for run in runs]):
+        data = point_data(point, [(runs[k], i) for k, i in members])
+        points.append(replace(data, digests=tuple(digests[k] for k, _ in members) if digests else ()))
+    return points
+
+
+def campaign_points(finished: FinishedRuns) -> list[PointData]:
+    """Operating points of all runs of a campaign that can be used."""
+    digests = finished.digests
+    return gather([digest.phasors for digest in digests], digests)
 
 
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
@@ -91,18 +105,8 @@ def point_data(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> 
     lines = tuple(i for _, i in members)
     D = [run.displacement.phasors[:, i] for run, i in zip(runs, lines)]
     F = [run.oil_force(i) for run, i in zip(runs, lines)]
-    A = [
-        np.zeros_like(d) if run.acceleration is None else run.acceleration.phasors[:, i]
-        for run, i, d in zip(runs, lines, D)
-    ]
     index = np.repeat(np.arange(len(runs)), [len(d) for d in D])
-    windows = _found(point, members)
-    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), np.concatenate(A), index, windows)
-
-
-def _found(point: OperatingPoint, members: list[tuple[RunPhasors, int]]) -> float:
-    middle = float(np.median([run.lines.excitation[i].frequency for run, i in members]))
-    return 0.0 if abs(middle - point.excitation_hz) < 1e-6 else 2 * np.pi * middle
+    return PointData(point, runs, lines, np.concatenate(D), np.concatenate(F), index)
 
 
 def mean_temperatures(run: Run) -> dict[int, float]:

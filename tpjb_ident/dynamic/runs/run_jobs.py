@@ -6,7 +6,7 @@ travel back.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,13 +15,13 @@ import numpy as np
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
+from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.dynamic.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
-from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
+from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns, RunDigest, digest
 from tpjb_ident.dynamic.runs.point_data import mean_temperatures, point_of
-from tpjb_ident.dynamic.runs.run_store import RunResult, RunStore, fingerprint, of_run
+from tpjb_ident.dynamic.runs.run_store import RunStore, fingerprint
 from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
@@ -30,10 +30,6 @@ from tpjb_ident.phasors.windows import RecordTooShortError
 from tpjb_ident.runtime.executors import Workers
 
 Progress = Callable[[str, int, int], None]
-#: A channel whose lines are below this share of the vector's may be dead.
-_NOTHING = 1e-6
-#: The same of its mean: what rounding leaves of a constant.
-_ROUNDING = 1e-10
 
 
 def all_runs(
@@ -43,54 +39,57 @@ def all_runs(
     workers: Workers | None = None,
     store: RunStore | None = None,
 ) -> FinishedRuns:
-    """Phasors and temperatures of every dynamic run; one that cannot be used is left out and named."""
+    """What every dynamic run says; one that cannot be used is left out and named."""
     runs = campaign.of_kind("dynamic")
     mass = campaign.housing_mass
     progress(runs[0].id if runs else "", 0, len(runs))
-    finished_runs = FinishedRuns(runs, mass, lambda run: one_run(run, mass, settings), store)
     jobs = [(_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs]
+    finished: dict[int, RunDigest | ExcludedRun] = {}
     outcomes = (workers or Workers()).outcomes(process_run, jobs)
     for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
         mark, result = outcome.get()
-        if isinstance(result, ExcludedRun):
-            finished_runs.leave_out(index, result)
-        else:
-            if store is not None and result is not None and mark:
-                store.keep(mark, result)
-            finished_runs.put(index, result, mark)
-        progress(runs[index].id, done, len(runs))
-    finished_runs.leave_out_dead_accelerometers()
-    if runs and not finished_runs.places:
-        raise finished_runs.left_out[0].error
-    return finished_runs
+        run = runs[index]
+        if store is not None and mark and isinstance(result, RunDigest):
+            store.keep(mark, result)
+        if store is not None and result is None:  # or cleared by another command since
+            result = store.load(run, mark)
+        finished[index] = result or one_run(run, mass, settings)
+        progress(run.id, done, len(runs))
+    found = FinishedRuns(tuple(finished[index] for index in sorted(finished)))
+    return found.without(_dead_accelerometers(found.digests))
+
+
+def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
+    """Runs with a dead accelerometer, where most of the others show that there is an acceleration."""
+    cure = "Check sensor, cable and amplifier; repeat the run"
+    dead = {}
+    for run in digests:
+        for condition in run.phasors.conditions:
+            if condition == DEAD_ACCELEROMETER:
+                dead[run.run] = Problem("error", run.seen[0].run.file, "", condition.detail, cure, run.run)
+    return dead if 2 * len(dead) < len(digests) else {}
 
 
 def process_run(
     run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
-) -> tuple[str, RunResult | ExcludedRun | None]:
+) -> tuple[str, RunDigest | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
     The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
     is kept anywhere (`known` is None) it is not asked for.
     """
     try:
-        return _process_run(run, housing_mass, settings, known)
+        if known is None:
+            return "", one_run(run, housing_mass, settings)
+        with run.opened():  # once for both
+            mark = fingerprint(run, housing_mass, settings)
+            if mark and mark == known:
+                return mark, None
+            before = _state(run)
+            result = one_run(run, housing_mass, settings)
+        return (mark if before == _state(run) else ""), result
     except (RigDataError, RecordTooShortError) as error:
         return "", ExcludedRun(run.id, run.point, error)
-
-
-def _process_run(
-    run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
-) -> tuple[str, RunResult | None]:
-    if known is None:
-        return "", one_run(run, housing_mass, settings)
-    with run.opened():  # once for both
-        mark = fingerprint(run, housing_mass, settings)
-        if mark and mark == known:
-            return mark, None
-        before = _state(run)
-        result = one_run(run, housing_mass, settings)
-    return (mark if before == _state(run) else ""), result
 
 
 def _state(run: Run) -> tuple[int, int] | None:
@@ -112,30 +111,36 @@ def _anywhere(run: Run) -> Any:
     return replace(run, reader=replace(reader, path=reader.path.absolute()))
 
 
-def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunResult:
-    """Phasors and temperatures of one run."""
+def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDigest:
+    """What one run says."""
     with run.opened():
         cached = with_kept_beginning(run)
         try:
             phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        conditions = merged(phasors.conditions, _dead_accelerometers(cached, phasors), _repaired(run))
-        phasors = _without_spares(phasors)
+        seen = _seen(run, cached, phasors)
+        phasors, dead = _without_dead(phasors, seen[0])
+        conditions = merged(phasors.conditions, dead, _repaired(run))
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
-        return RunResult(result, mean_temperatures(cached), _seen(run, cached, phasors))
+        return digest(result, mean_temperatures(cached), run.sample_rate, seen)
 
 
 def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
-    """What the checks make of the run's beginning, at every excitation frequency that was found in it."""
-    beginning = beginning_of(kept)
-    frequencies = phasors.lines.driven
-    if len(frequencies) == 1:
-        point = replace(run.point, excitation=2 * np.pi * frequencies[0])
-        return (of_run(observe(replace(beginning, point=point), phasors), run),)
-    points = [point_of(run.point, frequency) for frequency in frequencies]
-    looks = enumerate(points)
-    return tuple(of_run(observe(replace(beginning, point=p), phasors, i), replace(run, point=p)) for i, p in looks)
+    """What the checks make of the run's beginning, at every excitation frequency that was found in it.
+
+    The observations are of the run itself, so that what the beginning holds in memory may go.
+    """
+    beginning, driven = beginning_of(kept), phasors.lines.driven
+    seen = []
+    for line, frequency in enumerate(driven):
+        alone = len(driven) == 1
+        point = replace(run.point, excitation=2 * np.pi * frequency) if alone else point_of(run.point, frequency)
+        observed = observe(replace(beginning, point=point), phasors, line)
+        own = run if alone else replace(run, point=point)
+        report = Reporter(own, observed.report.found, observed.report.doubts)
+        seen.append(replace(observed, run=own, report=report))
+    return tuple(seen)
 
 
 def _repaired(run: Run) -> tuple[Condition, ...]:
@@ -145,47 +150,25 @@ def _repaired(run: Run) -> tuple[Condition, ...]:
     return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
 
 
-def _dead_accelerometers(run: Run, phasors: RunPhasors) -> tuple[Condition, ...]:
-    """Refuse a run with a dead probe or cell; tell of a dead accelerometer.
+def _without_dead(phasors: RunPhasors, seen: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+    """The run without spare channels that the checks call dead; refused with a dead probe or cell.
 
-    Only where a channel shows no line is the run read once more and held against the rules of `rigdata.check_campaign`,
-    which know a computed record without noise from a dead sensor.
+    What is said of a dead accelerometer: the run may do without.
     """
-    dead = _dead(run, phasors)
-    grave = [p for name, p in dead.items() if run.channels[name].quantity != "acceleration"]
+    dead = {finding.key: finding.problem for finding in seen.report.found if finding.key.startswith("dead ")}
+    grave, said, spare = [], [], []
+    for k, channel in enumerate(phasors.channels):
+        problem = dead.get(f"dead {channel.name}")
+        if problem is None:
+            continue
+        if problem.severity != "error":
+            spare.append(k)
+        elif channel.quantity == "acceleration":
+            said.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
+        else:
+            grave.append(problem)
     if grave:
         raise RigDataError(grave)
-    return tuple(Condition(DEAD_ACCELEROMETER, f"{p.place} of {run.id} {p.what}") for p in dead.values())
-
-
-def _dead(run: Run, phasors: RunPhasors) -> dict[str, Problem]:
-    silent = [c.name for k, c in enumerate(phasors.channels) if _silent(phasors, k)]
-    if not silent:
-        return {}
-    errors = {f.key: f.problem for f in observe(run, phasors).report.found if f.problem.severity == "error"}
-    return {name: errors[f"dead {name}"] for name in silent if f"dead {name}" in errors}
-
-
-def _without_spares(phasors: RunPhasors) -> RunPhasors:
-    """The run without channels that show nothing where the others of their quantity tell the plane."""
-    silent = [k for k in range(len(phasors.channels)) if _silent(phasors, k)]
-    alive = [channel for k, channel in enumerate(phasors.channels) if k not in silent]
-    spare = [k for k in silent if is_spare(phasors.channels[k], alive)]
-    if not spare:
-        return phasors
     z, mean = phasors.z.copy(), phasors.mean.copy()
     z[:, :, spare], mean[:, spare] = np.nan, np.nan
-    return replace(phasors, z=z, mean=mean)
-
-
-def _silent(phasors: RunPhasors, channel: int) -> bool:
-    """Whether no window shows any line in a channel; False where no window shows anything at all."""
-    quantity = phasors.pick(phasors.channels[channel].quantity)
-    finite = np.isfinite(phasors.z[:, :, quantity]).any(axis=(1, 2))
-    if not finite.any():
-        return False
-    largest = float(np.nanmax(np.abs(phasors.z[finite][:, :, quantity])))
-    own = np.abs(phasors.z[finite, :, channel])
-    size = float(np.max(own, initial=0.0, where=np.isfinite(own)))
-    mean = float(np.nanmax(np.abs(phasors.mean[finite][:, quantity])))
-    return size <= max(_NOTHING * largest, _ROUNDING * mean)
+    return replace(phasors, z=z, mean=mean), tuple(said)

@@ -15,38 +15,46 @@ import hashlib
 import json
 import shutil
 import zipfile
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigdata.calibration import Channel
+from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
 from tpjb_ident.check.findings import Finding, Reporter
 from tpjb_ident.check.lines import RecordLines
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.conditions import Condition
+from tpjb_ident.dynamic.runs.finished_runs import RunDigest
+from tpjb_ident.phasors.line_means import FilmLine, FilmLines
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runtime.provenance import sha256, source_stamp
 from tpjb_ident.runtime.tables import write_atomic
 
-_ARRAYS = ("start", "z", "mean", "scale", "lost", "speeds", "shaft_phase", "record")
-_LINES = ("excitation", "nuisance", "faint")
 #: What reading says of an entry that is cut off, or that somebody else wrote.
-_NOT_OURS = (OSError, ValueError, LookupError, TypeError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile)
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """Phasors and temperatures of a run."""
-
-    phasors: RunPhasors
-    temperatures: dict[int, float]
-    seen: tuple[Observation, ...] = field(default=(), repr=False)
+_NOT_OURS = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
+#: Classes that a result is made of, field by field, and series of values.
+_RECORDS = (
+    RunDigest, RunPhasors, OperatingPoint, LineSet, Line, FilmLines, FilmLine,
+    Observation, RecordLines, Reporter, Finding, Problem,
+)  # fmt: skip
+_MADE: dict[str, Any] = {kind.__name__: kind for kind in (*_RECORDS, tuple, list, set)}
 
 
 def fingerprint(run: Run, housing_mass: float, settings: PhasorSettings) -> str:
@@ -93,58 +101,25 @@ class RunStore:
             return None  # not there, cut off, or not ours: the run is simply done again
         return meta, arrays
 
-    def keep(self, mark: str, result: RunResult) -> None:
+    def keep(self, mark: str, result: RunDigest) -> None:
         """Keep a finished run under its fingerprint `mark`."""
-        phasors = result.phasors
-        arrays: dict[str, Any] = {name: getattr(phasors, name) for name in _ARRAYS}
-        arrays.update({f"residual.{i}": bins for i, bins in enumerate(phasors.residual)})
-        meta = {
-            "fingerprint": mark,
-            "run": phasors.run,
-            "length": phasors.length,
-            "channels": [c.name for c in phasors.channels],
-            "device": phasors.device,
-            "span": phasors.span,
-            "lines": _packed_lines(phasors.lines),
-            "conditions": _packed_conditions(phasors.conditions),
-            "temperatures": {str(pad): value for pad, value in result.temperatures.items()},
-            "seen": [packed(observation) for observation in result.seen],
-        }
+        arrays: dict[str, Any] = {}
+        meta = {"fingerprint": mark, "run": result.run, "result": packed(result, arrays)}
         text = np.array(json.dumps(meta))
         with suppress(FileNotFoundError):  # another run into the same folder has ended and cleared it
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_atomic(self._file(phasors.run), lambda path: np.savez(path, meta=text, **arrays))
+            write_atomic(self._file(result.run), lambda path: np.savez(path, meta=text, **arrays))
 
-    def load(self, run: Run, mark: str, housing_mass: float) -> RunResult | None:
+    def load(self, run: Run, mark: str) -> RunDigest | None:
         """Give a kept run back; None if it is not there, or not under this fingerprint."""
         stored = self._read(run.id)
         if not mark or stored is None or stored[0]["fingerprint"] != mark:
             return None
         try:
-            return self._unpacked(run, *stored, housing_mass)
+            result = unpacked(stored[0]["result"], stored[1], run)
         except _NOT_OURS:
             return None
-
-    def _unpacked(
-        self, run: Run, meta: dict[str, Any], arrays: dict[str, np.ndarray], housing_mass: float
-    ) -> RunResult:
-        residual = [arrays.pop(f"residual.{i}") for i in range(len(arrays) - len(_ARRAYS))]
-        phasors = RunPhasors(
-            run=run.id,
-            point=run.point,
-            direction=run.excitation_direction,
-            lines=_unpacked_lines(meta["lines"]),
-            length=meta["length"],
-            channels=tuple(run.channels[name] for name in meta["channels"]),
-            housing_mass=housing_mass,
-            conditions=_unpacked_conditions(meta["conditions"]),
-            span=None if meta["span"] is None else tuple(meta["span"]),
-            device=tuple(meta["device"]),
-            residual=tuple(residual),
-            **arrays,
-        )
-        seen = tuple(unpacked(entry, run) for entry in meta["seen"])
-        return RunResult(phasors, {int(pad): value for pad, value in meta["temperatures"].items()}, seen)
+        return result if isinstance(result, RunDigest) else None
 
     def clear(self) -> None:
         """Forget everything; the folder that it lies in goes too if nothing else is there."""
@@ -153,77 +128,46 @@ class RunStore:
             self.folder.parent.rmdir()
 
 
-def _packed_conditions(conditions: tuple[Condition, ...]) -> list[list[str]]:
-    return [[str(c), c.detail] for c in conditions]
+def packed(value: Any, arrays: dict[str, Any]) -> Any:
+    """A value as JSON can hold it: what it is made of by the name of its class, its arrays in `arrays`.
+
+    Channels are those of the run, by name; of the run itself only the excitation is kept that was looked at.
+    """
+    kind = type(value).__name__
+    if isinstance(value, np.ndarray):
+        name = f"array {len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, Condition):
+        return {"condition": [str(value), value.detail]}
+    if isinstance(value, Channel):
+        return {"channel": value.name}
+    if isinstance(value, Run):
+        return {"run": value.point.excitation}
+    if isinstance(value, dict):
+        return {"dict": [[key, packed(item, arrays)] for key, item in value.items()]}
+    if isinstance(value, tuple | list | set):
+        return {kind: [packed(item, arrays) for item in value]}
+    if is_dataclass(value):
+        return {kind: {f.name: packed(getattr(value, f.name), arrays) for f in fields(value)}}
+    return value
 
 
-def _unpacked_conditions(stored: list[list[str]]) -> tuple[Condition, ...]:
-    return tuple(Condition(name, detail) for name, detail in stored)
-
-
-def _packed_lines(lines: LineSet) -> dict[str, Any]:
-    return {
-        **{kind: [list(vars(line).values()) for line in getattr(lines, kind)] for kind in _LINES},
-        "conditions": _packed_conditions(lines.conditions),
-        "speed": lines.speed,
-    }
-
-
-def _unpacked_lines(stored: dict[str, Any]) -> LineSet:
-    lines = {kind: tuple(Line(*line) for line in stored[kind]) for kind in _LINES}
-    return LineSet(conditions=_unpacked_conditions(stored["conditions"]), speed=stored["speed"], **lines)
-
-
-def of_run(observation: Observation, run: Run) -> Observation:
-    """The same observation, of `run` in place of the one that was looked at: what that kept in memory may go."""
-    return replace(
-        observation, run=run, report=Reporter(run, list(observation.report.found), set(observation.report.doubts))
-    )
-
-
-def packed(observation: Observation) -> dict[str, Any]:
-    """What JSON can hold; samples are left out, dynamic runs have none."""
-    lines = (
-        None if observation.lines is None else {name: _plain(value) for name, value in vars(observation.lines).items()}
-    )
-    return {
-        "excitation": observation.run.point.excitation,
-        "channels": [c.name for c in observation.channels],
-        "lines": lines,
-        "spread": observation.spread.tolist(),
-        "other_line": observation.other_line,
-        "speed": observation.speed,
-        "digest": observation.digest,
-        "found": [[asdict(f.problem), f.key] for f in observation.report.found],
-        "doubts": sorted(observation.report.doubts),
-    }
-
-
-def unpacked(stored: Mapping[str, Any], run: Run) -> Observation:
-    """What `packed` made, of `run` at the excitation that was looked at."""
-    if stored["excitation"] != run.point.excitation:
-        run = replace(run, point=replace(run.point, excitation=stored["excitation"]))
-    channels = tuple(run.channels[name] for name in stored["channels"])
-    lines = stored["lines"]
-    observation = [Finding(Problem(**problem), key) for problem, key in stored["found"]]
-    return Observation(
-        run=run,
-        channels=channels,
-        lines=None if lines is None else RecordLines(**{name: _array(value) for name, value in lines.items()}),
-        spread=np.array(stored["spread"], dtype=float).reshape(3, len(channels)),
-        other_line=stored["other_line"],
-        samples=np.empty((0, len(channels))),
-        speed=stored["speed"],
-        digest=stored["digest"],
-        report=Reporter(run, observation, set(stored["doubts"])),
-    )
-
-
-def _plain(values: np.ndarray) -> Any:
-    return {"re": values.real.tolist(), "im": values.imag.tolist()} if np.iscomplexobj(values) else values.tolist()
-
-
-def _array(stored: Any) -> np.ndarray:
-    if isinstance(stored, dict):
-        return np.array(stored["re"]) + 1j * np.array(stored["im"])
-    return np.array(stored)
+def unpacked(stored: Any, arrays: dict[str, np.ndarray], run: Run) -> Any:
+    """What `packed` was given, of `run`."""
+    if not isinstance(stored, dict):
+        return stored
+    ((kind, content),) = stored.items()
+    if kind == "array":
+        return arrays[content]
+    if kind == "condition":
+        return Condition(*content)
+    if kind == "channel":
+        return run.channels[content]
+    if kind == "run":
+        return replace(run, point=replace(run.point, excitation=content))
+    if kind == "dict":
+        return {key: unpacked(item, arrays, run) for key, item in content}
+    if isinstance(content, list):
+        return _MADE[kind](unpacked(item, arrays, run) for item in content)
+    return _MADE[kind](**{name: unpacked(item, arrays, run) for name, item in content.items()})
