@@ -2,6 +2,8 @@
 
 Scores of one more fault beside a fitted model, and of one less, propose the next explanations. The likeliest proposal
 is fitted, and proposes further ones where it comes near the leader: the same step for the first fault and the third.
+What the campaign hardly tells from a fault of the leader is fitted in its place at last, whatever its score: beside
+others that already do a look-alike's work a score says little.
 """
 
 from __future__ import annotations
@@ -10,16 +12,16 @@ import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
-from tpjb_ident.diagnosis.comparison.evidence import Linear, posterior
+from tpjb_ident.diagnosis.comparison.evidence import Levels, Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit, Point, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, scores
+from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
@@ -92,6 +94,9 @@ class _Search:
         self.estimates: dict[frozenset[str], float] = {}
         self.proposals: dict[frozenset[str], Proposal] = {}
         self.paths: tuple[Path, ...] = ()
+        self.exchanged: dict[
+            frozenset[str], list[Proposal]
+        ] = {}  #: look-alikes by the leader that they are held against
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
         self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
@@ -121,7 +126,50 @@ class _Search:
         leader = self._leader()
         if leader is not None and leader.posterior.scale <= self.settings.right:
             order = [p for p in order if self._promising(p, leader)]
-        return self.proposals.pop(order[0].labels) if order else None
+        if not order:
+            return None if leader is None else self._look_alike(leader)
+        return self.proposals.pop(order[0].labels)
+
+    def _look_alike(self, leader: Fit) -> Proposal | None:
+        """The leader with a fault exchanged for what the campaign hardly tells from it; None where all were fitted."""
+        if leader.labels not in self.exchanged:
+            pairs = [(fault, path) for fault in leader.faults for path in self._alike(leader, fault)]
+            self.exchanged[leader.labels] = [self._exchange(leader, fault, path) for fault, path in pairs]
+        proposals = self.exchanged[leader.labels]
+        while proposals:
+            proposal = proposals.pop(0)
+            if proposal.labels not in self.fits:
+                return proposal
+        return None
+
+    def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
+        """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
+        others = [path for path in self.paths if path.fault.label not in fit.labels and not path.fault.is_term]
+        at, linear = fit.unknowns.slices[fit.faults.index(fault)], fit.linear
+        width = linear.width.copy()
+        width[at] = 0.0  # by itself, beside everything else that is free
+        own = linear.jacobian[:, at]
+        levels = Levels.of(
+            self.problem.errors, replace(linear, width=width), np.column_stack([own, *(p.columns for p in others)])
+        )
+        gram = levels.product(slice(1, levels.rest.shape[1]))[fit.posterior.leading, 1:, 1:]
+        size = np.sqrt(np.maximum(np.diag(gram), 1e-12))
+        cosine = np.abs(gram / np.outer(size, size))[: own.shape[1]].max(axis=0)
+        apart = Deciding.seen * np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        alike, start = [], own.shape[1]
+        for path in others:
+            stop = start + path.columns.shape[1]
+            if apart[start:stop].min() < Deciding.visible:
+                alike.append(path)
+            start = stop
+        return alike
+
+    def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Proposal:
+        """A fit with another fault in the place of one of its own."""
+        faults, linear = self._without(fit, fault)
+        score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, len(linear.theta))), np.zeros(0)))[0]
+        point = Point(linear.theta, self.problem.measured - linear.residual, linear.jacobian)
+        return replace(self._with(score, faults, point), solved=None)
 
     @property
     def _passed(self) -> bool:
@@ -263,8 +311,11 @@ class _Search:
 
     def _propose(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> None:
         """Add a fault to a model."""
-        if not np.any(score.amplitudes):
-            return
+        if np.any(score.amplitudes):
+            self._offer(self._with(score, faults, point, coarse))
+
+    def _with(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> Proposal:
+        """A model with one fault more."""
         fault = score.path.fault.turned()
         faults = (*faults, fault)
         estimate = score.total + self._log_prior(faults)
@@ -282,10 +333,16 @@ class _Search:
         solved = Point(theta, point.prediction, jacobian)
         theta = theta.copy()
         theta[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
-        self._offer(Proposal(faults, theta, jacobian, coarse, solved, estimate))
+        return Proposal(faults, theta, jacobian, coarse, solved, estimate)
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
-        """Take a fault from a model; its tolerance has its stated prior again, and stays where it is."""
+        """Take a fault from a model."""
+        faults, linear = self._without(fit, fault)
+        estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
+        self._offer(Proposal(faults, linear.theta, linear.jacobian, estimate=estimate))
+
+    def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
+        """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
         faults = tuple(f for f in fit.faults if f is not fault)
         point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
         residual = self.problem.measured - point.prediction
@@ -293,15 +350,18 @@ class _Search:
         if fault.own < 0:
             residual = residual + jacobian[:, at] @ theta[at]
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
-        linear = Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
-        estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
-        self._offer(Proposal(faults, theta, jacobian, estimate=estimate))
+        return faults, Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
 
     def _offer(self, proposal: Proposal) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
         better = fit is None or proposal.coarse or proposal.estimate > self._log_probability(fit) + Deciding.better
-        if better and (known is None or (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)):
+        if known is not None and known.coarse and not proposal.coarse:  # a start that would lead is past the jumps
+            leader = self._leader()
+            better &= leader is not None and proposal.estimate > self._log_probability(leader)
+        elif known is not None:
+            better &= (known.coarse, known.estimate) < (proposal.coarse, proposal.estimate)
+        if better:
             self.proposals[proposal.labels] = proposal
 
     def _weighed(self) -> Comparison:
