@@ -144,7 +144,7 @@ def content_key(rig: VirtualRig, layout: Layout) -> str:
 
 def _probed(rig: VirtualRig) -> Iterator[OperatingPoint]:
     """Every planned point, and one a little off: a rig that misses its set points asks the laws there."""
-    for point in dict.fromkeys(run.point for run in rig.runs() if run.point is not None):
+    for point in dict.fromkeys(run.point for run in rig.runs() if run.test is None):
         yield point
         yield replace(
             point,

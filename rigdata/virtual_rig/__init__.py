@@ -11,13 +11,10 @@ from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout
 from rigdata.virtual_rig.noise import (
-    ActuatorDefects,
     ChannelNoise,
     DryImperfections,
     Glitches,
     Noise,
-    SetPointMiss,
-    ShaftDefects,
 )
 from rigdata.virtual_rig.plan import (
     ClearanceSweep,
@@ -31,7 +28,6 @@ from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 __all__ = [
-    "ActuatorDefects",
     "CampaignTruth",
     "ChannelNoise",
     "ClearanceSweep",
@@ -47,8 +43,6 @@ __all__ = [
     "RigTruth",
     "Sensor",
     "SensorError",
-    "SetPointMiss",
-    "ShaftDefects",
     "SimulatedRun",
     "Timing",
     "VirtualRig",

@@ -12,6 +12,8 @@ from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 Branch = Literal["up", "down", "cycle"]
 _DOWNWARD = -pi / 2
+#: Of a run without load and rotation of its own.
+_NO_POINT = OperatingPoint(0.0)
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,8 @@ class PlannedRun:
     id: str
     kind: Literal["dynamic", "locus", "dry_pivot", "clearance"]
     rate: float
-    point: OperatingPoint | None = None
-    direction: float | None = None
+    point: OperatingPoint = _NO_POINT
+    direction: float = 0.0
     lines: tuple[tuple[float, float], ...] = ()
     record: str = ""
     test: DryTest | ClearanceSweep | None = None
