@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -87,16 +87,11 @@ class Run:
     @property
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together; the run's own device, that of the first displacement channel, first."""
-        devices = getattr(self.reader, "devices", None)
-        if devices is not None:
-            return tuple(devices())
-        names = tuple(name for name, channel in self.channels.items() if channel.quantity != "time")
-        return (Device("", names, self.sample_rate, self.length, False),)
+        return self.reader.devices()
 
-    def _apart(self, names: Iterable[str]) -> bool:
+    def _apart(self, names: Sequence[str]) -> bool:
         """Whether channels are sampled apart from the run's own device; refused where only some of them are."""
-        names = tuple(names)
-        apart: frozenset[str] = getattr(self.reader, "apart", frozenset)()
+        apart = self.reader.apart()
         if not apart.intersection(names):
             return False
         devices = {name: device for device in self.devices for name in device.channels}
@@ -293,8 +288,7 @@ class Run:
 
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
-        opener = getattr(self.reader, "opened", None)
-        return nullcontext() if opener is None else opener()
+        return self.reader.opened()
 
     def mean_temperature(self) -> float | None:
         """Temperature of the run [K]: as stated, else the mean of its thermometers; None where there is neither."""

@@ -77,7 +77,7 @@ def device_readers(run: Run) -> tuple[DeviceReader, ...]:
     _check_directions(run)
     directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
     tachometers = [c for c in run.channels.values() if c.quantity == "speed"][:1]
-    devices = _devices(run)
+    devices = run.devices
     for name in directed.keys() - {name for device in devices for name in device.channels}:
         run.record(name, 0, 0)  # says that the file lacks it
     readers = []
@@ -90,13 +90,6 @@ def device_readers(run: Run) -> tuple[DeviceReader, ...]:
         if channels:
             readers.append(DeviceReader(run, device, channels, own[0] if own else None, rate, length))
     return tuple(readers)
-
-
-def _devices(run: Run) -> tuple[Device, ...]:
-    if hasattr(run.reader, "devices"):
-        return run.devices
-    counted = getattr(run.reader, "counted", None)
-    return (Device("", tuple(run.channels), run.sample_rate, run.length, counted is not None and counted()),)
 
 
 def _check_directions(run: Run) -> None:
