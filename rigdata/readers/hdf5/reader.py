@@ -15,7 +15,7 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.device import Grid
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, Layout, RunReader, rate_of_time
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, SAMPLE, Layout, RunReader, rate_of_time
 from rigdata.readers.hdf5.guards import (
     TEXT,
     UNIT,
@@ -136,11 +136,11 @@ class Hdf5Reader(RunReader):
 
     def _cache_bytes(self) -> int:
         """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
-        layout = self._layout()
-        if layout.grids[0].length * 8 <= _LEAST_CACHE:
+        own = self._layout().grids[0]
+        if own.length * SAMPLE <= _LEAST_CACHE:
             return _LEAST_CACHE
         with self._group() as group:
-            largest = max(chunk_bytes(group, name) for name in layout.members[:4])
+            largest = max(chunk_bytes(self._dataset(group, name)) for name in own.channels[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def _dataset(self, group: Any, name: str) -> Any:
@@ -176,9 +176,8 @@ class Hdf5Reader(RunReader):
             raise self.refuse(place, "holds its data in another file", "Copy the data into this file")
         for code in foreign_filters(dataset):
             raise self.refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
-        chunk = dataset.chunks
-        if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
-            raise self.refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
+        if chunk_bytes(dataset) > _MAX_CHUNK:
+            raise self.refuse(place, f"has chunks of {dataset.chunks[0]} samples", "Use chunks below 100 MB")
 
     def _layout(self) -> _Members:
         """What is sampled together; it is looked for once where the file is kept open."""
