@@ -190,7 +190,7 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     return product
 
 
-def _tokens(plain: str, text: str) -> list[tuple[str, str, str, str]]:
+def _tokens(plain: str, text: str) -> list[tuple[str, ...]]:
     """Name, power and symbol of every piece; a plain 1 has none of them."""
     tokens, at = [], 0
     while at < len(plain):

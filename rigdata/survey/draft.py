@@ -17,7 +17,7 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
-from rigdata.survey.channels import PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
@@ -54,9 +54,9 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _open(HOUSING, "mass", "kg"), _MOUNT, ""]
+    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", "", OPEN, HOUSING, "kg"), _MOUNT, ""]
     if not all(rate > 0 for rate in surveyed.rates):
-        lines += ["[acquisition]", _open(ACQUISITION, "sample_rate", "Hz"), ""]
+        lines += ["[acquisition]", _line("sample_rate", "", OPEN, ACQUISITION, "Hz"), ""]
     if surveyed.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
@@ -102,10 +102,12 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     head, quantity = f"[channels.{_key(name)}]", guess.quantity.value
     if not quantity or quantity == "ignore":
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
-    source = Entry() if like else guess.quantity  # what it is like bears the mark for both
+    source = Entry(quantity) if like else guess.quantity  # what it is like bears the mark for both
     lines = [head, _line("quantity", f'"{quantity}"', source)]
     if quantity in VECTOR_QUANTITIES:
-        lines.append(_axis_line(guess))
+        is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
+        axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
+        lines.append(_line("axis", f'"{axis.number:g} deg"', axis, CHANNEL, "deg"))
     if like:
         lines.append(f"like = {_toml_string(like)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
@@ -120,13 +122,6 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     return lines
 
 
-def _axis_line(guess: ChannelGuess) -> str:
-    if guess.axis.value is not None:
-        return _line("axis", f'"{guess.axis.number:g} deg"', guess.axis)
-    hint = f"; its name hints at {guess.hint:g} deg" if math.isfinite(guess.hint) else ""
-    return _open(CHANNEL, "axis", "deg") + hint
-
-
 def run_lines(run: RunGuess) -> list[str]:
     """Lines of a run's table."""
     stem = run.file.rpartition("/")[2].rpartition(".")[0]
@@ -134,34 +129,27 @@ def run_lines(run: RunGuess) -> list[str]:
     lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", f'"{kind}"', run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     if kind in ("dynamic", "locus", None):
-        lines.append(_quantity("shaft_speed", f"{run.speed.number:.4g} Hz", run.speed))
-        lines.append(_quantity("static_load", run.load_text, run.load))
+        lines.append(_line("shaft_speed", f'"{run.speed.number:.4g} Hz"', run.speed, RUN, "Hz"))
+        lines.append(_line("static_load", f'"{run.load_text}"', run.load, RUN, "kN"))
     if kind == "dry_pivot":
-        lines.append(_line("pad", str(run.pad.value), run.pad) if run.pad.value else _open(RUN, "pad", ""))
+        lines.append(_line("pad", str(run.pad.value), run.pad, RUN))
     if kind != "clearance":
-        lines.append(_quantity("static_load_direction", f"{run.direction.number:.4g} deg", run.direction))
+        direction = f'"{run.direction.number:.4g} deg"'
+        lines.append(_line("static_load_direction", direction, run.direction, RUN, "deg"))
     if kind in ("dynamic", None):
-        lines.append(_quantity("excitation_frequency", f"{run.excitation.number:.4g} Hz", run.excitation))
+        frequency = f'"{run.excitation.number:.4g} Hz"'
+        lines.append(_line("excitation_frequency", frequency, run.excitation, RUN, "Hz"))
     return lines
 
 
-def _line(key: str, value: str, entry: Entry) -> str:
-    """One entry with its source; what is read from a file needs none."""
+def _line(key: str, value: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "") -> str:
+    """One entry with its source (what is read from a file needs none); or an open one with what it means."""
+    if entry.value is None:
+        meaning = next(field.meaning for field in fields if field.key == key)
+        text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
+        return f"{text}; {entry.reason}" if entry.reason else text
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
-
-
-def _quantity(key: str, text: str, entry: Entry) -> str:
-    if entry.value is not None:
-        return _line(key, f'"{text}"', entry)
-    unit = {"static_load": "kN", "static_load_direction": "deg"}.get(key, "Hz")
-    return f"{_open(RUN, key, unit)}{f'; {entry.reason}' if entry.reason else ''}"
-
-
-def _open(fields: tuple[Field, ...], key: str, unit: str) -> str:
-    """A line that is open: the key, the mark with a unit, and what it means."""
-    meaning = next(field.meaning for field in fields if field.key == key)
-    return f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
 
 
 def _toml_string(text: str) -> str:

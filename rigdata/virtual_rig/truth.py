@@ -127,7 +127,7 @@ def point_facts(point: OperatingPoint, position: FloatArray) -> dict[str, object
 
 
 def _checked(values: Any, shape: tuple[int, ...], name: str, kind: type = float) -> np.ndarray:
-    array = np.asarray(values, dtype=kind)
+    array: np.ndarray = np.asarray(values, dtype=kind)
     if array.shape != shape or not np.isfinite(array).all():
         raise VirtualRigError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
     return array
