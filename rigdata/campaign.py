@@ -268,19 +268,14 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
 def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]) -> str:
     try:
         path = inside(folder, manifest.bearing, file, "bearing")
-    except RigDataError as error:
-        problems.extend(error.problems)
-        return ""
-    if not os.path.isfile(path):
+        if os.path.isfile(path):
+            files[manifest.bearing] = path
+            return _read_text(path, manifest.bearing, _MAX_BEARING)
         message = f"the bearing file {manifest.bearing!r} is not in the folder"
         problems.append(Problem("warning", file, "bearing", message, "Add it, or give --bearing where one is needed"))
-        return ""
-    files[manifest.bearing] = path
-    try:
-        return _read_text(path, manifest.bearing, _MAX_BEARING)
     except RigDataError as error:
         problems.extend(error.problems)
-        return ""
+    return ""
 
 
 def _load_hdf5(path: Path) -> Campaign:

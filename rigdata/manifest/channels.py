@@ -216,13 +216,9 @@ def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list
 def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[str]:
     """Runs that the patterns of an entry name; `budget` counts the patterns with a star."""
     patterns = entry.value(RUNS_OF)
-    if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) for p in patterns):
-        if patterns is not None:
-            entry.error("runs", f"runs is {shown(patterns)}, no list of texts", 'Write runs = ["p-*", "c-1"]')
-        return set()
     named: set[str] = set()
     known = set(runs)
-    for pattern in patterns:
+    for pattern in patterns or ():
         matches = {pattern} & known
         if "*" in pattern:
             if next(budget) > _MOST_PATTERNS:

@@ -31,7 +31,7 @@ _EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 _BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
-_RAW = ("table", "tables", "list", "sign", "calibration")
+_RAW = ("table", "tables", "sign", "calibration")
 #: Begins a value of `tpjb init` that only the person at the rig knows.
 MARK = "??"
 
@@ -41,7 +41,8 @@ class Field:
     """One key of a table: what it holds, what it means, and its default."""
 
     key: str
-    kind: str  #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `_RAW`
+    #: A dimension of `rigdata.units`, "text", "choice", "whole" (number), "list" (of texts), or one of `_RAW`.
+    kind: str
     meaning: str
     example: str
     default: Any = None
@@ -100,7 +101,7 @@ ACQUISITION = (
 )
 CSV = (
     Field("delimiter", "text", 'one character, or "tab"', '";"'),
-    Field("decimal", "text", ". or ,", '","'),
+    Field("decimal", "text", ". or ,", '","', choices=(".", ",")),
     Field("encoding", "text", "of the text", '"cp1252"'),
     Field("header_line", "whole", "line of the column names, from 1", "7", low=1, high=1e7),
     Field("units_line", "whole", "line of the units", "8", low=1, high=1e7),
@@ -278,6 +279,8 @@ class Table:
             return value
         if field.kind == "whole":
             checked: Any = self._whole_number(field, value)
+        elif field.kind == "list":
+            checked = self._texts(field, value)
         elif field.kind in ("text", "choice"):
             checked = self._text(field, value, needed)
         else:
@@ -297,6 +300,14 @@ class Table:
             self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.choices))
         else:
             return value
+        return None
+
+    def _texts(self, field: Field, value: object) -> list[str] | None:
+        if isinstance(value, list) and value and all(isinstance(text, str) and text.strip() for text in value):
+            return value
+        self.error(
+            field.key, f"{field.key} is {shown(value)}, no list of texts", f"Write {field.key} = {field.example}"
+        )
         return None
 
     def _whole_number(self, field: Field, value: object) -> int | None:

@@ -228,22 +228,14 @@ def _read_csv(table: Table) -> CsvSpec:
     if values["delimiter"] in {"\\t", "tab", "TAB"}:
         values["delimiter"] = "\t"
     delimiter, decimal = values["delimiter"], values["decimal"]
-    if delimiter is not None and len(delimiter) != 1:
-        table.error("delimiter", f"delimiter is {delimiter!r}", "Give one character")
-    if decimal is not None and decimal not in (".", ","):
-        table.error("decimal", f"decimal is {decimal!r}", "Give one character, . or ,")
-    if delimiter is not None and delimiter in '0123456789+-.eE"\r\n':
-        table.error("delimiter", f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
+    if delimiter is not None and (len(delimiter) != 1 or delimiter in '0123456789+-.eE"\r\n'):
+        table.error("delimiter", f"delimiter {delimiter!r} cannot part numbers", 'Give one character, e.g. ";"')
     if delimiter is not None and delimiter == decimal:
         table.error("decimal", f"delimiter and decimal are both {decimal!r}", "They must differ")
     header, units = values["header_line"], values["units_line"]
     if header is not None and units is not None and units <= header:
         table.error("units_line", f"units_line {units} is not below header_line {header}", "Lines count from 1")
-    names = values["names"] or []
-    if not isinstance(names, list) or not all(isinstance(n, str) and n.strip() for n in names):
-        table.error("names", "names is no list of texts", 'Write names = ["time", "X1A", ..], one per column')
-        names = []
-    values["names"] = tuple(names)
+    values["names"] = tuple(values["names"] or ())
     values["encoding"] = _codec(table, values["encoding"])
     return CsvSpec(**values)
 

@@ -257,10 +257,9 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         after = pads[(i + 1) % len(pads)]
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
-        passed = (direction - angle - lag + np.pi) % (2 * np.pi) - np.pi
-        remaining = (next_angle + lag - direction + np.pi) % (2 * np.pi) - np.pi
+        passed, remaining = _wrapped(direction - angle - lag), _wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / width)) * (1 + np.tanh(remaining / width))
-        turned = np.clip((direction - angle + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
+        turned = np.clip(_wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
         shares.append(share)
@@ -274,6 +273,11 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         side = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
         position += (alone * (side - position @ normals[i]))[:, None] * normals[i]
     return np.asarray(position)
+
+
+def _wrapped(angle: FloatArray) -> FloatArray:
+    """Angles [rad] from -pi to pi."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _sides(truth: RigTruth) -> list[int]:

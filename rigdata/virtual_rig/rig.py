@@ -189,10 +189,7 @@ def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Ins
     for fault in faults:
         for i, sensor in enumerate(sensors):
             if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
-                name = _ERRORS[fault.kind]
-                error = getattr(sensor.error, name)
-                size = error * fault.value if fault.kind == "scaled" else error + fault.value
-                sensors[i] = sensor.with_error(**{name: size})
+                sensors[i] = sensor.with_error(**{_ERRORS[fault.kind]: fault.value})
     return replace(instruments, sensors=tuple(sensors))
 
 

@@ -147,8 +147,7 @@ def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]], effe
     sensors = {sensor.name: sensor for sensor in instruments.sensors}
     for name, place, change in changes:
         at = f"T{place.split()[-1]}" if name == "thermometer" else NAMES[place]
-        error = sensors[at].error
-        more = {"offset": error.offset + change} if name == "thermometer" else {"gain": error.gain * math.exp(change)}
+        more = {"offset": change} if name == "thermometer" else {"gain": math.exp(change)}
         sensors[at] = sensors[at].with_error(**more)
     return replace(instruments, sensors=tuple(sensors.values()))
 
