@@ -164,12 +164,15 @@ def _key(name: str) -> str:
 
 @dataclass
 class _Block:
-    """A table of a manifest: its kind, the channel's name or the run's file, its lines and what they mean."""
+    """A table of a manifest."""
 
-    kind: str
-    name: str
+    key: tuple[str, str]  #: "channels" and the channel's name, "runs" and the run's file; else empty
+    place: str  #: what messages call it
     lines: list[str]
-    data: dict[str, Any]
+
+
+#: Lines of tables by the key of their block.
+_Tables = dict[tuple[str, str], list[str]]
 
 
 def _described_channels(text: str) -> dict[str, dict[str, Any]]:
@@ -203,9 +206,9 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     described = _described_channels(text)
     former = _tables(survey(exports, pivots=pivots))
     for block in _blocks(text):
-        for line in former.get((block.kind, block.name), ()):
+        for line in former.get(block.key, ()):
             if line.startswith("axis") and "(guess)" in line and line in block.lines:
-                del described[block.name]["axis"]
+                del described[block.key[1]]["axis"]
     new_tables = _tables(survey(exports, described, pivots))
     for merges in (True, False):
         blocks = _blocks(text)
@@ -245,35 +248,31 @@ def _block(lines: list[str]) -> _Block:
         heading = ""
     if heading.startswith("[[runs]]"):
         (run,) = data["runs"]
-        return _Block("runs", str(run.get("file", "")), lines, run)
+        file = str(run.get("file", ""))
+        return _Block(("runs", file), f"run {run.get('id', file)}", lines)
     if heading.startswith("[channels."):
-        ((name, channel),) = data["channels"].items()
-        return _Block("channels", name, lines, channel)
-    return _Block("", "", lines, {})
+        (name,) = data["channels"]
+        return _Block(("channels", name), f"channel {name}", lines)
+    return _Block(("", ""), "", lines)
 
 
-def _tables(surveyed: Survey) -> dict[tuple[str, str], list[str]]:
+def _tables(surveyed: Survey) -> _Tables:
     """Lines of all tables that a draft has for channels and runs, by kind and name."""
     tables = {("channels", name): lines for name, lines in channel_blocks(surveyed).items()}
     return tables | {("runs", run.file): run_lines(run) for run in surveyed.runs}
 
 
-def _update(
-    blocks: list[_Block],
-    old: dict[tuple[str, str], list[str]] | None,
-    new: dict[tuple[str, str], list[str]],
-) -> list[str]:
+def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str]:
     """Merge the tables of a draft into the blocks; the `old` ones tell guesses from what was typed. Add new tables."""
     changes: list[str] = []
     for block in blocks:
-        key = block.kind, block.name
-        place = f"channel {block.name}" if block.kind == "channels" else f"run {block.data.get('id', block.name)}"
-        if old is not None and key in new:
-            _merge(block, new[key], old.get(key, []), place, changes)
-        elif block.kind == "runs" and block.name and key not in new:
-            changes.append(f"{place}: its file {block.name} is not there; left as it is")
-    present = {(block.kind, block.name) for block in blocks}
-    first_run = next((i for i, block in enumerate(blocks) if block.kind == "runs"), len(blocks))
+        kind, name = block.key
+        if old is not None and block.key in new:
+            _merge(block, new[block.key], old.get(block.key, []), changes)
+        elif kind == "runs" and name and block.key not in new:
+            changes.append(f"{block.place}: its file {name} is not there; left as it is")
+    present = [block.key for block in blocks]
+    first_run = next((i for i, (kind, _) in enumerate(present) if kind == "runs"), len(blocks))
     for (kind, name), lines in new.items():
         if (kind, name) in present:
             continue
@@ -281,11 +280,11 @@ def _update(
         at = len(blocks)
         if kind == "channels":
             at, first_run = first_run, first_run + 1
-        blocks.insert(at, _Block(kind, name, lines, {}))
+        blocks.insert(at, _Block((kind, name), "", lines))
     return changes
 
 
-def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
+def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[str]) -> None:
     """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
     guessed, wanted = _values(old), _values(new)
     lines, present = [], set()
@@ -296,7 +295,7 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
         if key in wanted and (MARK in value or is_guess) and MARK not in wanted[key][0]:
             result, drafted = wanted[key]
             if result != value:
-                changes.append(f"{place}: {key} {value} becomes {result}")
+                changes.append(f"{block.place}: {key} {value} becomes {result}")
             if result != value or "(records)" in drafted:
                 line = drafted
         lines.append(line)
@@ -312,7 +311,7 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
     for key, (value, line) in wanted.items():
         if key not in present:
             lines.append(line)
-            changes.append(f"{place}: {key} {value} added")
+            changes.append(f"{block.place}: {key} {value} added")
     block.lines = lines
 
 
