@@ -140,26 +140,32 @@ class CsvSpec:
     names: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Manifest:
-    """A checked manifest, SI."""
+@dataclass(frozen=True, kw_only=True)
+class Description:
+    """What a manifest says of the whole campaign, SI."""
 
     id: str
-    bearing: str
     description: str
+    bearing_name: str
     housing_mass: float
+    channels: Mapping[str, Channel] = field(repr=False)
+    notes: tuple[Problem, ...] = field(repr=False)
+    mass_uncertainty: float
+    mains: float | None
+    rotation: str
+    mount: str | None
+    date: str
+    by: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest(Description):
+    """A checked manifest, SI."""
+
     sample_rate: float | None
     csv: CsvSpec
-    channels: Mapping[str, Channel] = field(repr=False)
     runs: tuple[RunEntry, ...] = field(repr=False)
-    notes: tuple[Problem, ...] = ()
-    mass_uncertainty: float = 0.0
-    mains: float | None = None
-    rotation: str = "counter-clockwise"
-    mount: str | None = None
-    date: str = ""
-    by: str = ""
-    described: Mapping[str, Mapping[str, Channel]] = field(default_factory=dict, repr=False)  #: by run, if other
+    described: Mapping[str, Mapping[str, Channel]] = field(repr=False)  #: by run, if other
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
@@ -184,7 +190,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         findings.error(("acquisition", "mains"), f"mains is {mains:g} Hz", 'Give "50 Hz" or "60 Hz"')
     manifest = Manifest(
         id=header["id"] or "",
-        bearing=header["bearing"] or "",
+        bearing_name=header["bearing"] or "",
         description=header["description"],
         housing_mass=housing["mass"],
         sample_rate=acquisition["sample_rate"],

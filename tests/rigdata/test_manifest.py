@@ -91,7 +91,7 @@ def problems_of(text: str) -> list[str]:
 
 def test_the_example_of_the_format():
     manifest = parse_manifest(GOOD)
-    assert (manifest.id, manifest.bearing, manifest.housing_mass, manifest.sample_rate) == (
+    assert (manifest.id, manifest.bearing_name, manifest.housing_mass, manifest.sample_rate) == (
         "rocker-A",
         "rocker.toml",
         30.0,
