@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,8 @@ _LONGEST = 1000
 _KEY = re.compile(r"\s*([A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')\s*=")
 _PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([^.\s]+)")
 Path = tuple[str | int, ...]
+#: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
+TextFile = Callable[[str, str], str]
 #: Frequencies of the mains in any country [Hz].
 MAINS_FREQUENCIES = (50.0, 60.0)
 _QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
@@ -196,9 +198,8 @@ def nearest(name: str, choices: Collection[str]) -> str:
 class Findings:
     """The problems of one manifest, with their lines."""
 
-    def __init__(self, file: str, lines: dict[Path, int]) -> None:
-        self.file = file
-        self.lines = lines
+    def __init__(self, file: str, lines: dict[Path, int], files: TextFile | None = None) -> None:
+        self.file, self.lines, self.files = file, lines, files
         self.problems: list[Problem] = []
         self.errors = 0
         self.open: tuple[Path, ...] = ()
@@ -212,8 +213,8 @@ class Findings:
         self.append(Problem("error", self.file, f"line {first} and on", open_summary(paths), remedy))
         self.open = tuple(paths)
 
-    def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note a problem of the key at `path`."""
+    def error(self, path: Path, what: str, cure: str, run: str | None = None, severity: Severity = "error") -> None:
+        """Note an error, or something less severe, of the key at `path`."""
         if any(place[: len(path)] == path for place in self.open):
             self.errors += severity == "error"
             return
@@ -229,10 +230,6 @@ class Findings:
         self.errors += problem.severity == "error"
         if len(self.problems) < _MAX_FINDINGS and problem not in self.problems:
             self.problems.append(problem)
-
-    def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note an error of the key at `path`."""
-        self.add("error", path, what, cure, run)
 
 
 class Table:

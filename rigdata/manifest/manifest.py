@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.channels import TextFile, channels_by_run, read_channels
+from rigdata.manifest.channels import channels_by_run, read_channels
 from rigdata.manifest.fields import (
     ACQUISITION,
     CSV,
@@ -20,6 +20,7 @@ from rigdata.manifest.fields import (
     TOP,
     Findings,
     Table,
+    TextFile,
     key_lines,
     open_paths,
 )
@@ -64,8 +65,9 @@ class RunEntry:
     temperature: float | None = None
 
 
-def _read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:
-    """Read every run; what is wrong is noted in `findings`, and that run left out."""
+def _read_runs(top: Table) -> tuple[RunEntry, ...]:
+    """Read every run; what is wrong is noted, and that run left out."""
+    data, findings = top.data.get("runs"), top.findings
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
         return ()
@@ -171,7 +173,7 @@ class Manifest(Description):
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
     """Read and check the text of a manifest."""
     data = _load_toml(text, file)
-    findings = Findings(file, key_lines(text))
+    findings = Findings(file, key_lines(text), files)
     findings.note_open(open_paths(data))
     top = Table(data, (), findings)
     header = top.read(TOP, "the manifest")
@@ -179,9 +181,9 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         message = f"schema is {header['schema']!r}, not {_SCHEMA!r}"
         findings.error(("schema",), message, "Export in the format tpjb-rig/1")
     tables = top.subtable("channels")
-    channels = read_channels(tables, findings, files)
-    runs = _read_runs(data.get("runs"), findings)
-    described = channels_by_run(tables, channels, [run.id for run in runs], files)
+    channels = read_channels(tables)
+    runs = _read_runs(top)
+    described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
     housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
     acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")

@@ -199,7 +199,11 @@ class _Folder:
         for run in self._of_kind("clearance"):
             probes, forces = _pair(run, pair), _pair(run, cells.names)
             if probes and forces:
-                readings, pushes = (_around_middle(part_means(channels, _SWEPT)) for channels in (probes, forces))
+                around = []
+                for channels in (probes, forces):
+                    means = part_means(channels, _SWEPT)
+                    around.append(means - 0.5 * (means.max(axis=0) + means.min(axis=0)))
+                readings, pushes = around
                 return fitted_frame(pair, readings, cells.direction(pushes), "the clearance sweep", _CORNERS)
         return None
 
@@ -279,11 +283,6 @@ def _change(series: Sequence[Series]) -> FloatArray:
     """Difference of two channels (2,) between the last and the first tenth of a record."""
     tenths = part_means(series)
     return np.asarray(tenths[-1] - tenths[0])
-
-
-def _around_middle(readings: FloatArray) -> FloatArray:
-    """Readings (n, 2) from the middle of what they run around."""
-    return readings - 0.5 * (readings.max(axis=0) + readings.min(axis=0))
 
 
 def _with_load(run: RunGuess, load: float) -> RunGuess:

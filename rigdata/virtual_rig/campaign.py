@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
+from functools import cache
 from math import ceil, isfinite, log10
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,8 @@ def write_campaign(
     if os.path.lexists(target):
         raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
     _check_faults(rig, chosen)
-    rig = replace(rig, truth=rig.truth.remembered())
+    laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
+    rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
     runs = rig.runs()
     header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
     manifest = manifest_text(header, rig.instruments, runs, chosen, rig.faults)

@@ -100,14 +100,6 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
     return tuple(glitches)
 
 
-def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:
-    """Put bursts into the readings, in place."""
-    for glitch in glitches:
-        sensor = instruments.named(glitch.channel)
-        burst = slice(glitch.first, glitch.first + glitch.count)
-        columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
-
-
 def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArray:
     """Reading after the converter: limited to its span and rounded to its steps."""
     if bits is None:
@@ -311,7 +303,10 @@ class VirtualRig:
         glitches: tuple[Glitch, ...] = ()
         if run.kind in ("dynamic", "locus"):
             glitches = draw_glitches(instruments, self.noise, len(motion.time), self.seed, run.id)
-        add_glitches(columns, instruments, glitches)
+        for glitch in glitches:
+            sensor = instruments.named(glitch.channel)
+            burst = slice(glitch.first, glitch.first + glitch.count)
+            columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
         columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
         readings = Readings(motion.time, columns, run.rate)
         if faults:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from math import pi
 from typing import Any
 
@@ -72,11 +71,6 @@ class RigTruth:
             bearing_text='schema = "tpjb-bearing/1"\nname = "linear test bearing"\n',
         )
         return replace(base, **fields)
-
-    def remembered(self) -> RigTruth:
-        """Return the same truth, which asks each callable only once per point: for the length of one campaign."""
-        stiffness, position, temperature = cache(self.stiffness), cache(self.position), cache(self.temperature)
-        return replace(self, stiffness=stiffness, position=position, temperature=temperature)
 
     def h(self, point: OperatingPoint) -> ComplexArray:
         """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
