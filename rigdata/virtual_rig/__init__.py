@@ -20,7 +20,6 @@ from rigdata.virtual_rig.plan import (
     ClearanceSweep,
     DryTest,
     RigPlan,
-    Timing,
     locus_points,
     operating_points,
 )
@@ -44,7 +43,6 @@ __all__ = [
     "Sensor",
     "SensorError",
     "SimulatedRun",
-    "Timing",
     "VirtualRig",
     "VirtualRigError",
     "locus_points",

@@ -17,7 +17,6 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Timing,
     VirtualRig,
     VirtualRigError,
     operating_points,
@@ -36,7 +35,7 @@ def rig(*faults: Fault, noise: Noise | None = None, seconds: float = 2.0) -> Vir
         dynamic=operating_points([(5000.0, 25.0)]),
         directions=(0.3, 1.5),
         dry=(DryTest(2, levels=(500.0,)),),
-        timing=Timing(dynamic_seconds=seconds),
+        dynamic_seconds=seconds,
     )
     return VirtualRig(
         RigTruth.constant(K, C), plan, Instruments.like_paper(), noise or Noise.like_samples(), faults, seed=6

@@ -14,7 +14,6 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Timing,
     VirtualRig,
     locus_points,
     operating_points,
@@ -24,11 +23,12 @@ from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 
 TRUTH = RigTruth.constant(K, C)
-LONG = Timing(locus_seconds=20.0)
 
 
 def rig(noise: Noise, **changes) -> VirtualRig:
-    plan = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=(0.5,), locus=locus_points(1), timing=LONG)
+    plan = RigPlan(
+        dynamic=operating_points([(5000.0, 25.0)]), directions=(0.5,), locus=locus_points(1), locus_seconds=20.0
+    )
     return VirtualRig(TRUTH, replace(plan, **changes), Instruments.like_paper(), noise, seed=11)
 
 
@@ -148,7 +148,7 @@ def test_actuator_harmonics_and_cross_talk():
     assert amplitude(force, 50.0) == pytest.approx(500.0 * 0.02 * np.cos(0.5), rel=1e-6)
     noise = replace(Noise.none(), actuator_scatter=0.03, cross_talk=0.05)
     directions = tuple(np.linspace(0.0, 3.1, 200))
-    talk = rig(noise, directions=directions, timing=Timing(dynamic_seconds=0.01))
+    talk = rig(noise, directions=directions, dynamic_seconds=0.01)
     along, across = [], []
     for run in talk.runs()[:200]:
         oil_force = talk.simulate(run.id).motion.lines[0].oil_force / 500.0
@@ -162,7 +162,7 @@ def test_actuator_harmonics_and_cross_talk():
 
 def test_set_points_are_missed_by_as_much_as_stated():
     noise = replace(Noise.none(), load_miss=0.003, direction_miss=0.0035, speed_miss=0.001)
-    plan = replace(RigPlan(locus=locus_points(300)), timing=Timing(locus_seconds=0.02))
+    plan = replace(RigPlan(locus=locus_points(300)), locus_seconds=0.02)
     many = VirtualRig(TRUTH, plan, Instruments.like_paper(), noise, seed=2)
     facts = [many.simulate(run.id).motion.facts for run in many.runs()]
     assert np.std([f["static_load_N"] / 5000 for f in facts]) == pytest.approx(0.003, rel=0.15)

@@ -19,7 +19,6 @@ from rigdata.virtual_rig import (
     RigPlan,
     RigTruth,
     Sensor,
-    Timing,
     VirtualRig,
     locus_points,
     operating_points,
@@ -39,7 +38,8 @@ def small_plan() -> RigPlan:
         locus=locus_points(3),
         dry=(DryTest(1, levels=(500.0, 1500.0)), DryTest(3, levels=(500.0,), branch="cycle")),
         clearance=(ClearanceSweep(seconds=2.0),),
-        timing=Timing(dynamic_seconds=1.0, locus_seconds=0.5),
+        dynamic_seconds=1.0,
+        locus_seconds=0.5,
     )
 
 

@@ -33,7 +33,7 @@ FREQUENCIES = (10.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 55.0)
 
 
 def _rig(points: int) -> Any:
-    from rigdata.virtual_rig import RigPlan, Timing, operating_points
+    from rigdata.virtual_rig import RigPlan, operating_points
     from tests.good_campaigns import directions, rocker_rig
 
     loads = np.linspace(2000.0, 9000.0, math.ceil(points / len(FREQUENCIES)))
@@ -46,7 +46,7 @@ def _rig(points: int) -> Any:
             locus=(),
             dry=(),
             clearance=(),
-            timing=Timing(dynamic_seconds=1.0),
+            dynamic_seconds=1.0,
         ),
     )
 

@@ -32,7 +32,7 @@ from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
-from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, Timing
+from rigdata.virtual_rig.plan import ClearanceSweep, DryTest
 from tests.studies.diagnosis import mixtures, strangers
 from tests.studies.diagnosis.mixtures import BEARINGS, KINDS, OUTSIDE, Bench, Drawn, bench, hidden, said
 from tests.studies.diagnosis.tables import tables
@@ -93,7 +93,7 @@ def plan_of(layout: Layout) -> RigPlan:
         locus=tuple(OperatingPoint(test.load, test.direction, test.speed) for test in layout.locus),
         dry=tuple(DryTest(test.pad, levels, start=0.5 * levels[0]) for test in layout.dry),
         clearance=(ClearanceSweep(layout.push_load),) if layout.push_load else (),
-        timing=Timing(dynamic_rate=max(1000.0, 12.0 * fastest)),
+        dynamic_rate=max(1000.0, 12.0 * fastest),
     )
 
 
