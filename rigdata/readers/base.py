@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -183,16 +183,9 @@ class RunReader(RecordFile):
         readings[np.abs(time - within) > 1.0 / grid.rate] = np.nan
         return readings
 
-    def _planned(
-        self,
-        timings: Mapping[str, Grid],
-        run_rate: float | None,
-        first_time: Callable[[str], float],
-        member: str,
-        remedy: str,
-    ) -> Layout:
+    def _planned(self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str) -> Layout:
         """Put together what is sampled together; what has no usable times is a fault of that channel."""
-        grids, texts = planned(timings, self.channels, run_rate, first_time)
+        grids, texts = planned(timings, self.channels, run_rate)
         return Layout(grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()})
 
     def unit_problems(self, units: Mapping[str, str]) -> list[Problem]:

@@ -162,9 +162,10 @@ class FileReader(RunReader):
                 rate = rate_of_time(times[clock])
                 rate = rate if rate > 0 else self.stated_rate or rate
                 label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
-                timings[channel.name] = Grid(len(channel), clock, rate, label)
+                begin = float(times[clock][0]) if len(channel) else 0.0
+                timings[channel.name] = Grid(len(channel), clock, rate, label, begin)
         remedy = "Export it with its times, or correct sample_rate"
-        layout = self._planned(timings, self.stated_rate, lambda clock: float(times[clock][0]), "channel", remedy)
+        layout = self._planned(timings, self.stated_rate, "channel", remedy)
         faults |= layout.faults
         if not layout.grids:
             raise RigDataError([problem for error in faults.values() for problem in error.problems])

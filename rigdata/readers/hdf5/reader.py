@@ -216,9 +216,12 @@ class Hdf5Reader(RunReader):
         names = [name for name in self.channels if name in lengths]
         clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
         rates: dict[str, float] = {}
+        begins: dict[str, float] = {}
         run_rate = attribute or self.stated_rate
         for clock in [names[i] for i in clocks]:
-            rate = rate_of_time(self._seconds(group, clock, 0, min(lengths[clock], _LOOK)))
+            time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
+            rate = rate_of_time(time)
+            begins[clock] = float(time[0]) if len(time) else 0.0
             rates[clock] = rate if rate > 0 else run_rate or rate
             if attribute is not None and not self.channels[clock].clock:
                 rates[clock] = attribute
@@ -229,13 +232,11 @@ class Hdf5Reader(RunReader):
                 continue
             if same:
                 clock = names[i] if names[i] in same else same[0]
-                timings[name] = Grid(lengths[name], clock, rates[clock], clock)
+                timings[name] = Grid(lengths[name], clock, rates[clock], clock, begins[clock])
             else:
                 timings[name] = Grid(lengths[name], times=lengths[names[i]])
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        layout = self._planned(
-            timings, run_rate, lambda clock: float(self._seconds(group, clock, 0, 1)[0]), "dataset", remedy
-        )
+        layout = self._planned(timings, run_rate, "dataset", remedy)
         unserved = Grid(max(lengths.values()), "", run_rate or float("nan"))
         return _Members(layout.grids or (unserved,), layout.faults, members)
 
