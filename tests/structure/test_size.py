@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (137.47, 16_463),
     "model": (91.86, 12_029),
-    "rigdata": (69.15, 9_258),
+    "rigdata": (68.95, 9_236),
     "diagnosis": (39.0, 4_824),
     "cli": (29.4, 4_095),
     "report": (27.28, 3_482),
