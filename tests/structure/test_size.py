@@ -18,10 +18,10 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (137.47, 16_463),
+    "measurement": (137.67, 16_483),  # the springs under the housing, which the diagnosis read from the records again
     "model": (91.86, 12_029),
     "rigdata": (68.95, 9_236),
-    "diagnosis": (39.0, 4_824),
+    "diagnosis": (38.48, 4_770),
     "cli": (29.4, 4_095),
     "report": (27.28, 3_482),
     "pivot": (18.54, 2_542),

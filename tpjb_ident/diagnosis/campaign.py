@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from model.effects import Effect, apply_effects
 from model.instruments import Instruments
 from model.mirror import as_it_turns, rotation_of
 from model.pivots import NAMED_LAWS, pivot_laws
 from model.setup import Setup
-from rigdata.manifest.fields import MAINS_FREQUENCIES
 from tpjb_ident.compare.comparison import ComparisonError
 from tpjb_ident.compare.predictions import measured_laws
 from tpjb_ident.compare.static_tests import measure_static
@@ -22,13 +19,9 @@ from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose,
 from tpjb_ident.diagnosis.forward.forward import SENSOR
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.observe import observe, observe_table
-from tpjb_ident.dynamic.broadband.run_spectra import SpectraSettings, run_spectra
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.identify import identify
-from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.run_phasors import run_phasors
-from tpjb_ident.phasors.windows import RecordTooShortError
 from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
@@ -39,7 +32,6 @@ if TYPE_CHECKING:
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
-    from rigdata.run import Run
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
@@ -186,12 +178,12 @@ def measure_campaign(
     static = (ahead() if ahead is not None else None) or measure_static(campaign, bearing)
     curves, polygon, locus = static.curves, static.clearance, static.locus
     identification = replace(identification, conditions=identification.conditions + static.left_out)
-    housing = _with_housing(Setup(bearing, pivot_laws("rigid", bearing)), campaign).instruments
+    instruments = _instruments(campaign, identification)
     certain = _stated_tolerances(campaign, bearing, known or Tolerances())
     if polygon is None and locus is not None:
         certain = replace(certain, centre=unknown_centre(locus))
     return Measured(
-        identification, tuple(curves), polygon, locus, housing, certain, _sensor_positions(campaign, bearing)
+        identification, tuple(curves), polygon, locus, instruments, certain, _sensor_positions(campaign, bearing)
     )
 
 
@@ -242,60 +234,14 @@ def _sensor_positions(campaign: Campaign, bearing: Bearing) -> tuple[float, ...]
     return tuple(table.get(k, SENSOR) for k in range(1, len(bearing.pads) + 1))
 
 
-#: Runs that are looked at: those of the highest frequencies, where the housing shakes most.
-_RUNS = 8
-#: Beyond, the housing does not move as far as accelerometers can tell [N/m].
-_STIFF = 1e13
-
-
-def _with_housing(setup: Setup, campaign: Campaign) -> Setup:
-    """Tell a model the rig's housing mass and cell stiffness; what the campaign does not show stays as assumed."""
-    instruments = setup.instruments
+def _instruments(campaign: Campaign, identification: Identification) -> Instruments:
+    """The rig's housing mass, cell stiffness and probe axes; what the campaign does not show stays as assumed."""
+    instruments = Instruments()
     axes = [float(c.axis) for c in campaign.channels.values() if c.quantity == "displacement" and c.axis is not None]
     if len(axes) == 2 and abs(math.sin(axes[0] - axes[1])) > 0.05:
         instruments = replace(instruments, probe_axes=(axes[0], axes[1]))
     if math.isfinite(campaign.housing_mass):
         instruments = replace(instruments, housing_mass=campaign.housing_mass)
-    stiffness = cell_stiffness(campaign)
-    if stiffness is not None:
-        instruments = replace(instruments, cell_stiffness=stiffness)
-    return setup.change(instruments=instruments)
-
-
-def cell_stiffness(campaign: Campaign) -> tuple[float, float] | None:
-    """Estimate the stiffness between housing and frame in X and Y [N/m].
-
-    Accelerations are regressed on cell forces, -a / omega^2 = F / K, run by run; the median over runs counts.
-    """
-    runs = sorted(campaign.of_kind("dynamic"), key=lambda run: -run.point.excitation)[:_RUNS]
-    if not any(c.quantity == "acceleration" for c in campaign.channels.values()):
-        return None
-    mass = campaign.housing_mass if math.isfinite(campaign.housing_mass) else 0.0
-    rows = []
-    for run in runs:
-        try:
-            band = None if run.excitation_kind == "sine" else run.band
-            phasors = run_phasors(run, mass) if band is None else _over_band(run, band, mass, campaign.mains)
-        except RecordTooShortError:
-            continue
-        if phasors.acceleration is None:
-            continue
-        lines = len(phasors.lines.excitation)
-        omega = 2 * np.pi * np.array([line.frequency for line in phasors.lines.excitation])
-        force, acceleration = phasors.cell_force.phasors[:, :lines], phasors.acceleration.phasors[:, :lines]
-        power = np.sum(np.abs(force) ** 2, axis=(0, 1))
-        slope = np.sum((np.conj(force) * -acceleration / omega[:, None] ** 2).real, axis=(0, 1))
-        # an axis that the run does not excite says nothing
-        rows.append(np.where(power > 0.05 * power.max(), slope / np.maximum(power, 1e-300), np.nan))
-    if not rows:
-        return None
-    table = np.array(rows)
-    if np.any(np.all(np.isnan(table), axis=0)):
-        return None
-    x, y = (float(v) for v in np.nanmedian(table, axis=0))
-    return tuple(1.0 / max(c, 1.0 / _STIFF) for c in (x, y))  # type: ignore[return-value]
-
-
-def _over_band(run: Run, band: tuple[float, float], housing_mass: float, mains: float | None) -> RunPhasors:
-    """Phasors of a run that is excited over a band; `cell_stiffness` needs them at no common bins."""
-    return run_spectra(run, housing_mass, SpectraSettings(band, None, mains or MAINS_FREQUENCIES[0], {})).phasors
+    if identification.cell_stiffness is not None:
+        instruments = replace(instruments, cell_stiffness=identification.cell_stiffness)
+    return instruments

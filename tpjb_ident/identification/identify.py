@@ -106,7 +106,8 @@ def _with_zero_uncertainty(identification: Identification, campaign: Campaign) -
 def _with_bands(result: Identification, bands: IdentifiedBands) -> Identification:
     """The points of sines and those of bands together, sorted as ever."""
     points = [*result.points, *(p for band in bands.results for p in band.points)]
-    joint = SharedChanges(result.calibration_changes, result.calibration_names).beside(bands.shared)
+    sines = SharedChanges(result.calibration_changes, result.calibration_names, result.cell_stiffness)
+    joint = sines.beside(bands.shared)
     changes = joint.changes.reshape(len(joint.changes), len(points), 8)
     order = sorted(range(len(points)), key=lambda i: points[i].point)
     table = {c.sentence(): c for c in (*result.conditions, *bands.conditions)}
@@ -117,6 +118,7 @@ def _with_bands(result: Identification, bands: IdentifiedBands) -> Identificatio
         conditions=tuple(table.values()),
         bands=bands.results,
         calibration_names=joint.names,
+        cell_stiffness=joint.cell_stiffness,
     )
 
 
@@ -161,4 +163,6 @@ def assemble(
     named = with_probe_doubts(checked.swept, named_at_points(points, excluded, several), settings.clearance)
     shared = shared_changes(solved.solution, range(len(sources)))
     remarks = unstated(campaign) + conditions
-    return Identification(campaign.id, settings.method, named, shared.changes, remarks, calibration_names=shared.names)
+    return Identification(
+        campaign.id, settings.method, named, shared.changes, remarks, (), shared.names, shared.cell_stiffness
+    )

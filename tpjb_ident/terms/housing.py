@@ -139,6 +139,13 @@ class Housing(Term):
             return (Condition("accelerometers-doubtful", text),)
         return _out_of_step(loss, error[3], "cells", self._omega)
 
+    def springs(self, fitted: Fitted) -> tuple[float, float] | None:
+        """Stiffness under the housing along X and Y [N/m]; None where no accelerometer shows it."""
+        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+            return None
+        x, y = (1 / (_NANOMETRE * max(float(c), _STIFFEST)) for c in fitted.value[:2])
+        return x, y
+
     def lag_of_cells(self, fitted: Fitted) -> float:
         """By how much the cells come late [s]: a spring's loss is positive, late cells make it negative."""
         if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:

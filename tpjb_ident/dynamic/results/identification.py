@@ -47,6 +47,8 @@ class Identification(Presented):
         Of runs that were excited over a band.
     calibration_names : tuple of str
         Source of each row of `calibration_changes`, term and parameter; empty where rows have no name.
+    cell_stiffness : (float, float) or None
+        Of what the housing stands on along X and Y, as its accelerometers show it [N/m]; None where they do not.
 
     Examples
     --------
@@ -62,6 +64,7 @@ class Identification(Presented):
     conditions: tuple[Condition, ...] = ()
     bands: tuple[BandResult, ...] = ()
     calibration_names: tuple[str, ...] = field(default=(), repr=False)
+    cell_stiffness: tuple[float, float] | None = field(default=None, repr=False)
 
     @property
     def systematic(self) -> FloatArray:
