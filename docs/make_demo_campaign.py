@@ -54,7 +54,7 @@ def main() -> None:
     )
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "demo.h5"
-        truth = write_campaign(raw, rig).to_dict()
+        truth = write_campaign(raw, rig)
         repack(raw, SAMPLES / "demo.h5")
     kept = {key: value for key, value in truth.items() if key != "runs"}
     kept["pivot_note"] = f"pad 1..5: deflection = Kirk-Reedy deflection / {list(FACTORS)}"

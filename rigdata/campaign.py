@@ -9,12 +9,12 @@ import os
 import stat
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.manifest import MAX_MANIFEST, Manifest, RunEntry, parse_manifest
+from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunEntry, parse_manifest
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.readers.base import TEXT, RunReader
@@ -26,8 +26,8 @@ _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 _MAX_BEARING = 2**20
 
 
-@dataclass(frozen=True)
-class Campaign:
+@dataclass(frozen=True, kw_only=True)
+class Campaign(Description):
     """A test series: what was measured on one bearing, and how.
 
     Attributes
@@ -65,22 +65,10 @@ class Campaign:
     campaign demo: 58 runs (42 dynamic, 10 locus, 5 dry_pivot, 1 clearance), 12 channels
     """
 
-    id: str
-    description: str
     path: Path
-    bearing_name: str
     bearing_text: str = field(repr=False)
-    housing_mass: float
-    channels: Mapping[str, Channel] = field(repr=False)
     runs: tuple[Run, ...] = field(repr=False)
-    notes: tuple[Problem, ...] = field(repr=False, default=())
-    files: Mapping[str, Path] = field(repr=False, default_factory=dict)
-    mass_uncertainty: float = 0.0
-    mains: float | None = None
-    rotation: str = "counter-clockwise"
-    mount: str | None = None
-    date: str = ""
-    by: str = ""
+    files: Mapping[str, Path] = field(repr=False)
 
     def __str__(self) -> str:
         counts = Counter(run.kind for run in self.runs)
@@ -267,20 +255,15 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
 
 def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]) -> str:
     try:
-        path = inside(folder, manifest.bearing, file, "bearing")
-    except RigDataError as error:
-        problems.extend(error.problems)
-        return ""
-    if not os.path.isfile(path):
-        message = f"the bearing file {manifest.bearing!r} is not in the folder"
+        path = inside(folder, manifest.bearing_name, file, "bearing")
+        if os.path.isfile(path):
+            files[manifest.bearing_name] = path
+            return _read_text(path, manifest.bearing_name, _MAX_BEARING)
+        message = f"the bearing file {manifest.bearing_name!r} is not in the folder"
         problems.append(Problem("warning", file, "bearing", message, "Add it, or give --bearing where one is needed"))
-        return ""
-    files[manifest.bearing] = path
-    try:
-        return _read_text(path, manifest.bearing, _MAX_BEARING)
     except RigDataError as error:
         problems.extend(error.problems)
-        return ""
+    return ""
 
 
 def _load_hdf5(path: Path) -> Campaign:
@@ -324,9 +307,9 @@ def _assembled(
     channels = _used(manifest.channels)
     runs = []
     for entry in manifest.runs:
-        described = manifest.described.get(entry.id)
+        own = manifest.described.get(entry.id)
         try:
-            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate, described or manifest.channels)
+            reader = reader_of(entry, entry.sample_rate or manifest.sample_rate, own or manifest.channels)
         except RigDataError as error:
             problems.extend(error.problems)
             continue
@@ -337,7 +320,7 @@ def _assembled(
             excitation_direction=entry.excitation_direction,
             pad=entry.pad,
             branch=entry.branch,
-            channels=channels if described is None else _used(described),
+            channels=channels if own is None else _used(own),
             stated=entry.stated,
             reader=reader,
             excitation_kind=entry.excitation,
@@ -347,22 +330,9 @@ def _assembled(
         runs.append(run)
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
-    return Campaign(
-        id=manifest.id,
-        description=manifest.description,
-        bearing_name=manifest.bearing,
-        housing_mass=manifest.housing_mass,
-        channels=channels,
-        runs=tuple(runs),
-        notes=(*manifest.notes, *problems),
-        mass_uncertainty=manifest.mass_uncertainty,
-        mains=manifest.mains,
-        rotation=manifest.rotation,
-        mount=manifest.mount,
-        date=manifest.date,
-        by=manifest.by,
-        **source,
-    )
+    described = {item.name: getattr(manifest, item.name) for item in fields(Description)}
+    described |= {"channels": channels, "notes": (*manifest.notes, *problems)}
+    return Campaign(**described, runs=tuple(runs), **source)
 
 
 def _used(channels: Mapping[str, Channel]) -> dict[str, Channel]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from rigdata.calibration import Channel
@@ -51,16 +51,13 @@ class Grid:
     clock: str = ""  #: names the times; "" where they are counted, or there are none
     rate: float = float("nan")  #: of the times [Hz]
     label: str = ""
-    begin: float = 0.0  #: of counted times [s]
+    begin: float = 0.0  #: first time [s]; NaN where it is missing
     times: int | None = None  #: of a time column that should serve it but has not its length
     channels: list[str] = field(default_factory=list)
 
 
 def planned(
-    timings: Mapping[str, Grid],
-    channels: Mapping[str, Channel],
-    run_rate: float | None,
-    first_time: Callable[[str], float],
+    timings: Mapping[str, Grid], channels: Mapping[str, Channel], run_rate: float | None
 ) -> tuple[tuple[Grid, ...], dict[str, str]]:
     """What is sampled together, the run's own device first; and why a channel has no usable times.
 
@@ -95,7 +92,7 @@ def planned(
             grids.setdefault((usual, ""), Grid(usual, "", run_rate or float("nan"))).channels.append(name)
     for name, rate in rates.items():
         if rate:
-            faults[name] = _add_stated(grids, channels, name, untimed[name].length, rate, first_time)
+            faults[name] = _add_stated(grids, channels, name, untimed[name].length, rate)
     return tuple(_own_first(grids.values(), channels)), {name: text for name, text in faults.items() if text}
 
 
@@ -105,7 +102,6 @@ def _add_stated(
     name: str,
     length: int,
     rate: float,
-    first_time: Callable[[str], float],
 ) -> str:
     """Put a channel of a stated rate where it belongs; or say what is wrong with that rate."""
     for grid in grids.values():
@@ -118,9 +114,7 @@ def _add_stated(
         expected = rate * first.length / first.rate
         if abs(length - expected) > 1.0 + RATE_MISS * expected:
             return f"has {length} samples; at its sample_rate of {rate:.6g} Hz the run holds {expected:.0f}"
-        if first.length and first.clock:
-            begin = first_time(first.clock)
-        begin = begin if math.isfinite(begin) else first.begin
+        begin = first.begin if math.isfinite(first.begin) else 0.0
     grids[length, rate] = Grid(length, "", rate, f"{rate:.6g} Hz", begin, channels=[name])
     return ""
 

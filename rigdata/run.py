@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
 from rigdata.readers.base import LEAST_RATE, MOST_RATE, RunReader
 from rigdata.record import Record, VectorRecord
-from rigdata.vector import COLLINEAR_SINE, vector_rows
+from rigdata.vector import inverse_directions, vector_rows
 
 
 @dataclass(frozen=True)
@@ -87,16 +87,11 @@ class Run:
     @property
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together; the run's own device, that of the first displacement channel, first."""
-        devices = getattr(self.reader, "devices", None)
-        if devices is not None:
-            return tuple(devices())
-        names = tuple(name for name, channel in self.channels.items() if channel.quantity != "time")
-        return (Device("", names, self.sample_rate, self.length, False),)
+        return self.reader.devices()
 
-    def _apart(self, names: Iterable[str]) -> bool:
+    def _apart(self, names: Sequence[str]) -> bool:
         """Whether channels are sampled apart from the run's own device; refused where only some of them are."""
-        names = tuple(names)
-        apart: frozenset[str] = getattr(self.reader, "apart", frozenset)()
+        apart = self.reader.apart()
         if not apart.intersection(names):
             return False
         devices = {name: device for device in self.devices for name in device.channels}
@@ -265,7 +260,7 @@ class Run:
         >>> ti.load_campaign(demo).run("d-05000-25-01").vector("displacement", 0, 100).values.shape
         (100, 2)
         """
-        channels = self._vector_channels(quantity)
+        channels = self.vector_channels(quantity)
         names = tuple(c.name for c in channels)
         readings, time, rate = self._stretch(names, start, stop)
         rows = vector_rows(channels, readings)
@@ -277,15 +272,18 @@ class Run:
             names=names,
         )
 
-    def _vector_channels(self, quantity: str) -> list[Channel]:
-        """Channels that X and Y of a quantity come from."""
-        chosen = [c for c in self.channels.values() if c.quantity == quantity and c.axis is not None]
+    def of(self, quantity: str) -> list[Channel]:
+        """Channels that measure a quantity."""
+        return [channel for channel in self.channels.values() if channel.quantity == quantity]
+
+    def vector_channels(self, quantity: str) -> list[Channel]:
+        """Channels that X and Y of a quantity come from; refused where they do not span the plane."""
+        chosen = [c for c in self.of(quantity) if c.axis is not None]
         if len(chosen) < 2:
             fault = f"has {len(chosen)} channels, two are needed"
             remedy = f"Describe two {quantity} channels with different axes in the manifest"
             raise self._refuse(f"quantity {quantity}", fault, remedy)
-        axes = np.array([c.axis for c in chosen])
-        if not np.any(np.abs(np.sin(axes - axes[0])) > COLLINEAR_SINE):
+        if np.isnan(inverse_directions(tuple(c.axis or 0.0 for c in chosen))).any():
             names = ", ".join(c.name for c in chosen)
             remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
             raise self._refuse(f"channels {names}", "all measure along one line", remedy)
@@ -293,8 +291,7 @@ class Run:
 
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open while the block runs, where its reader can do that; nested blocks share it."""
-        opener = getattr(self.reader, "opened", None)
-        return nullcontext() if opener is None else opener()
+        return self.reader.opened()
 
     def mean_temperature(self) -> float | None:
         """Temperature of the run [K]: as stated, else the mean of its thermometers; None where there is neither."""
@@ -309,8 +306,7 @@ class Run:
 
     def temperatures(self) -> tuple[Channel, ...]:
         """Temperature channels of this run, by pad and position."""
-        thermometers = [c for c in self.channels.values() if c.quantity == "temperature"]
-        return tuple(sorted(thermometers, key=lambda c: (c.pad or 0, c.position or 0.0, c.name)))
+        return tuple(sorted(self.of("temperature"), key=lambda c: (c.pad or 0, c.position or 0.0, c.name)))
 
     def speed(self, start: int | None = None, stop: int | None = None) -> Record | None:
         """Read the shaft speed [rad/s], from pulses if need be; None where no channel measures it.
@@ -322,13 +318,12 @@ class Run:
         stop : int or None, optional
             Sample after the last; default the end.
         """
-        tachometers = [c.name for c in self.channels.values() if c.quantity == "speed"]
-        keyphasors = [c.name for c in self.channels.values() if c.quantity == "keyphasor"]
+        tachometers, keyphasors = self.of("speed"), self.of("keyphasor")
         if tachometers:
-            return self.record(tachometers[0], start, stop)
+            return self.record(tachometers[0].name, start, stop)
         if not keyphasors:
             return None
-        pulses = self.record(keyphasors[0], start, stop)
+        pulses = self.record(keyphasors[0].name, start, stop)
         return replace(pulses, quantity="speed", values=speed_from_pulses(pulses.values, pulses.time))
 
 

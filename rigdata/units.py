@@ -162,51 +162,44 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     plain = text.strip().translate(_SPELLINGS).replace("°C", "degC").replace("°F", "degF").replace("°", "deg")
     if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
         plain = "revolution/min" if "min" in plain else "revolution/s"
-    tokens = _tokens(plain, text)
-    unit, end = _product(tokens, 0, dimension, text)
-    if end != len(tokens):
+    product, sign, needs_name = Unit(1.0), 1, bool(plain)
+    outer: list[tuple[Unit, int]] = []  # products before the open parentheses, and their signs
+    for name, power, symbol, _ in _tokens(plain, text):
+        if needs_name and symbol in ("*", "/", ")"):
+            raise UnitError(f"unit {text!r} has {symbol!r} where a unit name should be")
+        if symbol in ("*", "/"):
+            sign, needs_name = (-1 if symbol == "/" else 1), True
+            continue
+        if symbol == "(":
+            if len(outer) == 2:
+                raise UnitError(f"unit {text!r} has too many parentheses")
+            outer.append((product, sign))
+            product, sign, needs_name = Unit(1.0), 1, True
+            continue
+        factor = _named(name, dimension) ** int(power or 1) if name else Unit(1.0)
+        if symbol == ")":
+            if not outer:
+                raise UnitError(f"unit {text!r} has an unmatched parenthesis")
+            factor = product
+            product, sign = outer.pop()
+        product, sign, needs_name = product * factor**sign, 1, False
+    if needs_name:
+        raise UnitError(f"unit {text!r} ends where a unit name should be")
+    if outer:
         raise UnitError(f"unit {text!r} has an unmatched parenthesis")
-    return unit
+    return product
 
 
-def _tokens(plain: str, text: str) -> list[tuple[str, str, str]]:
-    """Name, power and symbol of every piece; a plain 1 has none of them but the power."""
+def _tokens(plain: str, text: str) -> list[tuple[str, ...]]:
+    """Name, power and symbol of every piece; a plain 1 has none of them."""
     tokens, at = [], 0
     while at < len(plain):
         match = _TOKEN.match(plain, at)
-        if match is None or match.end() == at:
+        if match is None:
             raise UnitError(f"unit {text!r} cannot be read from {plain[at:].strip()!r} on")
-        tokens.append((match[1] or "", match[2] or "1", match[3] or ""))
+        tokens.append(match.groups(""))
         at = match.end()
     return tokens
-
-
-def _product(
-    tokens: list[tuple[str, str, str]], at: int, dimension: str, text: str, depth: int = 0
-) -> tuple[Unit, int]:
-    """Multiply and divide from left to right until the closing parenthesis."""
-    result, sign, waiting = Unit(1.0), 1, True
-    while at < len(tokens):
-        name, power, symbol = tokens[at]
-        if symbol == ")":
-            break
-        if symbol in {"*", "/"}:
-            if waiting:
-                raise UnitError(f"unit {text!r} has {symbol!r} where a unit name should be")
-            sign, waiting, at = (-1 if symbol == "/" else 1), True, at + 1
-            continue
-        if symbol == "(":
-            if depth == 2:
-                raise UnitError(f"unit {text!r} has too many parentheses")
-            factor, at = _product(tokens, at + 1, dimension, text, depth + 1)
-            if at == len(tokens):
-                raise UnitError(f"unit {text!r} has an unmatched parenthesis")
-        else:
-            factor = _named(name, dimension) ** int(power) if name else Unit(1.0)
-        result, sign, waiting, at = result * factor**sign, 1, False, at + 1
-    if waiting and tokens:
-        raise UnitError(f"unit {text!r} ends where a unit name should be")
-    return result, at
 
 
 def _named(name: str, dimension: str) -> Unit:
@@ -242,7 +235,7 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     if not isinstance(value, str):
         if dimension != "ratio":
             raise UnitError(f'{shown(value)} has no unit; write it with one, like "{shown(value)} {example}"')
-        return _to_float(value), ""
+        return _finite(value), ""
     if len(value) > LONGEST:
         raise UnitError(f"a text of {len(value)} characters is not a quantity")
     text = value.strip()
@@ -253,19 +246,16 @@ def split_quantity(value: object, dimension: str) -> tuple[float, str]:
     unit = text[match.end() :].strip()
     if not unit and dimension != "ratio":
         raise UnitError(f'{shown(value)} has no unit; write it with one, like "{match[0]} {example}"')
-    return _to_float(match[0]), unit
+    return _finite(match[0]), unit
 
 
-def _to_float(value: str | float) -> float:
+def _finite(value: str | float) -> float:
     try:
-        return _finite(float(value))
-    except OverflowError as error:  # a whole number of hundreds of digits
-        raise UnitError(f"{shown(value)} is not a finite number") from error
-
-
-def _finite(number: float) -> float:
+        number = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
     if not math.isfinite(number):
-        raise UnitError(f"{number} is not a finite number")
+        raise UnitError(f"{shown(value)} is not a finite number")
     return number
 
 

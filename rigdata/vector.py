@@ -12,9 +12,9 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 
 #: Two directions whose sine is not above this (3 deg) count as one.
-COLLINEAR_SINE = 0.05
+_COLLINEAR_SINE = 0.05
 #: The same limit as the smallest singular value of two directions, sqrt(1 - cos).
-_LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - COLLINEAR_SINE**2))
+_LEAST_SINGULAR = math.sqrt(1.0 - math.sqrt(1.0 - _COLLINEAR_SINE**2))
 
 
 def directions(axes: float | Sequence[float] | FloatArray) -> FloatArray:

@@ -38,7 +38,6 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Timing,
     VirtualRig,
     locus_points,
     operating_points,
@@ -69,7 +68,7 @@ PLAN = RigPlan(
     locus=locus_points(6),
     dry=tuple(DryTest(p, levels=(1000.0, 3000.0), hold=0.3) for p in range(1, 6)),
     clearance=(ClearanceSweep(seconds=6.0),),
-    timing=Timing(locus_seconds=1.0),
+    locus_seconds=1.0,
 )
 #: The dynamic run of `PLAN` that faults strike.
 RUN = "d-05000-25-03"
@@ -80,7 +79,7 @@ SMALL_PLAN = RigPlan(
     locus=locus_points(3, load=1000.0),
     dry=tuple(DryTest(p, levels=(500.0, 1000.0, 2000.0, 3000.0), hold=0.3) for p in range(1, 6)),
     clearance=(ClearanceSweep(seconds=6.0),),
-    timing=Timing(dynamic_seconds=1.0),
+    dynamic_seconds=1.0,
 )
 
 
@@ -144,7 +143,7 @@ def content_key(rig: VirtualRig, layout: Layout) -> str:
 
 def _probed(rig: VirtualRig) -> Iterator[OperatingPoint]:
     """Every planned point, and one a little off: a rig that misses its set points asks the laws there."""
-    for point in dict.fromkeys(run.point for run in rig.runs() if run.point is not None):
+    for point in dict.fromkeys(run.point for run in rig.runs() if run.test is None):
         yield point
         yield replace(
             point,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,8 +27,6 @@ from rigdata.units import UnitError, is_signal
 _FIELD = {field.key: field for field in CHANNEL}
 #: Entries that say where a sensor sits: a channel that is `like` another has its own.
 _PLACE = ("axis", "pad", "position", "plane", "for")
-#: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
-TextFile = Callable[[str, str], str]
 _MAX_CHANNELS = 4096
 
 
@@ -42,8 +40,9 @@ _MOST_PATTERNS = 1000
 _MOST_PLANES = 2
 
 
-def read_channels(table: Table, findings: Findings, files: TextFile | None = None) -> dict[str, Channel]:
-    """Read every channel; what is wrong is noted in `findings`, and that channel left out."""
+def read_channels(table: Table) -> dict[str, Channel]:
+    """Read every channel; what is wrong is noted, and that channel left out."""
+    findings = table.findings
     channels: dict[str, Channel] = {}
     if not table.data:
         findings.error(("channels",), "no channels are described", "Add a [channels.NAME] table per column")
@@ -56,7 +55,7 @@ def read_channels(table: Table, findings: Findings, files: TextFile | None = Non
         if "like" in entry.data and not _complete(entry, name, tables, channels):
             continue
         errors = findings.errors
-        channel = read_channel(name, entry, files)
+        channel = read_channel(name, entry)
         if channel is not None and findings.errors == errors:
             channels[name] = channel
     return {name: channels[name] for name in tables if name in channels}
@@ -77,7 +76,7 @@ def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str,
     return True
 
 
-def read_channel(name: str, table: Table, files: TextFile | None) -> Channel | None:
+def read_channel(name: str, table: Table) -> Channel | None:
     """One channel; None where anything is wrong, which is then noted."""
     heading = f"[channels.{name[:40]}]"
     if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
@@ -103,7 +102,7 @@ def read_channel(name: str, table: Table, files: TextFile | None) -> Channel | N
     else:
         gain, values["zero"] = _calibration(table, quantity, values["unit"])
     values["zero_uncertainty"] = _zero_uncertainty(table, quantity)
-    response = _response(table, values, files)
+    response = _response(table, values)
     if gain is None or values["zero"] is None:
         return None
     entries = {key: value for key, value in values.items() if key in Channel.__dataclass_fields__}
@@ -119,8 +118,9 @@ def _zero_uncertainty(table: Table, quantity: str) -> float:
     return 0.0
 
 
-def _response(table: Table, values: dict[str, Any], files: TextFile | None) -> ChannelResponse:
+def _response(table: Table, values: dict[str, Any]) -> ChannelResponse:
     """Filter and delay; what is wrong is noted and left out."""
+    findings = table.findings
     responses: list[Any] = []
     try:
         if values["filter"] is not None:
@@ -128,16 +128,16 @@ def _response(table: Table, values: dict[str, Any], files: TextFile | None) -> C
     except UnitError as error:
         table.error("filter", f"filter: {error}", "Or give filter_table, a measured response")
     file = values["filter_table"]
-    if file is not None and files is None:
+    if file is not None and findings.files is None:
         table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
-    elif file is not None and files is not None:
+    elif file is not None and findings.files is not None:
         try:
-            responses.append(parse_response_table(files(file, ".".join(str(p) for p in table.path))))
+            responses.append(parse_response_table(findings.files(file, ".".join(str(p) for p in table.path))))
         except UnitError as error:
             table.error("filter_table", f"{shown(file)}: {error}", "Give lines of frequency_Hz, gain, phase_deg")
         except RigDataError as error:
             for problem in error.problems:
-                table.findings.append(problem)
+                findings.append(problem)
     return ChannelResponse(tuple(responses), values["delay"])
 
 
@@ -168,16 +168,13 @@ def _note_unused(table: Table, unit: str) -> None:
         return
     for key in ("sensitivity", "full_scale", "excitation"):
         if key in table.data:
-            table.findings.add(
-                "warning",
-                (*table.path, key),
-                f"{key} is not used: readings in {unit} are already converted",
-                f"Delete {key}, or set unit to what the logger recorded",
-            )
+            text = f"{key} is not used: readings in {unit} are already converted"
+            remedy = f"Delete {key}, or set unit to what the logger recorded"
+            table.findings.error((*table.path, key), text, remedy, severity="warning")
 
 
 def channels_by_run(
-    table: Table, channels: Mapping[str, Channel], runs: Sequence[str], files: TextFile | None
+    table: Table, channels: Mapping[str, Channel], runs: Sequence[str]
 ) -> dict[str, Mapping[str, Channel]]:
     """Channels of the runs that describe one otherwise; what is wrong is noted."""
     findings = table.findings
@@ -192,7 +189,7 @@ def channels_by_run(
     for run, changes in entries.items():
         key = tuple(id(entry) for _, entry in changes)
         if key not in known:
-            known[key] = _changed(table, channels, changes, files)
+            known[key] = _changed(table, channels, changes)
             _check_together(known[key], findings)
         described[run] = known[key]
     return described
@@ -216,13 +213,9 @@ def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list
 def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[str]:
     """Runs that the patterns of an entry name; `budget` counts the patterns with a star."""
     patterns = entry.value(RUNS_OF)
-    if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) for p in patterns):
-        if patterns is not None:
-            entry.error("runs", f"runs is {shown(patterns)}, no list of texts", 'Write runs = ["p-*", "c-1"]')
-        return set()
     named: set[str] = set()
     known = set(runs)
-    for pattern in patterns:
+    for pattern in patterns or ():
         matches = {pattern} & known
         if "*" in pattern:
             if next(budget) > _MOST_PATTERNS:
@@ -237,7 +230,7 @@ def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[s
 
 
 def _changed(
-    table: Table, channels: Mapping[str, Channel], changes: Sequence[tuple[str, Table]], files: TextFile | None
+    table: Table, channels: Mapping[str, Channel], changes: Sequence[tuple[str, Table]]
 ) -> Mapping[str, Channel]:
     """All channels of a run, some with other entries: the last one counts, key by key."""
     merged: dict[str, Table] = {}
@@ -250,7 +243,7 @@ def _changed(
                 merged[name].origins[key] = (*entry.path, key)
     described = dict(channels)
     for name, entry in merged.items():
-        described[name] = read_channel(name, entry, files) or described[name]
+        described[name] = read_channel(name, entry) or described[name]
     return described
 
 

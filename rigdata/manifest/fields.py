@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,8 @@ _LONGEST = 1000
 _KEY = re.compile(r"\s*([A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')\s*=")
 _PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([^.\s]+)")
 Path = tuple[str | int, ...]
+#: Gives the text of a file of the campaign, by its name in the manifest; raises RigDataError.
+TextFile = Callable[[str, str], str]
 #: Frequencies of the mains in any country [Hz].
 MAINS_FREQUENCIES = (50.0, 60.0)
 _QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
@@ -31,7 +33,7 @@ _EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 _BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
-_RAW = ("table", "tables", "list", "sign", "calibration")
+_RAW = ("table", "tables", "sign", "calibration")
 #: Begins a value of `tpjb init` that only the person at the rig knows.
 MARK = "??"
 
@@ -41,7 +43,8 @@ class Field:
     """One key of a table: what it holds, what it means, and its default."""
 
     key: str
-    kind: str  #: a dimension of `rigdata.units`, "text", "choice" (of `known`), "whole" (number), or one of `_RAW`
+    #: A dimension of `rigdata.units`, "text", "choice", "whole" (number), "list" (of texts), or one of `_RAW`.
+    kind: str
     meaning: str
     example: str
     default: Any = None
@@ -100,7 +103,7 @@ ACQUISITION = (
 )
 CSV = (
     Field("delimiter", "text", 'one character, or "tab"', '";"'),
-    Field("decimal", "text", ". or ,", '","'),
+    Field("decimal", "text", ". or ,", '","', choices=(".", ",")),
     Field("encoding", "text", "of the text", '"cp1252"'),
     Field("header_line", "whole", "line of the column names, from 1", "7", low=1, high=1e7),
     Field("units_line", "whole", "line of the units", "8", low=1, high=1e7),
@@ -195,9 +198,8 @@ def nearest(name: str, choices: Collection[str]) -> str:
 class Findings:
     """The problems of one manifest, with their lines."""
 
-    def __init__(self, file: str, lines: dict[Path, int]) -> None:
-        self.file = file
-        self.lines = lines
+    def __init__(self, file: str, lines: dict[Path, int], files: TextFile | None = None) -> None:
+        self.file, self.lines, self.files = file, lines, files
         self.problems: list[Problem] = []
         self.errors = 0
         self.open: tuple[Path, ...] = ()
@@ -211,8 +213,8 @@ class Findings:
         self.append(Problem("error", self.file, f"line {first} and on", open_summary(paths), remedy))
         self.open = tuple(paths)
 
-    def add(self, severity: Severity, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note a problem of the key at `path`."""
+    def error(self, path: Path, what: str, cure: str, run: str | None = None, severity: Severity = "error") -> None:
+        """Note an error, or something less severe, of the key at `path`."""
         if any(place[: len(path)] == path for place in self.open):
             self.errors += severity == "error"
             return
@@ -228,10 +230,6 @@ class Findings:
         self.errors += problem.severity == "error"
         if len(self.problems) < _MAX_FINDINGS and problem not in self.problems:
             self.problems.append(problem)
-
-    def error(self, path: Path, what: str, cure: str, run: str | None = None) -> None:
-        """Note an error of the key at `path`."""
-        self.add("error", path, what, cure, run)
 
 
 class Table:
@@ -278,6 +276,8 @@ class Table:
             return value
         if field.kind == "whole":
             checked: Any = self._whole_number(field, value)
+        elif field.kind == "list":
+            checked = self._texts(field, value)
         elif field.kind in ("text", "choice"):
             checked = self._text(field, value, needed)
         else:
@@ -297,6 +297,14 @@ class Table:
             self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.choices))
         else:
             return value
+        return None
+
+    def _texts(self, field: Field, value: object) -> list[str] | None:
+        if isinstance(value, list) and value and all(isinstance(text, str) and text.strip() for text in value):
+            return value
+        self.error(
+            field.key, f"{field.key} is {shown(value)}, no list of texts", f"Write {field.key} = {field.example}"
+        )
         return None
 
     def _whole_number(self, field: Field, value: object) -> int | None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigdata.calibration import Channel
-from rigdata.manifest.channels import TextFile, channels_by_run, read_channels
+from rigdata.manifest.channels import channels_by_run, read_channels
 from rigdata.manifest.fields import (
     ACQUISITION,
     CSV,
@@ -20,6 +20,7 @@ from rigdata.manifest.fields import (
     TOP,
     Findings,
     Table,
+    TextFile,
     key_lines,
     open_paths,
 )
@@ -64,8 +65,9 @@ class RunEntry:
     temperature: float | None = None
 
 
-def _read_runs(data: object, findings: Findings) -> tuple[RunEntry, ...]:
-    """Read every run; what is wrong is noted in `findings`, and that run left out."""
+def _read_runs(top: Table) -> tuple[RunEntry, ...]:
+    """Read every run; what is wrong is noted, and that run left out."""
+    data, findings = top.data.get("runs"), top.findings
     if not isinstance(data, list) or not data:
         findings.error(("runs",), "no runs are listed", "Add a [[runs]] table per record")
         return ()
@@ -140,32 +142,38 @@ class CsvSpec:
     names: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Manifest:
-    """A checked manifest, SI."""
+@dataclass(frozen=True, kw_only=True)
+class Description:
+    """What a manifest says of the whole campaign, SI."""
 
     id: str
-    bearing: str
     description: str
+    bearing_name: str
     housing_mass: float
+    channels: Mapping[str, Channel] = field(repr=False)
+    notes: tuple[Problem, ...] = field(repr=False)
+    mass_uncertainty: float
+    mains: float | None
+    rotation: str
+    mount: str | None
+    date: str
+    by: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest(Description):
+    """A checked manifest, SI."""
+
     sample_rate: float | None
     csv: CsvSpec
-    channels: Mapping[str, Channel] = field(repr=False)
     runs: tuple[RunEntry, ...] = field(repr=False)
-    notes: tuple[Problem, ...] = ()
-    mass_uncertainty: float = 0.0
-    mains: float | None = None
-    rotation: str = "counter-clockwise"
-    mount: str | None = None
-    date: str = ""
-    by: str = ""
-    described: Mapping[str, Mapping[str, Channel]] = field(default_factory=dict, repr=False)  #: by run, if other
+    described: Mapping[str, Mapping[str, Channel]] = field(repr=False)  #: by run, if other
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:
     """Read and check the text of a manifest."""
     data = _load_toml(text, file)
-    findings = Findings(file, key_lines(text))
+    findings = Findings(file, key_lines(text), files)
     findings.note_open(open_paths(data))
     top = Table(data, (), findings)
     header = top.read(TOP, "the manifest")
@@ -173,9 +181,9 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         message = f"schema is {header['schema']!r}, not {_SCHEMA!r}"
         findings.error(("schema",), message, "Export in the format tpjb-rig/1")
     tables = top.subtable("channels")
-    channels = read_channels(tables, findings, files)
-    runs = _read_runs(data.get("runs"), findings)
-    described = channels_by_run(tables, channels, [run.id for run in runs], files)
+    channels = read_channels(tables)
+    runs = _read_runs(top)
+    described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
     housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
     acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")
@@ -184,7 +192,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         findings.error(("acquisition", "mains"), f"mains is {mains:g} Hz", 'Give "50 Hz" or "60 Hz"')
     manifest = Manifest(
         id=header["id"] or "",
-        bearing=header["bearing"] or "",
+        bearing_name=header["bearing"] or "",
         description=header["description"],
         housing_mass=housing["mass"],
         sample_rate=acquisition["sample_rate"],
@@ -228,22 +236,14 @@ def _read_csv(table: Table) -> CsvSpec:
     if values["delimiter"] in {"\\t", "tab", "TAB"}:
         values["delimiter"] = "\t"
     delimiter, decimal = values["delimiter"], values["decimal"]
-    if delimiter is not None and len(delimiter) != 1:
-        table.error("delimiter", f"delimiter is {delimiter!r}", "Give one character")
-    if decimal is not None and decimal not in (".", ","):
-        table.error("decimal", f"decimal is {decimal!r}", "Give one character, . or ,")
-    if delimiter is not None and delimiter in '0123456789+-.eE"\r\n':
-        table.error("delimiter", f"delimiter {delimiter!r} cannot part numbers", 'Give e.g. ";"')
+    if delimiter is not None and (len(delimiter) != 1 or delimiter in '0123456789+-.eE"\r\n'):
+        table.error("delimiter", f"delimiter {delimiter!r} cannot part numbers", 'Give one character, e.g. ";"')
     if delimiter is not None and delimiter == decimal:
         table.error("decimal", f"delimiter and decimal are both {decimal!r}", "They must differ")
     header, units = values["header_line"], values["units_line"]
     if header is not None and units is not None and units <= header:
         table.error("units_line", f"units_line {units} is not below header_line {header}", "Lines count from 1")
-    names = values["names"] or []
-    if not isinstance(names, list) or not all(isinstance(n, str) and n.strip() for n in names):
-        table.error("names", "names is no list of texts", 'Write names = ["time", "X1A", ..], one per column')
-        names = []
-    values["names"] = tuple(names)
+    values["names"] = tuple(values["names"] or ())
     values["encoding"] = _codec(table, values["encoding"])
     return CsvSpec(**values)
 

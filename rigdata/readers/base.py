@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,10 +13,10 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import DIMENSIONS, Channel
-from rigdata.device import Device, Grid, by_clock
+from rigdata.device import Device, Grid, by_clock, planned
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.problem import Problem, RigDataError, Severity, refuse
 from rigdata.units import UnitError, is_signal, parse_unit, temperature_offset, unit_factor
 
 #: A channel longer than this is rejected: slices of it would be asked for by mistake [samples].
@@ -70,6 +71,10 @@ class RecordFile:
         """The error that stops the reading of the file."""
         return refuse(self.file, place, fault, remedy, self.run)
 
+    def problem(self, severity: Severity, place: str, fault: str, remedy: str) -> Problem:
+        """Something wrong with the file that does not stop its reading by itself."""
+        return Problem(severity, self.file, place, fault, remedy, self.run)
+
 
 def refuse_claim(claimed: int, size: int, file: str) -> None:
     """Refuse a file of `size` bytes whose headers claim far more than it can hold, before any of it is read."""
@@ -78,15 +83,19 @@ def refuse_claim(claimed: int, size: int, file: str) -> None:
         raise refuse(file, "", fault, "Copy it again from the logger, or split the run")
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What is sampled together in a record."""
+
+    grids: tuple[Grid, ...]  #: the run's own device first
+    faults: dict[str, RigDataError]  #: of channels without usable times
+
+
 class RunReader(RecordFile):
     """Lazy access to one run's record: channels of several devices, each at its own times."""
 
-    def _grids(self) -> Sequence[Grid]:
-        """Channels at the same times, those of the run's own device first."""
-        raise NotImplementedError
-
-    def _faults(self) -> Mapping[str, RigDataError]:
-        """What is wrong with channels that have no usable times."""
+    def _layout(self) -> Layout:
+        """What is sampled together."""
         raise NotImplementedError
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
@@ -99,16 +108,20 @@ class RunReader(RecordFile):
 
     def _grid(self, name: str) -> Grid:
         """Channels at the times of `name`."""
-        grids = self._grids()
+        grids = self._layout().grids
         return next((grid for grid in grids if name in grid.channels), grids[0])
 
     def devices(self) -> tuple[Device, ...]:
         """Channels that are sampled together."""
-        return by_clock(self._grids(), self.channels)
+        return by_clock(self._layout().grids, self.channels)
 
     def apart(self) -> frozenset[str]:
         """Channels that are not sampled with the run's own device."""
-        return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._grids()[1:]))
+        return frozenset(itertools.chain.from_iterable(grid.channels for grid in self._layout().grids[1:]))
+
+    def opened(self) -> AbstractContextManager[None]:
+        """Keep the file open while the block runs, where that spares work; nested blocks share it."""
+        return nullcontext()
 
     def problems(self) -> tuple[Problem, ...]:
         """Report what does not stop the run from being used."""
@@ -116,22 +129,22 @@ class RunReader(RecordFile):
 
     def length(self) -> int:
         """Count the samples per channel of the run's own device."""
-        return self._grids()[0].length
+        return self._layout().grids[0].length
 
     def rate(self) -> float:
         """Give the sample rate [Hz]: of the file's times, else what the file or the manifest states."""
-        rate = self._grids()[0].rate
+        rate = self._layout().grids[0].rate
         if not rate > 0:
             clocks = [channel.name for channel in self.channels.values() if channel.quantity == "time"]
             self.read_device(clocks, 0, 0)  # names a time column that the file lacks
             fault = "there are neither usable times nor a sample rate"
             remedy = 'Add sample_rate to the run or to [acquisition], a channel with quantity = "time", or in HDF5 the '
-            raise refuse(self.file, "", fault, f"{remedy}group's attribute sample_rate_hz", self.run)
+            raise self.refuse("", fault, f"{remedy}group's attribute sample_rate_hz")
         return rate
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names` along the run's own times, (stop - start,) each."""
-        faults, apart = self._faults(), self.apart()
+        faults, apart = self._layout().faults, self.apart()
         for name in names:
             if name in faults:
                 raise faults[name]
@@ -143,7 +156,7 @@ class RunReader(RecordFile):
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds (stop - start,): the file's, else counted from the rate."""
-        clock = self._grids()[0].clock
+        clock = self._layout().grids[0].clock
         return self._clock_times(clock, start, stop) if clock else np.arange(start, stop) / self.rate()
 
     def device_time(self, name: str, start: int, stop: int) -> FloatArray:
@@ -158,31 +171,47 @@ class RunReader(RecordFile):
 
         Straight lines, missing from a step before the first sample and after the last; no phasor may come from it.
         """
-        length = self._grid(name).length
-        (values,) = self.read_device([name], 0, length)
-        at = self.device_time(name, 0, length)
+        grid = self._grid(name)
+        (values,) = self.read_device([name], 0, grid.length)
+        at = self.device_time(name, 0, grid.length)
         finite = np.isfinite(values)
         if not finite.any():
             return np.full(stop - start, np.nan)
         at, time = at[finite], self.time(start, stop)
         within = np.clip(time, at[0], at[-1])
         readings = np.interp(within, at, values[finite])
-        readings[np.abs(time - within) > 1.0 / self._grid(name).rate] = np.nan
+        readings[np.abs(time - within) > 1.0 / grid.rate] = np.nan
         return readings
+
+    def _planned(self, timings: Mapping[str, Grid], run_rate: float | None, member: str, remedy: str) -> Layout:
+        """Put together what is sampled together; what has no usable times is a fault of that channel."""
+        grids, texts = planned(timings, self.channels, run_rate)
+        return Layout(grids, {name: self.refuse(f"{member} {name}", text, remedy) for name, text in texts.items()})
+
+    def unit_problems(self, units: Mapping[str, str]) -> list[Problem]:
+        """An error for every channel whose unit in the file is another than its unit in the manifest."""
+        problems = []
+        for name, unit in units.items():
+            channel, stated = self.channels.get(name), unit.strip()
+            if channel is not None and len(unit) <= _LONGEST and stated and _differ(stated, channel):
+                fault = f"the file states {stated!r}, the manifest unit = {channel.unit!r}"
+                remedy = "Correct unit in the manifest, or the units of the file if those are wrong"
+                problems.append(self.problem("error", f"channel {name}", fault, remedy))
+        return problems
 
     def _notes(self, members: str, names: Sequence[str], units: Mapping[str, str]) -> tuple[Problem, ...]:
         """Units other than the manifest's, channels that are sampled apart, and those that nobody describes."""
-        problems = list(unit_problems(self.channels, units, self.file, self.run))
+        problems = self.unit_problems(units)
         if self.apart():
             parts = [f"{', '.join(device.channels[:6])} ({device.rate:.6g} Hz)" for device in self.devices()]
             text = f"sampled apart: {'; '.join(parts[:6])}"
-            problems.append(Problem("note", self.file, "channels", text, "Nothing, if that is meant", self.run))
+            problems.append(self.problem("note", "channels", text, "Nothing, if that is meant"))
         extra = [name for name in names if name not in self.channels]
         if extra:
             listed = ", ".join(ascii(name)[1:-1][:40] for name in extra[:6])
             listed += f", ... ({len(extra)} in all)" if len(extra) > 6 else ""
             text, remedy = f"{members} without a description: {listed}", "Nothing, or describe them in the manifest"
-            problems.append(Problem("note", self.file, members, text, remedy, self.run))
+            problems.append(self.problem("note", members, text, remedy))
         return tuple(problems)
 
 
@@ -214,36 +243,24 @@ def suffix_hint(path: Path) -> str:
     return f"the suffix {suffix or '(none)'} is not known; {hint}"
 
 
-def unit_problems(
-    channels: Mapping[str, Channel], units: Mapping[str, str], file: str, run: str | None
-) -> tuple[Problem, ...]:
-    """An error for every channel whose unit in the file is another than its unit in the manifest."""
-    problems = []
-    for name, text in units.items():
-        channel = channels.get(name)
-        if channel is None or channel.quantity not in DIMENSIONS or text.strip() in ("", channel.unit):
-            continue
-        if len(text) <= _LONGEST and _differ(text.strip(), channel.unit, DIMENSIONS[channel.quantity]):
-            fault = f"the file states {text.strip()!r}, the manifest unit = {channel.unit!r}"
-            cure = "Correct unit in the manifest, or the units of the file if those are wrong"
-            problems.append(Problem("error", file, f"channel {name}", fault, cure, run))
-    return tuple(problems)
+def _differ(stated: str, channel: Channel) -> bool:
+    """Whether the unit that a file states makes another number of a reading than the manifest's; False if it is none.
 
-
-def _differ(stated: str, manifest: str, dimension: str) -> bool:
-    """Whether two units turn a reading into different numbers; False where the file's is no unit."""
+    What a reading is counts (a signal's dimension, or the quantity itself), then the offset and the factor.
+    """
+    if channel.quantity not in DIMENSIONS:
+        return False
+    dimension = DIMENSIONS[channel.quantity]
+    meanings: list[tuple[object, float, float]] = []
     try:
-        first, second = _meaning(stated, dimension), _meaning(manifest, dimension)
+        for unit in (stated, channel.unit):
+            if is_signal(unit):
+                parsed = parse_unit(unit)
+                meanings.append((parsed.powers, 0.0, parsed.factor))
+            else:
+                offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
+                meanings.append((dimension, offset, unit_factor(unit, dimension)))
     except UnitError:
         return False
-    (*kind, factor), (*other_kind, other_factor) = first, second
+    (*kind, factor), (*other_kind, other_factor) = meanings
     return kind != other_kind or not math.isclose(factor, other_factor, rel_tol=_SAME)
-
-
-def _meaning(unit: str, dimension: str) -> tuple[object, float, float]:
-    """What a reading is (a signal's dimension, or the quantity itself), its offset and its factor."""
-    parsed = parse_unit(unit)
-    if is_signal(unit):
-        return parsed.powers, 0.0, parsed.factor
-    offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
-    return dimension, offset, unit_factor(unit, dimension)

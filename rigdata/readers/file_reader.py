@@ -21,13 +21,14 @@ from rigdata.arrays import FloatArray
 from rigdata.device import Grid
 from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FORMATS, RecordFile, RunReader, suffix_hint
-from rigdata.readers.series import Contents, Layout, Series, arranged, table, with_unique_names
+from rigdata.readers.base import FORMATS, Layout, RecordFile, RunReader, rate_of_time, suffix_hint
+from rigdata.readers.series import SAME_STEP, Contents, Series, is_time, table, with_unique_names
 
 #: Larger files of a logger's format are rejected: they are read whole [bytes].
 LARGEST = 2**31
 #: Parsed columns cached by a campaign before the oldest run is let go [bytes].
 _CACHE_BYTES = 96 * 2**20
+_MOST_TIMES = 1000
 _Value = TypeVar("_Value")
 
 
@@ -98,10 +99,26 @@ def read_contents(record: RecordFile) -> Contents:
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         fault = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
         raise record.refuse("", fault, again) from error
-    contents = table(contents, record.channels, record.stated_rate)
+    contents = table(contents, record)
     if not contents.series:
         raise record.refuse("", "holds no channel of numbers", "Export the run again, with its channels")
     return contents
+
+
+@dataclass(frozen=True)
+class _Columns(Layout):
+    """All channels of a file at their own times."""
+
+    values: Mapping[str, FloatArray]
+    times: Mapping[str, FloatArray]  #: by clock, s
+    units: Mapping[str, str]  #: as the file states them
+    unread: tuple[str, ...]  #: columns that nobody describes
+    problems: tuple[Problem, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all channels [bytes]."""
+        return sum(array.nbytes for array in (*self.values.values(), *self.times.values()))
 
 
 @dataclass(frozen=True)
@@ -120,20 +137,41 @@ class FileReader(RunReader):
             raise self.refuse("", "is not an ordinary file", "Name a record in the manifest")
         return self.path, state.st_size, state.st_mtime_ns, self.run
 
-    def _layout(self) -> Layout:
+    def _layout(self) -> _Columns:
         """All channels at their own times."""
-        return self.cache.get(self._signature(), self._arranged)
+        return self.cache.get(self._signature(), lambda: self._arranged(read_contents(self)))
 
-    def _arranged(self) -> Layout:
-        contents = read_contents(self)
-        layout = arranged(with_unique_names(contents.series), self.channels, self.stated_rate, self.file, self.run)
-        return replace(layout, unread=contents.unread, problems=contents.problems)
-
-    def _grids(self) -> Sequence[Grid]:
-        return self._layout().grids
-
-    def _faults(self) -> Mapping[str, RigDataError]:
-        return self._layout().faults
+    def _arranged(self, contents: Contents) -> _Columns:
+        series = with_unique_names(contents.series)
+        faults: dict[str, RigDataError] = {}
+        timings: dict[str, Grid] = {}
+        times: dict[str, FloatArray] = {}
+        for channel in series:
+            if channel.time is None:
+                timings[channel.name] = Grid(len(channel))
+            elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
+                back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
+                fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
+                remedy = "Sort or split the run, or export without times"
+                faults[channel.name] = self.refuse(f"channel {channel.name}", fault, remedy)
+            else:
+                clock = next((key for key, time in times.items() if _alike(time, channel.time)), str(len(times) + 1))
+                times.setdefault(clock, channel.time)
+                if len(times) > _MOST_TIMES:
+                    raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
+                rate = rate_of_time(times[clock])
+                rate = rate if rate > 0 else self.stated_rate or rate
+                label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
+                begin = float(times[clock][0]) if len(channel) else 0.0
+                timings[channel.name] = Grid(len(channel), clock, rate, label, begin)
+        remedy = "Export it with its times, or correct sample_rate"
+        layout = self._planned(timings, self.stated_rate, "channel", remedy)
+        faults |= layout.faults
+        if not layout.grids:
+            raise RigDataError([problem for error in faults.values() for problem in error.problems])
+        values = {channel.name: channel.values for channel in series}
+        units = {channel.name: channel.unit for channel in series}
+        return _Columns(layout.grids, faults, values, times, units, contents.unread, contents.problems)
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
         return self._layout().times[clock][start:stop].copy()
@@ -152,3 +190,11 @@ class FileReader(RunReader):
         layout = self._layout()
         members = "columns" if layout.unread else "channels"
         return (*layout.problems, *self._notes(members, (*layout.values, *layout.unread), layout.units))
+
+
+def _alike(time: FloatArray, other: FloatArray) -> bool:
+    """Whether two channels are sampled at the same times."""
+    if time is other or len(time) != len(other):
+        return time is other
+    step = (other[-1] - other[0]) / max(len(other) - 1, 1) if len(other) else 0.0
+    return bool(np.all(np.abs(time - other) <= SAME_STEP * step))

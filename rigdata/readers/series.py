@@ -16,9 +16,9 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, Channel
-from rigdata.device import RATE_MISS, Grid, planned
-from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import rate_of_time
+from rigdata.device import RATE_MISS
+from rigdata.problem import Problem
+from rigdata.readers.base import RecordFile, rate_of_time
 
 #: Longer channels are in a file without a name, and are read from there in pieces [bytes].
 IN_MEMORY = 2**23
@@ -33,8 +33,7 @@ _UNITS = "|".join(TIME_FACTORS)
 _TIME = re.compile(rf"(?:(?i:{_WORDS})\b|t\s*[\[(]|(?:(?i:{_WORDS})|t)(?:_(?:{_UNITS}))?$)")
 _TIME_UNIT = re.compile(rf"(?:[\[(]\s*|_)({_UNITS})\s*[\])]?$")
 #: Two clocks whose samples differ by this share of a step count as one.
-_SAME = 0.01
-_MOST_TIMES = 1000
+SAME_STEP = 0.01
 
 
 @dataclass(frozen=True)
@@ -151,24 +150,6 @@ def seconds(column: Series) -> FloatArray:
         return column.values * TIME_FACTORS.get(time_unit(column.name, column.unit), 1.0)
 
 
-@dataclass(frozen=True)
-class Layout:
-    """All channels of a file at their own times."""
-
-    grids: tuple[Grid, ...]  #: the run's own device first
-    values: Mapping[str, FloatArray]
-    times: Mapping[str, FloatArray]  #: by clock, s
-    faults: Mapping[str, RigDataError]  #: of channels without usable times
-    units: Mapping[str, str]  #: as the file states them
-    unread: tuple[str, ...] = ()  #: columns that nobody describes
-    problems: tuple[Problem, ...] = ()
-
-    @property
-    def nbytes(self) -> int:
-        """Size of all channels [bytes]."""
-        return sum(array.nbytes for array in (*self.values.values(), *self.times.values()))
-
-
 def time_columns(names: Sequence[str], channels: Mapping[str, Channel]) -> list[int]:
     """Places of the time columns: those described as such, else those named like one that nobody describes."""
     described = [i for i, name in enumerate(names) if name in channels and channels[name].quantity == "time"]
@@ -197,11 +178,12 @@ def _letter(name: str, channels: Mapping[str, Channel]) -> str:
     return channels[name].clock if name in channels else ""
 
 
-def table(contents: Contents, channels: Mapping[str, Channel], stated_rate: float | None = None) -> Contents:
+def table(contents: Contents, record: RecordFile) -> Contents:
     """Channels of a table at the times of their time columns; of these, only those that are described stay channels.
 
     Where not all columns have one time column, rows without a cell of a device are none of its samples.
     """
+    channels = record.channels
     series, names = list(contents.series), [column.name for column in contents.series]
     clocks = time_columns(names, channels)
     groups: dict[int | None, list[int]] = {i: [] for i in (None, *clocks)}
@@ -229,15 +211,16 @@ def table(contents: Contents, channels: Mapping[str, Channel], stated_rate: floa
             placed[i] = replace(series[i], values=values, time=time, group=label or series[i].group)
     ordered = [placed[i] for i in sorted(placed)]
     if is_shared or not clocks:
-        ordered = _slow_columns(ordered, channels, stated_rate)
+        ordered = _slow_columns(ordered, record)
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})
 
 
-def _slow_columns(series: Sequence[Series], channels: Mapping[str, Channel], rows_rate: float | None) -> list[Series]:
+def _slow_columns(series: Sequence[Series], record: RecordFile) -> list[Series]:
     """Columns of a stated rate other than that of the rows: their cells, at the times of their rows if these agree."""
+    rows_rate = record.stated_rate
     slow: dict[tuple[str, float, int], list[int]] = {}
     for i, column in enumerate(series):
-        known = channels.get(column.name)
+        known = record.channels.get(column.name)
         rate = column.rate if column.time is not None else (rows_rate or np.nan)
         if known is not None and known.sample_rate and not abs(known.sample_rate / rate - 1.0) <= RATE_MISS:
             slow.setdefault((known.clock, known.sample_rate, len(column)), []).append(i)
@@ -252,7 +235,7 @@ def _slow_columns(series: Sequence[Series], channels: Mapping[str, Channel], row
         if time is not None:
             time = time[rows]
             agrees = abs(rate_of_time(time) / rate - 1.0) <= RATE_MISS
-            even = bool(np.all(np.abs(time * rate - np.arange(len(time))) < _SAME))
+            even = bool(np.all(np.abs(time * rate - np.arange(len(time))) < SAME_STEP))
             time = time if agrees and not even else None
         for i in members:
             placed[i] = replace(series[i], values=to_temporary_file(series[i].values[rows]), time=time)
@@ -273,44 +256,3 @@ def _without_gaps(time: FloatArray) -> FloatArray:
     if len(usable) in (0, len(time)):
         return time
     return np.interp(np.arange(len(time)), usable, time[usable])
-
-
-def arranged(
-    series: Sequence[Series], channels: Mapping[str, Channel], stated_rate: float | None, file: str, run: str | None
-) -> Layout:
-    """Put channels that share their times together; what has no usable times is a fault of that channel."""
-    faults: dict[str, RigDataError] = {}
-    timings: dict[str, Grid] = {}
-    times: dict[str, FloatArray] = {}
-    for channel in series:
-        place = f"channel {channel.name}"
-        if channel.time is None:
-            timings[channel.name] = Grid(len(channel))
-        elif not np.isfinite(channel.time).all() or np.any(np.diff(channel.time) < 0):
-            back = np.append(np.flatnonzero(~(np.diff(channel.time) >= 0)), -1)
-            fault = f"its times have gaps or run backwards (sample {int(back[0]) + 2})"
-            faults[channel.name] = refuse(file, place, fault, "Sort or split the run, or export without times", run)
-        else:
-            clock = next((key for key, time in times.items() if _alike(time, channel.time)), str(len(times) + 1))
-            times.setdefault(clock, channel.time)
-            if len(times) > _MOST_TIMES:
-                raise refuse(file, "", f"has more than {_MOST_TIMES} different times", "Split the run", run)
-            rate = rate_of_time(times[clock])
-            rate = rate if rate > 0 else stated_rate or rate
-            label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
-            timings[channel.name] = Grid(len(channel), clock, rate, label)
-    grids, texts = planned(timings, channels, stated_rate, lambda clock: float(times[clock][0]))
-    for name, text in texts.items():
-        faults[name] = refuse(file, f"channel {name}", text, "Export it with its times, or correct sample_rate", run)
-    if not grids:
-        raise RigDataError([problem for error in faults.values() for problem in error.problems])
-    units = {channel.name: channel.unit for channel in series}
-    return Layout(grids, {channel.name: channel.values for channel in series}, times, faults, units)
-
-
-def _alike(time: FloatArray, other: FloatArray) -> bool:
-    """Whether two channels are sampled at the same times."""
-    if time is other or len(time) != len(other):
-        return time is other
-    step = (other[-1] - other[0]) / max(len(other) - 1, 1) if len(other) else 0.0
-    return bool(np.all(np.abs(time - other) <= _SAME * step))

@@ -17,7 +17,7 @@ from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
-from rigdata.survey.channels import PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
@@ -54,9 +54,9 @@ def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _open(HOUSING, "mass", "kg"), _MOUNT, ""]
+    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", "", OPEN, HOUSING, "kg"), _MOUNT, ""]
     if not all(rate > 0 for rate in surveyed.rates):
-        lines += ["[acquisition]", _open(ACQUISITION, "sample_rate", "Hz"), ""]
+        lines += ["[acquisition]", _line("sample_rate", "", OPEN, ACQUISITION, "Hz"), ""]
     if surveyed.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
@@ -102,10 +102,12 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     head, quantity = f"[channels.{_key(name)}]", guess.quantity.value
     if not quantity or quantity == "ignore":
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
-    source = Entry() if like else guess.quantity  # what it is like bears the mark for both
+    source = Entry(quantity) if like else guess.quantity  # what it is like bears the mark for both
     lines = [head, _line("quantity", f'"{quantity}"', source)]
     if quantity in VECTOR_QUANTITIES:
-        lines.append(_axis_line(guess))
+        is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
+        axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
+        lines.append(_line("axis", f'"{axis.number:g} deg"', axis, CHANNEL, "deg"))
     if like:
         lines.append(f"like = {_toml_string(like)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
@@ -120,13 +122,6 @@ def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> 
     return lines
 
 
-def _axis_line(guess: ChannelGuess) -> str:
-    if guess.axis.value is not None:
-        return _line("axis", f'"{guess.axis.number:g} deg"', guess.axis)
-    hint = f"; its name hints at {guess.hint:g} deg" if math.isfinite(guess.hint) else ""
-    return _open(CHANNEL, "axis", "deg") + hint
-
-
 def run_lines(run: RunGuess) -> list[str]:
     """Lines of a run's table."""
     stem = run.file.rpartition("/")[2].rpartition(".")[0]
@@ -134,34 +129,27 @@ def run_lines(run: RunGuess) -> list[str]:
     lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
     lines.append(_line("kind", f'"{kind}"', run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     if kind in ("dynamic", "locus", None):
-        lines.append(_quantity("shaft_speed", f"{run.speed.number:.4g} Hz", run.speed))
-        lines.append(_quantity("static_load", run.load_text, run.load))
+        lines.append(_line("shaft_speed", f'"{run.speed.number:.4g} Hz"', run.speed, RUN, "Hz"))
+        lines.append(_line("static_load", f'"{run.load_text}"', run.load, RUN, "kN"))
     if kind == "dry_pivot":
-        lines.append(_line("pad", str(run.pad.value), run.pad) if run.pad.value else _open(RUN, "pad", ""))
+        lines.append(_line("pad", str(run.pad.value), run.pad, RUN))
     if kind != "clearance":
-        lines.append(_quantity("static_load_direction", f"{run.direction.number:.4g} deg", run.direction))
+        direction = f'"{run.direction.number:.4g} deg"'
+        lines.append(_line("static_load_direction", direction, run.direction, RUN, "deg"))
     if kind in ("dynamic", None):
-        lines.append(_quantity("excitation_frequency", f"{run.excitation.number:.4g} Hz", run.excitation))
+        frequency = f'"{run.excitation.number:.4g} Hz"'
+        lines.append(_line("excitation_frequency", frequency, run.excitation, RUN, "Hz"))
     return lines
 
 
-def _line(key: str, value: str, entry: Entry) -> str:
-    """One entry with its source; what is read from a file needs none."""
+def _line(key: str, value: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "") -> str:
+    """One entry with its source (what is read from a file needs none); or an open one with what it means."""
+    if entry.value is None:
+        meaning = next(field.meaning for field in fields if field.key == key)
+        text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
+        return f"{text}; {entry.reason}" if entry.reason else text
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
-
-
-def _quantity(key: str, text: str, entry: Entry) -> str:
-    if entry.value is not None:
-        return _line(key, f'"{text}"', entry)
-    unit = {"static_load": "kN", "static_load_direction": "deg"}.get(key, "Hz")
-    return f"{_open(RUN, key, unit)}{f'; {entry.reason}' if entry.reason else ''}"
-
-
-def _open(fields: tuple[Field, ...], key: str, unit: str) -> str:
-    """A line that is open: the key, the mark with a unit, and what it means."""
-    meaning = next(field.meaning for field in fields if field.key == key)
-    return f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
 
 
 def _toml_string(text: str) -> str:
@@ -176,12 +164,15 @@ def _key(name: str) -> str:
 
 @dataclass
 class _Block:
-    """A table of a manifest: its kind, the channel's name or the run's file, its lines and what they mean."""
+    """A table of a manifest."""
 
-    kind: str
-    name: str
+    key: tuple[str, str]  #: "channels" and the channel's name, "runs" and the run's file; else empty
+    place: str  #: what messages call it
     lines: list[str]
-    data: dict[str, Any]
+
+
+#: Lines of tables by the key of their block.
+_Tables = dict[tuple[str, str], list[str]]
 
 
 def _described_channels(text: str) -> dict[str, dict[str, Any]]:
@@ -215,9 +206,9 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     described = _described_channels(text)
     former = _tables(survey(exports, pivots=pivots))
     for block in _blocks(text):
-        for line in former.get((block.kind, block.name), ()):
+        for line in former.get(block.key, ()):
             if line.startswith("axis") and "(guess)" in line and line in block.lines:
-                del described[block.name]["axis"]
+                del described[block.key[1]]["axis"]
     new_tables = _tables(survey(exports, described, pivots))
     for merges in (True, False):
         blocks = _blocks(text)
@@ -257,35 +248,31 @@ def _block(lines: list[str]) -> _Block:
         heading = ""
     if heading.startswith("[[runs]]"):
         (run,) = data["runs"]
-        return _Block("runs", str(run.get("file", "")), lines, run)
+        file = str(run.get("file", ""))
+        return _Block(("runs", file), f"run {run.get('id', file)}", lines)
     if heading.startswith("[channels."):
-        ((name, channel),) = data["channels"].items()
-        return _Block("channels", name, lines, channel)
-    return _Block("", "", lines, {})
+        (name,) = data["channels"]
+        return _Block(("channels", name), f"channel {name}", lines)
+    return _Block(("", ""), "", lines)
 
 
-def _tables(surveyed: Survey) -> dict[tuple[str, str], list[str]]:
+def _tables(surveyed: Survey) -> _Tables:
     """Lines of all tables that a draft has for channels and runs, by kind and name."""
     tables = {("channels", name): lines for name, lines in channel_blocks(surveyed).items()}
     return tables | {("runs", run.file): run_lines(run) for run in surveyed.runs}
 
 
-def _update(
-    blocks: list[_Block],
-    old: dict[tuple[str, str], list[str]] | None,
-    new: dict[tuple[str, str], list[str]],
-) -> list[str]:
+def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str]:
     """Merge the tables of a draft into the blocks; the `old` ones tell guesses from what was typed. Add new tables."""
     changes: list[str] = []
     for block in blocks:
-        key = block.kind, block.name
-        place = f"channel {block.name}" if block.kind == "channels" else f"run {block.data.get('id', block.name)}"
-        if old is not None and key in new:
-            _merge(block, new[key], old.get(key, []), place, changes)
-        elif block.kind == "runs" and block.name and key not in new:
-            changes.append(f"{place}: its file {block.name} is not there; left as it is")
-    present = {(block.kind, block.name) for block in blocks}
-    first_run = next((i for i, block in enumerate(blocks) if block.kind == "runs"), len(blocks))
+        kind, name = block.key
+        if old is not None and block.key in new:
+            _merge(block, new[block.key], old.get(block.key, []), changes)
+        elif kind == "runs" and name and block.key not in new:
+            changes.append(f"{block.place}: its file {name} is not there; left as it is")
+    present = [block.key for block in blocks]
+    first_run = next((i for i, (kind, _) in enumerate(present) if kind == "runs"), len(blocks))
     for (kind, name), lines in new.items():
         if (kind, name) in present:
             continue
@@ -293,11 +280,11 @@ def _update(
         at = len(blocks)
         if kind == "channels":
             at, first_run = first_run, first_run + 1
-        blocks.insert(at, _Block(kind, name, lines, {}))
+        blocks.insert(at, _Block((kind, name), "", lines))
     return changes
 
 
-def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, changes: list[str]) -> None:
+def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[str]) -> None:
     """Fill in open places, put new guesses in place of old ones, and add what a table lacks; no line goes."""
     guessed, wanted = _values(old), _values(new)
     lines, present = [], set()
@@ -308,7 +295,7 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
         if key in wanted and (MARK in value or is_guess) and MARK not in wanted[key][0]:
             result, drafted = wanted[key]
             if result != value:
-                changes.append(f"{place}: {key} {value} becomes {result}")
+                changes.append(f"{block.place}: {key} {value} becomes {result}")
             if result != value or "(records)" in drafted:
                 line = drafted
         lines.append(line)
@@ -324,7 +311,7 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], place: str, ch
     for key, (value, line) in wanted.items():
         if key not in present:
             lines.append(line)
-            changes.append(f"{place}: {key} {value} added")
+            changes.append(f"{block.place}: {key} {value} added")
     block.lines = lines
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -35,8 +34,8 @@ _MAINS_NEAR = 0.005
 _CORNERS = 25.0
 #: Shares that a sweep is looked at in.
 _SWEPT = 120
-#: Loads and speeds that differ by no more than this factor are one set point; a round number so near is meant.
-_ONE_LOAD, _ONE_SPEED, _ROUND = 1.03, 1.015, 0.003
+#: What differs by no more than this factor is one set point; a round number so near is meant.
+_ALIKE_FACTORS, _ROUND = {"speed": 1.015, "excitation": 1.015, "load": 1.03}, 0.003
 #: Share of the running records in which the shaft speed must show.
 _MOST_OF = 0.8
 #: A load that a file's name states and the cells contradict by more than this share is to be confirmed.
@@ -200,7 +199,11 @@ class _Folder:
         for run in self._of_kind("clearance"):
             probes, forces = _pair(run, pair), _pair(run, cells.names)
             if probes and forces:
-                readings, pushes = (_around_middle(part_means(channels, _SWEPT)) for channels in (probes, forces))
+                around = []
+                for channels in (probes, forces):
+                    means = part_means(channels, _SWEPT)
+                    around.append(means - 0.5 * (means.max(axis=0) + means.min(axis=0)))
+                readings, pushes = around
                 return fitted_frame(pair, readings, cells.direction(pushes), "the clearance sweep", _CORNERS)
         return None
 
@@ -282,11 +285,6 @@ def _change(series: Sequence[Series]) -> FloatArray:
     return np.asarray(tenths[-1] - tenths[0])
 
 
-def _around_middle(readings: FloatArray) -> FloatArray:
-    """Readings (n, 2) from the middle of what they run around."""
-    return readings - 0.5 * (readings.max(axis=0) + readings.min(axis=0))
-
-
 def _with_load(run: RunGuess, load: float) -> RunGuess:
     """A run with its load [N] by calibrated cells, in their unit; what a name states stands if they agree."""
     reason, stated = f"cells {load / 1e3:.3g} kN", run.load
@@ -294,7 +292,7 @@ def _with_load(run: RunGuess, load: float) -> RunGuess:
     agrees = off <= _CONTRADICTS * stated.number
     if stated.source == "file" and agrees:
         return run
-    if stated.source == "file" or off <= (_ONE_LOAD - 1.0) * stated.number:
+    if stated.source == "file" or off <= (_ALIKE_FACTORS["load"] - 1.0) * stated.number:
         source = "records" if agrees else "guess"
         return replace(run, load=replace(stated, source=source, reason=f"the file's name; {reason}"))
     return replace(run, load=Entry(load, "records", reason), load_text="")
@@ -327,60 +325,51 @@ def _with_lines(run: RunGuess, speed: Entry) -> RunGuess:
 
 def _set_points(runs: Sequence[RunGuess]) -> tuple[RunGuess, ...]:
     """Directions, speeds, frequencies and loads that are nearly alike become the set point that was meant."""
-
-    def close(group: list[float], angle: float) -> bool:
-        return angle - group[-1] <= _ALIKE and angle - group[0] <= 2 * _ALIKE
-
-    def rounded(middle: float) -> float:
-        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
-        return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
-
-    meant: dict[str, tuple[Any, Any]] = {
-        "direction": (close, rounded),
-        "speed": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),
-        "excitation": (_within(_ONE_SPEED), functools.partial(_round, digits=4)),
-        "load": (_within(_ONE_LOAD), functools.partial(_round, digits=3)),
-    }
     changed = list(runs)
-    for name, (is_alike, nearest) in meant.items():
+    for name in ("direction", *_ALIKE_FACTORS):
         entries: list[Entry] = [getattr(run, name) for run in changed]
-        movable = [name != "load" or entry.source == "records" for entry in entries]
-        values = [entry.number for entry, moves in zip(entries, movable, strict=True) if moves]
-        points = _common(values, is_alike, nearest)
-        for i, entry in enumerate(entries):
-            if movable[i]:
-                moved: Any = {name: replace(entry, value=points.get(entry.value, entry.value))}
-                changed[i] = replace(changed[i], **moved)
+        movable = [i for i, entry in enumerate(entries) if name != "load" or entry.source == "records"]
+        points = _common(name, [entries[i].number for i in movable])
+        for i in movable:
+            value = points.get(entries[i].number, entries[i].value)
+            moved: Any = {name: replace(entries[i], value=value)}
+            changed[i] = replace(changed[i], **moved)
     for i, run in enumerate(changed):
         if run.load.source and not run.load_text:
             changed[i] = replace(run, load_text=f"{run.load.number / 1e3:.4g} kN")
     return tuple(changed)
 
 
-def _within(factor: float) -> Callable[[list[float], float], bool]:
-    return lambda group, value: value <= factor * group[0]
-
-
-def _round(middle: float, digits: int) -> float:
-    nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
-    return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.{digits}g}")
-
-
-def _common(
-    values: Sequence[float], close: Callable[[list[float], float], bool], rounded: Callable[[float], float]
-) -> dict[float, float]:
+def _common(name: str, values: Sequence[float]) -> dict[float, float]:
     """What every finite value was meant to be: the middle of its group of values that are alike, rounded."""
     groups: list[list[float]] = []
     for value in sorted({v for v in values if math.isfinite(v)}):
-        if groups and close(groups[-1], value):
+        if groups and _is_alike(name, groups[-1], value):
             groups[-1].append(value)
         else:
             groups.append([value])
     set_points: dict[float, float] = {}
     for group in groups:
         members = sorted(v for v in values if v in group)
-        set_points |= dict.fromkeys(group, rounded(members[len(members) // 2]))
+        set_points |= dict.fromkeys(group, _meant(name, members[len(members) // 2]))
     return set_points
+
+
+def _is_alike(name: str, group: Sequence[float], value: float) -> bool:
+    """Whether a value is of a group of lower ones."""
+    if name == "direction":
+        return value - group[-1] <= _ALIKE and value - group[0] <= 2 * _ALIKE
+    return value <= _ALIKE_FACTORS[name] * group[0]
+
+
+def _meant(name: str, middle: float) -> float:
+    """The round set point near a value; else the value to some digits."""
+    if name == "direction":
+        nearby = 45.0 * round(middle / 45.0)  # an axis, or between two; pads may be anywhere
+        return nearby if abs(nearby - middle) <= _ALIKE / 2 else middle
+    nearby = float(f"{middle:.2g}")  # 21.99 Hz was meant to be 22 Hz
+    digits = 3 if name == "load" else 4
+    return nearby if abs(nearby - middle) <= _ROUND * middle else float(f"{middle:.{digits}g}")
 
 
 def is_mains(frequency: float) -> bool:

@@ -11,19 +11,15 @@ from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments, Sensor, SensorError
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout
 from rigdata.virtual_rig.noise import (
-    ActuatorDefects,
     ChannelNoise,
     DryImperfections,
     Glitches,
     Noise,
-    SetPointMiss,
-    ShaftDefects,
 )
 from rigdata.virtual_rig.plan import (
     ClearanceSweep,
     DryTest,
     RigPlan,
-    Timing,
     locus_points,
     operating_points,
 )
@@ -31,7 +27,6 @@ from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 __all__ = [
-    "ActuatorDefects",
     "CampaignTruth",
     "ChannelNoise",
     "ClearanceSweep",
@@ -47,10 +42,7 @@ __all__ = [
     "RigTruth",
     "Sensor",
     "SensorError",
-    "SetPointMiss",
-    "ShaftDefects",
     "SimulatedRun",
-    "Timing",
     "VirtualRig",
     "VirtualRigError",
     "locus_points",

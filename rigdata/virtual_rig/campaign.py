@@ -6,7 +6,8 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
+from functools import cache
 from math import ceil, isfinite, log10
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.motion import answer
 from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, felt_direction
-from rigdata.virtual_rig.truth import VirtualRigError
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, point_facts
 
 Progress = Callable[[int, int, str], None]
 _Records = Iterable[tuple[SimulatedRun, tuple[Fault, ...]]]
@@ -30,32 +31,14 @@ _UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had t
 _PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 
 
-@dataclass(frozen=True)
-class CampaignTruth:
-    """What was really put into a campaign."""
-
-    campaign: str
-    seed: int
-    points: tuple[Mapping[str, object], ...] = field(repr=False)
-    locus: tuple[Mapping[str, object], ...] = field(repr=False)
-    pivot_curves: tuple[Mapping[str, object], ...] = field(repr=False)
-    clearance_cold_m: tuple[float, ...]
-    gap_voltage_V: Mapping[str, float]  # noqa: N815 - the truth files' own key
-    housing_mass_kg: float
-    cell_stiffness_N_per_m: tuple[float, ...]  # noqa: N815
-    sensor_errors: Mapping[str, Mapping[str, float]] = field(repr=False)
-    faults: tuple[Mapping[str, object], ...]
-    runs: Mapping[str, Mapping[str, object]] = field(repr=False)
-
-    def to_dict(self) -> dict[str, object]:
-        """Everything as plain Python, in the shape of the samples' truth files."""
-        return {"schema": "tpjb-truth/1", **asdict(self)}
+class CampaignTruth(dict[str, Any]):
+    """What was really put into a campaign, by the keys of the samples' truth files."""
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
         target = Path(path)
         spare = target.with_name(f".{target.name}.part")
-        spare.write_text(json.dumps(_finite(self.to_dict()), indent=1, allow_nan=False), encoding="utf-8")
+        spare.write_text(json.dumps(_finite(self), indent=1, allow_nan=False), encoding="utf-8")
         os.replace(spare, target)
 
 
@@ -74,7 +57,8 @@ def write_campaign(
     if os.path.lexists(target):
         raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
     _check_faults(rig, chosen)
-    rig = replace(rig, truth=rig.truth.remembered())
+    laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
+    rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
     runs = rig.runs()
     header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
     manifest = manifest_text(header, rig.instruments, runs, chosen, rig.faults)
@@ -96,14 +80,15 @@ def _written_records(
     rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None
 ) -> Iterator[tuple[SimulatedRun, tuple[Fault, ...]]]:
     """Simulate every record and note its facts; those whose file is there, with the faults of it."""
-    total = len(rig.records())
-    for done, record in enumerate(rig.simulate_all(), 1):
-        facts[record.run.id] = run_facts(record)
-        faults = rig.faults_of(record.run.id)
+    own = [run.id for run in rig.runs() if run.record == run.id]
+    for done, run in enumerate(own, 1):
+        record = rig.simulate(run)
+        facts[run] = _run_facts(record)
+        faults = rig.faults_of(run)
         if not _has("missing_file", faults):
             yield record, faults
         if progress is not None:
-            progress(done, total, record.run.id)
+            progress(done, len(own), run)
 
 
 def _check_faults(rig: VirtualRig, layout: Layout) -> None:
@@ -225,24 +210,25 @@ def _finite(value: object) -> object:
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
     """Gather the truth of a rig and of its simulated runs."""
-    cells = rig.instruments.cell_stiffness
+    truth, instruments = rig.truth, rig.instruments
     return CampaignTruth(
+        schema="tpjb-truth/1",
         campaign=rig.campaign,
         seed=rig.seed,
-        points=tuple(_point(rig, point) for point in rig.plan.dynamic),
-        locus=tuple(_set_point(point) | _position(rig, point) for point in rig.plan.locus),
-        pivot_curves=tuple(_pivot_curve(rig, k + 1) for k in range(len(rig.truth.pivot_angles))),
-        clearance_cold_m=tuple(rig.truth.clearance),
-        gap_voltage_V=rig.instruments.gap_voltages(),
-        housing_mass_kg=rig.instruments.true_mass,
-        cell_stiffness_N_per_m=tuple(cells),
-        sensor_errors={s.name: asdict(s.error) for s in rig.instruments.sensors},
-        faults=tuple(_fault(fault) for fault in rig.faults),
-        runs=dict(runs),
+        points=[_point(rig, point) for point in rig.plan.dynamic],
+        locus=[point_facts(point, truth.centre(point)) for point in rig.plan.locus],
+        pivot_curves=[_pivot_curve(truth, k + 1) for k in range(len(truth.pivot_angles))],
+        clearance_cold_m=truth.clearance,
+        gap_voltage_V=instruments.gap_voltages(),
+        housing_mass_kg=instruments.true_mass,
+        cell_stiffness_N_per_m=instruments.cell_stiffness,
+        sensor_errors={s.name: asdict(s.error) for s in instruments.sensors},
+        faults=[_fault(fault) for fault in rig.faults],
+        runs=runs,
     )
 
 
-def run_facts(record: SimulatedRun) -> dict[str, object]:
+def _run_facts(record: SimulatedRun) -> dict[str, object]:
     """Facts of one record for the truth."""
     return {
         "kind": record.run.kind,
@@ -257,40 +243,25 @@ def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
     readings = apparent_stiffness(h, point.excitation, rig.instruments)
     steady = replace(point, excitation=0.0)
     return {
-        **_set_point(point),
+        **point_facts(point, rig.truth.centre(steady)),
         "excitation_Hz": point.excitation_hz,
         "K": h.real.tolist(),
         "C": (h.imag / point.excitation).tolist(),
         "K_apparent": readings.real.tolist(),
         "C_apparent": (readings.imag / point.excitation).tolist(),
-        **_position(rig, steady),
         "pad_temperature_C": rig.truth.temperatures(steady).tolist(),
     }
 
 
-def _position(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
-    x, y = rig.truth.centre(point).tolist()
-    return {"x_m": x, "y_m": y}
-
-
-def _set_point(point: OperatingPoint) -> dict[str, object]:
-    return {
-        "static_load_N": point.static_load,
-        "static_load_direction_deg": point.static_load_direction_deg,
-        "shaft_speed_Hz": point.shaft_speed_hz,
-    }
-
-
-def _pivot_curve(rig: VirtualRig, pad: int) -> dict[str, object]:
+def _pivot_curve(truth: RigTruth, pad: int) -> dict[str, object]:
     # tangents by central differences over 0.1 % of the load: error about 1e-7 for smooth laws
     low, high = _PIVOT_LOADS * (1 - 1e-3), _PIVOT_LOADS * (1 + 1e-3)
-    rise = rig.truth.deflection(pad, high) - rig.truth.deflection(pad, low)
     with np.errstate(divide="ignore"):  # a rigid pivot is infinitely stiff
-        stiffness = (high - low) / rise
+        stiffness = (high - low) / (truth.deflection(pad, high) - truth.deflection(pad, low))
     return {
         "pad": pad,
         "force_N": _PIVOT_LOADS.tolist(),
-        "deflection_m": rig.truth.deflection(pad, _PIVOT_LOADS).tolist(),
+        "deflection_m": truth.deflection(pad, _PIVOT_LOADS).tolist(),
         "stiffness_N_per_m": stiffness.tolist(),
     }
 
@@ -309,7 +280,7 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
     lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
     readings = {}
     for quantity in ("displacement", "force", "acceleration"):
-        phasors = np.stack([line.phasor(quantity) for line in lines], axis=1)
+        phasors = np.stack([getattr(line, quantity) for line in lines], axis=1)
         readings[quantity] = _reading_map(instruments, quantity, frequency) @ phasors
     oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
     return oil_force @ np.linalg.inv(readings["displacement"])

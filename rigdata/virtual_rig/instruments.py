@@ -78,8 +78,12 @@ class Sensor:
         return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), calibration=calibration)
 
     def with_error(self, **changes: float) -> Sensor:
-        """Return the sensor with these fields of its error replaced."""
-        return replace(self, error=replace(self.error, **changes))
+        """Return the sensor with these errors on top of its own: a gain multiplies, all else adds."""
+        error = self.error
+        for name, value in changes.items():
+            total = error.gain * value if name == "gain" else getattr(error, name) + value
+            error = replace(error, **{name: total})
+        return replace(self, error=error)
 
     def direction(self, stated: bool = False) -> np.ndarray:
         """Unit vector (2,) along which it really reads, or is stated to read."""
@@ -162,21 +166,12 @@ class Instruments:
         mass_error: float = 0.0,
     ) -> Instruments:
         """Add measurement effects by their canonical names and meanings (physics.md)."""
-
-        def changed(sensor: Sensor) -> Sensor:
-            error = sensor.error
-            if sensor.quantity == "displacement":
-                return sensor.with_error(
-                    gain=error.gain * probe_gain,
-                    angle=error.angle + probe_rotation,
-                    delay=error.delay + channel_delay,
-                )
-            if sensor.quantity == "force":
-                return sensor.with_error(gain=error.gain * loadcell_gain, cross=error.cross + loadcell_crosstalk)
-            return sensor
-
+        errors = {
+            "displacement": {"gain": probe_gain, "angle": probe_rotation, "delay": channel_delay},
+            "force": {"gain": loadcell_gain, "cross": loadcell_crosstalk},
+        }
         return replace(
             self,
-            sensors=tuple(changed(s) for s in self.sensors),
+            sensors=tuple(s.with_error(**errors.get(s.quantity, {})) for s in self.sensors),
             housing_mass_error=self.housing_mass_error + mass_error,
         )

@@ -106,7 +106,7 @@ def manifest_text(
     if layout.time_name is not None:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
     blocks += [_channel(sensor) for sensor in instruments.sensors]
-    rotation = next((run.point.rotation for run in runs if run.point is not None), ROTATIONS[0])
+    rotation = runs[0].point.rotation
     if rotation != ROTATIONS[0]:
         blocks.append(_table("[shaft]", {"rotation": rotation}))
     blocks += [_run(run, layout, common, faults, rotation) for run in runs]
@@ -153,10 +153,10 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
     entries["kind"] = run.kind
     if isinstance(noted.test, DryTest):
         entries["pad"] = noted.test.pad
-        entries["static_load_direction"] = _degrees(noted.direction or 0.0)
+        entries["static_load_direction"] = _degrees(noted.direction)
         if noted.test.branch != "up":
             entries["branch"] = noted.test.branch
-    if noted.point is not None:
+    elif noted.test is None:
         entries["shaft_speed"] = f"{noted.point.shaft_speed_hz:.10g} Hz"
         entries["static_load"] = f"{noted.point.static_load / 1e3:.10g} kN"
         entries["static_load_direction"] = _degrees(noted.point.static_load_direction)
@@ -164,7 +164,7 @@ def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Faul
             entries["rotation"] = noted.point.rotation
         if noted.kind == "dynamic":
             entries["excitation_frequency"] = f"{noted.point.excitation_hz:.10g} Hz"
-            entries["excitation_direction"] = _degrees(noted.direction or 0.0)
+            entries["excitation_direction"] = _degrees(noted.direction)
     if run.rate != common_rate:
         entries["sample_rate"] = _rate(run.rate)
     return _table("[[runs]]", entries)
@@ -177,12 +177,12 @@ def _as_noted(run: PlannedRun, faults: tuple[Fault, ...]) -> PlannedRun:
             continue
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
             run = replace(run, test=replace(run.test, pad=int(fault.value)))
-        elif fault.kind == "wrong_direction" and run.direction is not None:
+        elif fault.kind == "wrong_direction":
             run = replace(run, direction=run.direction + fault.value)
-        elif fault.kind == "wrong_frequency" and run.point is not None:
+        elif fault.kind == "wrong_frequency":
             excitation = run.point.excitation + hz(fault.value)
             run = replace(run, point=replace(run.point, excitation=excitation))
-        elif fault.kind == "wrong_load" and run.point is not None:
+        elif fault.kind == "wrong_load":
             run = replace(run, point=replace(run.point, static_load=run.point.static_load * fault.value))
     return run
 

@@ -6,7 +6,7 @@ there are dry load steps toward one pad, and a small load swept once around the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from rigdata.vector import directions
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.noise import Noise, stream
 from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
-from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector
+from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector, point_facts
 
 _SETTLING = 0.1  # time constant of an overshoot [s]
 _UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one
@@ -30,12 +30,8 @@ class MotionLine:
     frequency: float  #: rad/s
     oil_force: ComplexArray  #: (2,) each: N, m, N, m/s^2
     displacement: ComplexArray
-    cell_force: ComplexArray
+    force: ComplexArray  #: of the cells
     acceleration: ComplexArray
-
-    def phasor(self, quantity: str) -> ComplexArray:
-        """Phasor (2,) of a measured quantity."""
-        return self.cell_force if quantity == "force" else getattr(self, quantity)
 
 
 @dataclass(frozen=True)
@@ -58,7 +54,7 @@ class Motion:
             mean = np.stack([np.interp(time, self.time, column) for column in mean.T], axis=1)
         out = np.broadcast_to(mean, (len(time), 2)).copy()
         for line in self.lines:
-            phasor = line.phasor(quantity)
+            phasor = getattr(line, quantity)
             turn = line.frequency * time
             out += np.outer(np.cos(turn), phasor.real) - np.outer(np.sin(turn), phasor.imag)
         return out
@@ -80,18 +76,16 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     The actuators' force goes through the film: F_oil = H d at every line, d shaft relative to housing. The
     housing stands on its cells, so F_oil = F_cell + m_h a_h with F_cell = k_cell x_h.
     """
-    if run.point is None:
-        raise VirtualRigError(f"run {run.id} needs a set point")
     rng = stream(seed, run.record, "physics")
     actual = _missed(run.point, noise, rng)
     shaft_angle = rng.uniform(0, 2 * np.pi)
     forces = _actuator_forces(run, noise, rng)
-    unbalance = noise.shaft.unbalance * actual.shaft_speed**2
+    unbalance = noise.unbalance * actual.shaft_speed**2
     if unbalance:
         turning = unbalance * np.array([1.0, -1j * np.sign(actual.spin)]) * np.exp(1j * shaft_angle)
         forces.append((actual.shaft_speed, turning))
     # the surface is the same in the whole campaign
-    runout = np.array(noise.shaft.runout, dtype=float)
+    runout = np.array(noise.runout, dtype=float)
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
     orders = np.arange(1, len(runout) + 1)
     steady = replace(actual, excitation=0.0)
@@ -105,7 +99,7 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
         position=position,
         load=load_vector(actual),
         temperature=truth.temperatures(steady),
-        facts=_facts(actual, position, lines),
+        facts=point_facts(actual, position) | {"lines": [_line_facts(line) for line in lines]},
         lines=tuple(lines),
         speed=actual.spin,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
@@ -114,30 +108,26 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
 
 def _missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
     """Draw the point that is really run when the set point is `point`."""
-    miss = noise.set_point
     load, direction, speed = rng.standard_normal(3)
     return replace(
         point,
-        static_load=point.static_load * (1 + miss.load * load),
-        static_load_direction=point.static_load_direction + miss.direction * direction,
-        shaft_speed=point.shaft_speed * (1 + miss.speed * speed),
+        static_load=point.static_load * (1 + noise.load_miss * load),
+        static_load_direction=point.static_load_direction + noise.direction_miss * direction,
+        shaft_speed=point.shaft_speed * (1 + noise.speed_miss * speed),
     )
 
 
 def _actuator_forces(run: PlannedRun, noise: Noise, rng: np.random.Generator) -> list[tuple[float, ComplexArray]]:
     """Force phasors (2,) [N] of the actuators, with their frequencies [rad/s]."""
     forces: list[tuple[float, ComplexArray]] = []
-    if run.direction is None:
-        return forces
     along = directions(run.direction)
     across = np.array([-along[1], along[0]])
-    defects = noise.actuators
     for frequency, amplitude in run.lines:
         phase = np.exp(1j * rng.uniform(0, 2 * np.pi))
-        gain = 1 + defects.scatter * rng.standard_normal()
-        talk = defects.cross_talk * (rng.standard_normal() + 1j * rng.standard_normal()) / np.sqrt(2)
+        gain = 1 + noise.actuator_scatter * rng.standard_normal()
+        talk = noise.cross_talk * (rng.standard_normal() + 1j * rng.standard_normal()) / np.sqrt(2)
         forces.append((frequency, amplitude * phase * (gain * along + talk * across)))
-        for order, share in enumerate(defects.harmonics, 2):
+        for order, share in enumerate(noise.actuator_harmonics, 2):
             turn = np.exp(1j * rng.uniform(0, 2 * np.pi))
             forces.append((order * frequency, amplitude * share * turn * along))
     return forces
@@ -156,38 +146,21 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
         frequency=frequency,
         oil_force=force,
         displacement=np.asarray(np.linalg.solve(h, force), dtype=complex),
-        cell_force=force - instruments.true_mass * acceleration,
+        force=force - instruments.true_mass * acceleration,
         acceleration=acceleration,
     )
 
 
-def _facts(actual: OperatingPoint, position: FloatArray, lines: Sequence[MotionLine]) -> dict[str, object]:
-    phasors_of_lines = []
-    for line in lines:
-        phasors = {"oil_force_N": _parts(line.oil_force), "displacement_m": _parts(line.displacement)}
-        phasors_of_lines.append({"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **phasors})
-    return {
-        "static_load_N": actual.static_load,
-        "static_load_direction_deg": actual.static_load_direction_deg,
-        "shaft_speed_Hz": actual.shaft_speed_hz,
-        "x_m": float(position[0]),
-        "y_m": float(position[1]),
-        "lines": phasors_of_lines,
-    }
+def _line_facts(line: MotionLine) -> dict[str, object]:
+    """Frequency and phasors ``[[Re x, Im x], [Re y, Im y]]`` of a line."""
+    phasors = {"oil_force_N": line.oil_force, "displacement_m": line.displacement}
+    parts = {name: np.stack([p.real, p.imag], axis=1).tolist() for name, p in phasors.items()}
+    return {"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **parts}
 
 
-def _parts(phasor: ComplexArray) -> list[list[float]]:
-    """[[Re x, Im x], [Re y, Im y]]."""
-    return [[float(p.real), float(p.imag)] for p in phasor]
-
-
-def dry_motion(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Motion:
+def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, seed: int) -> Motion:
     """Motion in a dry pivot test: position along the pad = clearance + deflection under the load on the pivot."""
-    test = run.test
-    if not isinstance(test, DryTest) or run.direction is None:
-        raise VirtualRigError(f"run {run.id} is not a dry pivot test")
     rng = stream(seed, run.record, "dry")
-    pad = test.pad - 1
     toward = directions(run.direction)
     sideways = np.array([-toward[1], toward[0]])
     time, load = load_history(test, run.rate)
@@ -199,7 +172,7 @@ def dry_motion(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Mot
     on_pivot = held_back(load * np.cos(off), flaws.friction)
     deflection = truth.deflection(test.pad, on_pivot)
     missing = gap * np.exp(-load / flaws.contact_load)
-    radial = truth.clearance[pad] + deflection - missing
+    radial = truth.clearance[test.pad - 1] + deflection - missing
     position = np.outer(radial, toward) + np.outer(side_start + side * (deflection - missing), sideways)
     facts = {
         "load_direction_error_deg": float(np.degrees(off)),
@@ -258,11 +231,8 @@ def _either_sign(rng: np.random.Generator, limits: tuple[float, float]) -> float
     return float(rng.uniform(*limits) * rng.choice([-1.0, 1.0]))
 
 
-def clearance_motion(run: PlannedRun, truth: RigTruth, noise: Noise, seed: int) -> Motion:
+def clearance_motion(run: PlannedRun, sweep: ClearanceSweep, truth: RigTruth, noise: Noise, seed: int) -> Motion:
     """Motion in a clearance sweep."""
-    sweep = run.test
-    if not isinstance(sweep, ClearanceSweep):
-        raise VirtualRigError(f"run {run.id} is not a clearance sweep")
     rng = stream(seed, run.record, "dry")
     push = sweep.push * (1 + noise.dry.push_scatter * rng.standard_normal())
     time = np.arange(round(sweep.seconds * run.rate)) / run.rate
@@ -287,10 +257,9 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         after = pads[(i + 1) % len(pads)]
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
-        passed = (direction - angle - lag + np.pi) % (2 * np.pi) - np.pi
-        remaining = (next_angle + lag - direction + np.pi) % (2 * np.pi) - np.pi
+        passed, remaining = _wrapped(direction - angle - lag), _wrapped(next_angle + lag - direction)
         share = 0.25 * (1 + np.tanh(passed / width)) * (1 + np.tanh(remaining / width))
-        turned = np.clip((direction - angle + np.pi) % (2 * np.pi) - np.pi, 0.0, gap)
+        turned = np.clip(_wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
         shares.append(share)
@@ -304,6 +273,11 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         side = truth.clearance[pad] + truth.deflection(pad + 1, push * np.maximum(off, 0.0))
         position += (alone * (side - position @ normals[i]))[:, None] * normals[i]
     return np.asarray(position)
+
+
+def _wrapped(angle: FloatArray) -> FloatArray:
+    """Angles [rad] from -pi to pi."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _sides(truth: RigTruth) -> list[int]:

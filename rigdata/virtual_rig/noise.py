@@ -34,32 +34,6 @@ class ChannelNoise:
 
 
 @dataclass(frozen=True)
-class ShaftDefects:
-    """What the turning shaft adds."""
-
-    runout: tuple[float, ...] = ()
-    unbalance: float = 0.0
-
-
-@dataclass(frozen=True)
-class ActuatorDefects:
-    """What the actuators do in addition to the command."""
-
-    harmonics: tuple[float, ...] = ()
-    scatter: float = 0.0
-    cross_talk: float = 0.0
-
-
-@dataclass(frozen=True)
-class SetPointMiss:
-    """By how much a run misses its set point, standard deviations."""
-
-    load: float = 0.0
-    direction: float = 0.0
-    speed: float = 0.0
-
-
-@dataclass(frozen=True)
 class Glitches:
     """Bursts in which a displacement or force channel is off by a constant."""
 
@@ -99,9 +73,14 @@ class Noise:
     mains_frequency: float = 50.0
     mains_scatter: float = 0.0
     mains_harmonics: tuple[float, ...] = ()
-    shaft: ShaftDefects = ShaftDefects()
-    actuators: ActuatorDefects = ActuatorDefects()
-    set_point: SetPointMiss = SetPointMiss()
+    runout: tuple[float, ...] = ()  #: of the shaft, 1X, 2X, ... [m]
+    unbalance: float = 0.0  #: kg m
+    actuator_harmonics: tuple[float, ...] = ()  #: shares of the excitation
+    actuator_scatter: float = 0.0
+    cross_talk: float = 0.0  #: of the actuators
+    load_miss: float = 0.0  #: by how much a run misses its set point, standard deviations: share, rad, share
+    direction_miss: float = 0.0
+    speed_miss: float = 0.0
     glitches: Glitches = Glitches()
     dry: DryImperfections = DryImperfections()
     bits: int | None = None
@@ -126,9 +105,14 @@ class Noise:
             speed=ChannelNoise(0.122, 0.023, 0.06, 0.002),
             mains_scatter=0.01,
             mains_harmonics=(0.02, 0.05),
-            shaft=ShaftDefects((1.1e-6, 0.25e-6), 1.31e-3),
-            actuators=ActuatorDefects((0.02,), 0.03, 0.05),
-            set_point=SetPointMiss(0.003, radians(0.2), 0.0009),
+            runout=(1.1e-6, 0.25e-6),
+            unbalance=1.31e-3,
+            actuator_harmonics=(0.02,),
+            actuator_scatter=0.03,
+            cross_talk=0.05,
+            load_miss=0.003,
+            direction_miss=radians(0.2),
+            speed_miss=0.0009,
             glitches=Glitches(1 / 6),
             dry=DryImperfections(
                 direction=(radians(1.0), radians(2.0)),

@@ -12,6 +12,8 @@ from rigdata.virtual_rig.truth import VirtualRigError, hz
 
 Branch = Literal["up", "down", "cycle"]
 _DOWNWARD = -pi / 2
+#: Of a run without load and rotation of its own.
+_NO_POINT = OperatingPoint(0.0)
 
 
 @dataclass(frozen=True)
@@ -59,28 +61,14 @@ class ClearanceSweep:
 
 
 @dataclass(frozen=True)
-class Timing:
-    """Sample rates [Hz] and record lengths [s]."""
-
-    dynamic_rate: float = 1000.0
-    dynamic_seconds: float = 2.0
-    locus_seconds: float = 1.0
-    dry_rate: float = 500.0
-
-    def __post_init__(self) -> None:
-        if min(self.dynamic_rate, self.dynamic_seconds, self.locus_seconds, self.dry_rate) <= 0:
-            raise VirtualRigError("sample rates and record lengths must be positive")
-
-
-@dataclass(frozen=True)
 class PlannedRun:
     """One run of the plan."""
 
     id: str
     kind: Literal["dynamic", "locus", "dry_pivot", "clearance"]
     rate: float
-    point: OperatingPoint | None = None
-    direction: float | None = None
+    point: OperatingPoint = _NO_POINT
+    direction: float = 0.0
     lines: tuple[tuple[float, float], ...] = ()
     record: str = ""
     test: DryTest | ClearanceSweep | None = None
@@ -99,7 +87,14 @@ class RigPlan:
     locus: tuple[OperatingPoint, ...] = ()
     dry: tuple[DryTest, ...] = ()
     clearance: tuple[ClearanceSweep, ...] = ()
-    timing: Timing = Timing()
+    dynamic_rate: float = 1000.0  #: sample rates [Hz] and record lengths [s]
+    dynamic_seconds: float = 2.0
+    locus_seconds: float = 1.0
+    dry_rate: float = 500.0
+
+    def __post_init__(self) -> None:
+        if min(self.dynamic_rate, self.dynamic_seconds, self.locus_seconds, self.dry_rate) <= 0:
+            raise VirtualRigError("sample rates and record lengths must be positive")
 
     @classmethod
     def like_paper(cls, pads: int = 5) -> RigPlan:
@@ -149,18 +144,18 @@ class RigPlan:
                     yield PlannedRun(
                         id=f"d-{self._name(point)}-{point.excitation_hz:g}{tail}",
                         kind="dynamic",
-                        rate=self.timing.dynamic_rate,
+                        rate=self.dynamic_rate,
                         point=point,
                         direction=direction,
                         lines=tuple((p.excitation, amplitude) for p in together),
                         record=f"d-{self._name(point)}-{together[0].excitation_hz:g}{tail}",
-                        seconds=self.timing.dynamic_seconds,
+                        seconds=self.dynamic_seconds,
                     )
 
     def _check_dynamic(self, point: OperatingPoint) -> None:
-        if not 0 < point.excitation < pi * self.timing.dynamic_rate:
+        if not 0 < point.excitation < pi * self.dynamic_rate:
             raise VirtualRigError(
-                f"an excitation of {point.excitation_hz:g} Hz cannot be sampled at {self.timing.dynamic_rate:g} Hz; "
+                f"an excitation of {point.excitation_hz:g} Hz cannot be sampled at {self.dynamic_rate:g} Hz; "
                 "choose one between zero and half the sample rate"
             )
         if point.static_load <= 0 or self.dynamic_fraction <= 0:
@@ -172,10 +167,10 @@ class RigPlan:
             yield PlannedRun(
                 id=name,
                 kind="locus",
-                rate=self.timing.dynamic_rate,
+                rate=self.dynamic_rate,
                 point=point,
                 record=name,
-                seconds=self.timing.locus_seconds,
+                seconds=self.locus_seconds,
             )
 
     def _static_runs(self, pivot_angles: Sequence[float]) -> Iterable[PlannedRun]:
@@ -184,11 +179,11 @@ class RigPlan:
                 raise VirtualRigError(f"dry test on pad {test.pad}: the bearing has pads 1 to {len(pivot_angles)}")
             name = f"p-{test.pad}-{test.branch}"
             angle = pivot_angles[test.pad - 1]
-            rate = self.timing.dry_rate
+            rate = self.dry_rate
             yield PlannedRun(id=name, kind="dry_pivot", rate=rate, direction=angle, record=name, test=test)
         for number, sweep in enumerate(self.clearance, 1):
             name = f"c-{number}"
-            yield PlannedRun(id=name, kind="clearance", rate=self.timing.dry_rate, record=name, test=sweep)
+            yield PlannedRun(id=name, kind="clearance", rate=self.dry_rate, record=name, test=sweep)
 
     def _name(self, point: OperatingPoint) -> str:
         """Load, and whatever else distinguishes the points of this plan."""

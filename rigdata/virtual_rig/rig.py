@@ -5,7 +5,7 @@ From motion to readings: axes, gains, delays, runout, noise, glitches, zero, the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from rigdata.virtual_rig.faults import Fault, check_faults
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
 from rigdata.virtual_rig.noise import ChannelNoise, Noise, stream
-from rigdata.virtual_rig.plan import PlannedRun, RigPlan
+from rigdata.virtual_rig.plan import DryTest, PlannedRun, RigPlan
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError
 
 
@@ -100,14 +100,6 @@ def draw_glitches(instruments: Instruments, noise: Noise, samples: int, seed: in
     return tuple(glitches)
 
 
-def add_glitches(columns: dict[str, FloatArray], instruments: Instruments, glitches: Iterable[Glitch]) -> None:
-    """Put bursts into the readings, in place."""
-    for glitch in glitches:
-        sensor = instruments.named(glitch.channel)
-        burst = slice(glitch.first, glitch.first + glitch.count)
-        columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
-
-
 def converted(reading: FloatArray, sensor: Sensor, bits: int | None) -> FloatArray:
     """Reading after the converter: limited to its span and rounded to its steps."""
     if bits is None:
@@ -179,20 +171,18 @@ def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: s
     return out
 
 
+#: Fields of a sensor's error by the fault that changes them.
+_ERRORS = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
+
+
 def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
     """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
     sensors = list(instruments.sensors)
     for fault in faults:
         for i, sensor in enumerate(sensors):
             if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
-                sensors[i] = _faulty_sensor(sensor, fault.kind, fault.value)
+                sensors[i] = sensor.with_error(**{_ERRORS[fault.kind]: fault.value})
     return replace(instruments, sensors=tuple(sensors))
-
-
-def _faulty_sensor(sensor: Sensor, kind: str, value: float) -> Sensor:
-    names = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
-    error = getattr(sensor.error, names[kind])
-    return sensor.with_error(**{names[kind]: error * value if kind == "scaled" else error + value})
 
 
 def spoil_record(
@@ -286,21 +276,15 @@ class VirtualRig:
     def _runs(self) -> tuple[PlannedRun, ...]:
         return self.plan.runs(self.truth.pivot_angles)
 
-    def records(self) -> tuple[PlannedRun, ...]:
-        """The runs that have a record of their own, in order; others share one of these."""
-        return tuple(run for run in self.runs() if run.record == run.id)
-
     def simulate(self, run_id: str) -> SimulatedRun:
-        """Make the record of one run (or the one that it shares)."""
+        """Make the record of one run (or the one that it shares, or that was copied in its place)."""
         runs = {run.id: run for run in self.runs()}
         if run_id not in runs:
             raise VirtualRigError(f"no run {run_id!r} in the plan")
-        return self._recorded(runs[runs[run_id].record])
-
-    def simulate_all(self) -> Iterator[SimulatedRun]:
-        """Make every record, one after the other."""
-        for run in self.records():
-            yield self._recorded(run)
+        run = runs[runs[run_id].record]
+        copied = [fault.other for fault in self.faults_of(run.id) if fault.kind == "duplicate_run"]
+        source = runs[copied[0] or ""] if copied else run
+        return replace(self._simulated(source), run=run)
 
     def faults_of(self, record: str) -> tuple[Fault, ...]:
         """Faults that strike one of the runs of a record."""
@@ -309,15 +293,7 @@ class VirtualRig:
         members = [run.id for run in self.runs() if run.record == record]
         return tuple(fault for fault in self.faults if any(map(fault.affects, members)))
 
-    def _recorded(self, run: PlannedRun) -> SimulatedRun:
-        """Simulate a run, or the one whose record was copied in its place."""
-        for fault in self.faults_of(run.record):
-            if fault.kind == "duplicate_run":
-                copied = next(candidate for candidate in self.runs() if candidate.id == fault.other)
-                return replace(self._simulate(copied), run=run)
-        return self._simulate(run)
-
-    def _simulate(self, run: PlannedRun) -> SimulatedRun:
+    def _simulated(self, run: PlannedRun) -> SimulatedRun:
         faults = self.faults_of(run.record)
         if any(fault.kind == "missing_excitation" for fault in faults):
             run = replace(run, lines=())
@@ -327,7 +303,10 @@ class VirtualRig:
         glitches: tuple[Glitch, ...] = ()
         if run.kind in ("dynamic", "locus"):
             glitches = draw_glitches(instruments, self.noise, len(motion.time), self.seed, run.id)
-        add_glitches(columns, instruments, glitches)
+        for glitch in glitches:
+            sensor = instruments.named(glitch.channel)
+            burst = slice(glitch.first, glitch.first + glitch.count)
+            columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
         columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
         readings = Readings(motion.time, columns, run.rate)
         if faults:
@@ -336,8 +315,8 @@ class VirtualRig:
         return SimulatedRun(run, readings, motion, glitches, run.id)
 
     def _motion(self, run: PlannedRun, instruments: Instruments) -> Motion:
-        if run.kind == "dry_pivot":
-            return dry_motion(run, self.truth, self.noise, self.seed)
-        if run.kind == "clearance":
-            return clearance_motion(run, self.truth, self.noise, self.seed)
+        if isinstance(run.test, DryTest):
+            return dry_motion(run, run.test, self.truth, self.noise, self.seed)
+        if run.test is not None:
+            return clearance_motion(run, run.test, self.truth, self.noise, self.seed)
         return running_motion(run, self.truth, instruments, self.noise, self.seed)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from math import pi
 from typing import Any
 
@@ -73,16 +72,9 @@ class RigTruth:
         )
         return replace(base, **fields)
 
-    def remembered(self) -> RigTruth:
-        """Return the same truth, which asks each callable only once per point: for the length of one campaign."""
-        stiffness, position, temperature = cache(self.stiffness), cache(self.position), cache(self.temperature)
-        return replace(self, stiffness=stiffness, position=position, temperature=temperature)
-
     def h(self, point: OperatingPoint) -> ComplexArray:
         """Dynamic stiffness at a point, (2, 2) complex [N/m], checked."""
-        h = np.asarray(self.stiffness(point), dtype=complex)
-        if h.shape != (2, 2) or not np.isfinite(h).all():
-            raise VirtualRigError(f"stiffness({point}) must be (2, 2) finite complex, got shape {h.shape}: {h}")
+        h = _checked(self.stiffness(point), (2, 2), f"stiffness({point})", complex)
         if np.linalg.cond(h) > 1e8:
             raise VirtualRigError(f"stiffness({point}) is singular: the shaft would move without bound")
         return h
@@ -116,8 +108,20 @@ def hz(frequency: float) -> float:
     return 2 * pi * frequency
 
 
-def _checked(values: Any, shape: tuple[int, ...], name: str) -> FloatArray:
-    array = np.asarray(values, dtype=float)
+def point_facts(point: OperatingPoint, position: FloatArray) -> dict[str, object]:
+    """A point and the shaft's mean position there, as the truth files write them."""
+    x, y = position.tolist()
+    return {
+        "static_load_N": point.static_load,
+        "static_load_direction_deg": point.static_load_direction_deg,
+        "shaft_speed_Hz": point.shaft_speed_hz,
+        "x_m": x,
+        "y_m": y,
+    }
+
+
+def _checked(values: Any, shape: tuple[int, ...], name: str, kind: type = float) -> np.ndarray:
+    array: np.ndarray = np.asarray(values, dtype=kind)
     if array.shape != shape or not np.isfinite(array).all():
         raise VirtualRigError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
     return array

@@ -18,7 +18,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from rigdata.virtual_rig import Fault, Noise, Timing
+from rigdata.virtual_rig import Fault, Noise
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
@@ -175,7 +175,7 @@ def test_what_many_runs_share_is_told_once():
 
 
 #: Nine short runs.
-TINY = replace(PLAN, directions=directions(5), locus=(), dry=PLAN.dry[:3], timing=Timing(dynamic_seconds=1.0))
+TINY = replace(PLAN, directions=directions(5), locus=(), dry=PLAN.dry[:3], dynamic_seconds=1.0)
 
 
 @pytest.mark.slow

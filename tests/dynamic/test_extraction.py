@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,38 +28,9 @@ DRIVEN = 33.7
 POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * DRIVEN)
 
 
-@dataclass
-class Reader:
-    """Channels in memory; counts what is asked of it."""
-
-    data: dict
-    stamps: np.ndarray | None = None
-    file: str = "memory"
-    asked: list = field(default_factory=list)
-
-    def names(self):
-        return tuple(self.data)
-
-    def length(self):
-        return len(next(iter(self.data.values())))
-
-    def rate(self):
-        return RATE
-
-    def read(self, names, start, stop):
-        self.asked.append(tuple(names))
-        return [self.data[name][start:stop] for name in names]
-
-    def time(self, start, stop):
-        return (np.arange(self.length()) / RATE if self.stamps is None else self.stamps)[start:stop]
-
-    def counted(self):
-        return self.stamps is None
-
-
 def run_of(data, channels, stamps=None):
     described = {c.name: c for c in channels}
-    return Run("r", "dynamic", POINT, 0.3, None, "up", described, frozenset(), Reader(data, stamps))
+    return Run("r", "dynamic", POINT, 0.3, None, "up", described, frozenset(), HeldReader(data, RATE, stamps))
 
 
 def probes(axes, zero=0.0, polarity=1):

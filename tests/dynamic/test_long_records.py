@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Timing
 from tests.dynamic.test_identify import rig
 from tests.rigs.held_run import POINT, held_run
 from tpjb_ident.phasors.extraction import extract
@@ -23,8 +22,8 @@ FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
 
 @pytest.fixture(scope="module")
 def run(campaign_of):
-    timing = Timing(dynamic_rate=5000.0, dynamic_seconds=8.0)
-    path = campaign_of(rig([(5000.0, 25.0)], seed=4, timing=timing, directions=(0.3,)))
+    timing = {"dynamic_rate": 5000.0, "dynamic_seconds": 8.0}
+    path = campaign_of(rig([(5000.0, 25.0)], seed=4, **timing, directions=(0.3,)))
     return load_campaign(path).of_kind("dynamic")[0]
 
 

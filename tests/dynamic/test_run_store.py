@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rigdata.campaign import load_campaign
-from rigdata.virtual_rig import Timing, write_campaign
+from rigdata.virtual_rig import write_campaign
 from tests.dynamic.test_identify import rig
 from tests.good_campaigns import directions, written
 from tpjb_ident.cli.commands.identify import KEPT
@@ -34,7 +34,7 @@ POINTS = [(2500.0, 25.0), (5000.0, 25.0)]
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     """Six runs as short as they may be: what is kept of them is the same in kind."""
-    plan = {"directions": directions(3), "timing": Timing(dynamic_seconds=1.0)}
+    plan = {"directions": directions(3), "dynamic_seconds": 1.0}
     return written(tmp_path_factory.mktemp("rig") / "c.h5", rig(POINTS, seed=8, **plan))
 
 
@@ -159,7 +159,7 @@ def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
 
 
 def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
-    two = rig(POINTS[:1], seed=8, directions=directions(2), timing=Timing(dynamic_seconds=1.0))
+    two = rig(POINTS[:1], seed=8, directions=directions(2), dynamic_seconds=1.0)
     write_campaign(tmp_path / "folder", two, "csv-german")
     run, other = load_campaign(tmp_path / "folder").of_kind("dynamic")[:2]
     mark = fingerprint(run, 30.0, PhasorSettings())

@@ -13,8 +13,8 @@ import pytest
 from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from rigdata.readers import base
-from rigdata.readers.file_reader import read_series
-from rigdata.readers.series import Series, arranged
+from rigdata.readers.file_reader import FileReader, read_series
+from rigdata.readers.series import Contents, Series
 from tests.hostile import claims
 from tests.hostile.fuzz_targets import CSV_MANIFEST
 
@@ -92,11 +92,11 @@ def test_mdf_is_refused_by_what_it_claims_in_the_process_that_reads_it(tmp_path)
 def test_short_channels_are_not_spread_over_a_long_clock():
     clock = Series("fast", "", np.zeros(1000), np.arange(1000.0))
     slow = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 999.0])) for i in range(10_000)]
-    assert arranged([clock, *slow], {}, None, "x.tdms", None).nbytes == 8 * (2 * 1000 + 2 * 10_000 + 2)
+    assert FileReader(Path("x"), "x.tdms")._arranged(Contents([clock, *slow])).nbytes == 8 * (2 * 1000 + 2 * 10_000 + 2)
 
 
 @pytest.mark.slow
 def test_different_times_without_end_are_refused():
     series = [Series(f"s{i}", "", np.zeros(2), np.array([0.0, 1.05**i])) for i in range(1002)]
     with pytest.raises(RigDataError, match="more than 1000 different times"):
-        arranged(series, {}, None, "x.tdms", None)
+        FileReader(Path("x"), "x.tdms")._arranged(Contents(series))

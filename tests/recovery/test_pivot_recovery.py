@@ -51,7 +51,7 @@ def test_one_campaign(tmp_path, kind):
     for curve, law in zip(curves, laws, strict=True):
         assert curve.law.name == {"rocker": "hertz-line", "sphere": "hertz-point"}[kind]
         errors_within(curve, law, 4)
-        facts = truth.runs[f"p-{curve.pad}-up"]
+        facts = truth["runs"][f"p-{curve.pad}-up"]
         stated = np.radians(facts["load_direction_error_deg"])
         assert abs(curve.load_direction.angle - stated) < 5 * curve.load_direction.se + 1e-3
         upper = curve.pad in (3, 4)
@@ -76,7 +76,7 @@ def test_errors_and_coverage(tmp_path):
             top = np.log(curve.stiffness(8000.0) * law.compliance(8000.0)) / curve.relative_stiffness_se(8000.0)
             beyond.append(abs(float(top)) < 1.96)
             if curve.pad in (3, 4):
-                gap = truth.runs[f"p-{curve.pad}-up"]["contact_gap_m"]
+                gap = truth["runs"][f"p-{curve.pad}-up"]["contact_gap_m"]
                 onsets.append(curve.onset_load / true_onset(law, gap) - 1.0)
     errors, inside = np.abs(errors), np.abs(scores) < 1.96
     assert np.all(np.median(errors, axis=0) < 0.03)

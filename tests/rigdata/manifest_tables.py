@@ -33,7 +33,7 @@ _HOLDS = {
 
 
 def _holds(field: Field) -> str:
-    text = ", ".join(field.choices) or _HOLDS.get(field.kind, field.kind)
+    text = ", ".join(field.choices) if field.kind == "choice" else _HOLDS.get(field.kind, field.kind)
     if field.kind == "whole":
         text += f" from {field.low:g}"
     if field.required:

@@ -16,7 +16,7 @@ from rigdata import RigDataError, load_campaign
 from rigdata.readers import series
 from rigdata.readers.base import FORMATS
 from rigdata.readers.file_reader import FileReader, ReadingCache, read_series
-from rigdata.readers.series import Series, arranged, equidistant, is_time, seconds, with_unique_names
+from rigdata.readers.series import Contents, Series, equidistant, is_time, seconds, with_unique_names
 from tests.foreign_files import write_mdf, write_tdms, write_uff
 from tests.manifests import PROBE, SET_POINT, manifest
 from tpjb_ident.check.campaign import check_campaign
@@ -203,9 +203,13 @@ def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
     assert cache.nbytes <= 3 * 8 * COUNT
 
 
+def arranged(series):
+    return FileReader(Path("f"), "f", "r")._arranged(Contents(series))
+
+
 def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
     same = [Series("b", "", np.zeros(5)), Series("c", "", np.zeros(5))]
-    layout = arranged([Series("a", "", np.zeros(4)), *same], {}, None, "f", "r")
+    layout = arranged([Series("a", "", np.zeros(4)), *same])
     assert layout.grids[0].channels == ["b", "c"]
     assert "has 4 samples and no times, the others have 5" in str(layout.faults["a"])
 
@@ -213,7 +217,7 @@ def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
 def test_slow_channels_stay_at_their_own_times():
     fast = Series("a", "V", np.arange(11.0), 0.1 * np.arange(11))
     slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
-    layout = arranged([slow, fast], {}, None, "f", "r")
+    layout = arranged([slow, fast])
     first, second = layout.grids
     assert (first.length, first.rate, second.length) == (11, 10.0, 2)
     np.testing.assert_array_equal(layout.times[second.clock], slow.time)

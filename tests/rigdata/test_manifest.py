@@ -91,7 +91,7 @@ def problems_of(text: str) -> list[str]:
 
 def test_the_example_of_the_format():
     manifest = parse_manifest(GOOD)
-    assert (manifest.id, manifest.bearing, manifest.housing_mass, manifest.sample_rate) == (
+    assert (manifest.id, manifest.bearing_name, manifest.housing_mass, manifest.sample_rate) == (
         "rocker-A",
         "rocker.toml",
         30.0,
@@ -150,7 +150,7 @@ def test_the_example_of_the_format():
         ('id = "p-1-up"', "id = 7", ["not text"]),
         ("header_line = 7", "header_line = 0", ["whole number from 1"]),
         ("units_line = 8", "units_line = 6", ["not below header_line"]),
-        ('decimal = ","', 'decimal = ";"', ["Give one character, . or ,"]),
+        ('decimal = ","', 'decimal = ";"', ["decimal ';' is unknown"]),
         ('encoding = "cp1252"', 'encoding = "klingon"', ["encoding", "cp1252"]),
         ('encoding = "cp1252"', 'encoding = "zip"', ["encoding"]),
         ('branch = "up"', 'branch = "upp"', ["Did you mean 'up'"]),

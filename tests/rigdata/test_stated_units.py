@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 
 from rigdata import load_campaign
 from rigdata.calibration import Channel
-from rigdata.readers.base import unit_problems
+from rigdata.readers.base import RunReader
 from tests.hostile.fuzz_targets import CSV_MANIFEST
 from tpjb_ident.check.campaign import check_campaign
 
 
 def stated(quantity: str, unit: str, text: str) -> str:
-    problems = unit_problems({"C": Channel("C", quantity, unit=unit)}, {"C": text}, "c.csv", "c-1")
+    reader = RunReader(Path("c.csv"), "c.csv", "c-1", {"C": Channel("C", quantity, unit=unit)})
+    problems = reader.unit_problems({"C": text})
     assert all(p.severity == "error" and p.place == "channel C" for p in problems)
     return "; ".join(p.what for p in problems)
 

@@ -110,11 +110,11 @@ def test_truth_holds_the_apparent_coefficients_and_the_gap_voltages():
     instruments = Instruments.like_paper(seed=5).with_errors(probe_gain=1.1)
     plan = RigPlan(dynamic=operating_points([(5000.0, 40.0)]))
     truth = campaign_truth(VirtualRig(RigTruth.constant(K, C), plan, instruments), {})
-    point = truth.points[0]
+    point = truth["points"][0]
     np.testing.assert_allclose(point["K"], K)
     np.testing.assert_allclose(point["C"], C)
     np.testing.assert_allclose(point["K_apparent"], K / 1.1)
-    assert truth.gap_voltage_V == {s.name: s.zero for s in instruments.of("displacement")}
+    assert truth["gap_voltage_V"] == {s.name: s.zero for s in instruments.of("displacement")}
 
 
 def test_instruments_refuse_what_cannot_be():

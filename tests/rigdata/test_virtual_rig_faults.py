@@ -17,7 +17,6 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Timing,
     VirtualRig,
     VirtualRigError,
     operating_points,
@@ -36,7 +35,7 @@ def rig(*faults: Fault, noise: Noise | None = None, seconds: float = 2.0) -> Vir
         dynamic=operating_points([(5000.0, 25.0)]),
         directions=(0.3, 1.5),
         dry=(DryTest(2, levels=(500.0,)),),
-        timing=Timing(dynamic_seconds=seconds),
+        dynamic_seconds=seconds,
     )
     return VirtualRig(
         RigTruth.constant(K, C), plan, Instruments.like_paper(), noise or Noise.like_samples(), faults, seed=6
@@ -123,7 +122,7 @@ def test_duplicate_run_is_the_other_record():
     assert (copied.run.id, copied.source) == (SECOND, FIRST)
     np.testing.assert_array_equal(copied.readings.columns["X1A"], rig().simulate(FIRST).readings.columns["X1A"])
     crossed = rig(Fault("duplicate_run", SECOND, other=FIRST), Fault("duplicate_run", FIRST, other=SECOND))
-    assert [r.source for r in crossed.simulate_all()][:2] == [SECOND, FIRST]
+    assert [crossed.simulate(run.id).source for run in crossed.runs()][:2] == [SECOND, FIRST]
 
 
 def test_time_gap_takes_rows_out_of_all_channels():
@@ -217,7 +216,7 @@ def test_faults_that_a_layout_cannot_show_are_refused(tmp_path):
 def test_the_truth_tells_all_faults(tmp_path):
     fault = Fault("dead", FIRST, "X1A")
     truth = write_campaign(tmp_path / "c.h5", rig(fault))
-    assert truth.faults == ({"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0},)
+    assert truth["faults"] == [{"kind": "dead", "run": FIRST, "channel": "X1A", "start": 0.0}]
     assert all(text for _, _, text in KINDS.values())
     assert replace(fault, run="*").affects(SECOND)
     assert fault.is_in("X1A")

@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 
 from rigdata.virtual_rig import (
-    ActuatorDefects,
     ChannelNoise,
     Glitches,
     Instruments,
     Noise,
     RigPlan,
     RigTruth,
-    SetPointMiss,
-    ShaftDefects,
-    Timing,
     VirtualRig,
     locus_points,
     operating_points,
@@ -27,11 +23,12 @@ from tests.good_campaigns import CROSS_DAMPING as C
 from tests.good_campaigns import CROSS_STIFFNESS as K
 
 TRUTH = RigTruth.constant(K, C)
-LONG = Timing(locus_seconds=20.0)
 
 
 def rig(noise: Noise, **changes) -> VirtualRig:
-    plan = RigPlan(dynamic=operating_points([(5000.0, 25.0)]), directions=(0.5,), locus=locus_points(1), timing=LONG)
+    plan = RigPlan(
+        dynamic=operating_points([(5000.0, 25.0)]), directions=(0.5,), locus=locus_points(1), locus_seconds=20.0
+    )
     return VirtualRig(TRUTH, replace(plan, **changes), Instruments.like_paper(), noise, seed=11)
 
 
@@ -123,7 +120,7 @@ def test_converter_rounds_to_its_steps_and_limits():
 
 
 def test_runout_is_in_the_probes_only_and_unbalance_goes_through_the_film():
-    runout = values(replace(Noise.none(), shaft=ShaftDefects(runout=(1e-6, 0.3e-6))))
+    runout = values(replace(Noise.none(), runout=(1e-6, 0.3e-6)))
     assert amplitude(runout["X1A"], 22.0) == pytest.approx(1e-6, rel=1e-6)
     assert amplitude(runout["X1B"], 44.0) == pytest.approx(0.3e-6, rel=1e-6)
     for name in ("L1H", "L1V", "A1H", "A1V"):
@@ -134,7 +131,7 @@ def test_runout_is_in_the_probes_only_and_unbalance_goes_through_the_film():
     np.testing.assert_allclose(shifted, runout["X1A"][:1000], atol=2e-8)
 
     omega = 2 * np.pi * 22.0
-    found = values(replace(Noise.none(), shaft=ShaftDefects(unbalance=25.0 / omega**2)))
+    found = values(replace(Noise.none(), unbalance=25.0 / omega**2))
     force = np.stack([found["L1H"] + 30 * found["A1H"], found["L1V"] + 30 * found["A1V"]])
     np.testing.assert_allclose(np.hypot(*force), 25.0, rtol=1e-9)
     turning = np.unwrap(np.arctan2(force[1], force[0]))
@@ -146,12 +143,12 @@ def test_runout_is_in_the_probes_only_and_unbalance_goes_through_the_film():
 
 
 def test_actuator_harmonics_and_cross_talk():
-    harmonic = values(replace(Noise.none(), actuators=ActuatorDefects(harmonics=(0.02,))), "d-05000-25-01")
+    harmonic = values(replace(Noise.none(), actuator_harmonics=(0.02,)), "d-05000-25-01")
     force = harmonic["L1H"] + 30 * harmonic["A1H"]
     assert amplitude(force, 50.0) == pytest.approx(500.0 * 0.02 * np.cos(0.5), rel=1e-6)
-    noise = replace(Noise.none(), actuators=ActuatorDefects(scatter=0.03, cross_talk=0.05))
+    noise = replace(Noise.none(), actuator_scatter=0.03, cross_talk=0.05)
     directions = tuple(np.linspace(0.0, 3.1, 200))
-    talk = rig(noise, directions=directions, timing=Timing(dynamic_seconds=0.01))
+    talk = rig(noise, directions=directions, dynamic_seconds=0.01)
     along, across = [], []
     for run in talk.runs()[:200]:
         oil_force = talk.simulate(run.id).motion.lines[0].oil_force / 500.0
@@ -164,10 +161,10 @@ def test_actuator_harmonics_and_cross_talk():
 
 
 def test_set_points_are_missed_by_as_much_as_stated():
-    noise = replace(Noise.none(), set_point=SetPointMiss(load=0.003, direction=0.0035, speed=0.001))
-    plan = replace(RigPlan(locus=locus_points(300)), timing=Timing(locus_seconds=0.02))
+    noise = replace(Noise.none(), load_miss=0.003, direction_miss=0.0035, speed_miss=0.001)
+    plan = replace(RigPlan(locus=locus_points(300)), locus_seconds=0.02)
     many = VirtualRig(TRUTH, plan, Instruments.like_paper(), noise, seed=2)
-    facts = [record.motion.facts for record in many.simulate_all()]
+    facts = [many.simulate(run.id).motion.facts for run in many.runs()]
     assert np.std([f["static_load_N"] / 5000 for f in facts]) == pytest.approx(0.003, rel=0.15)
     assert np.std([f["shaft_speed_Hz"] / 22 for f in facts]) == pytest.approx(0.001, rel=0.15)
     off = [f["static_load_direction_deg"] - p.static_load_direction_deg for f, p in zip(facts, plan.locus)]
@@ -204,9 +201,8 @@ def test_scaling_scales_channel_noise_and_nothing_else():
     base = Noise.like_samples()
     twice = base.scaled(2.0)
     assert twice.displacement == ChannelNoise(*(2 * v for v in (35e-9, 10e-9, 39e-9, 0.15e-6)))
-    assert (twice.shaft, twice.actuators, twice.glitches, twice.dry) == (
-        base.shaft, base.actuators, base.glitches, base.dry,
-    )  # fmt: skip
+    channels = ("displacement", "force", "acceleration", "temperature", "speed")
+    assert replace(twice, **{name: getattr(base, name) for name in channels}) == base
     white = replace(Noise.none(), displacement=ChannelNoise(white=1e-8))
     np.testing.assert_allclose(values(white.scaled(3.0))["X1A"], 3 * values(white)["X1A"], rtol=1e-6, atol=1e-15)
 

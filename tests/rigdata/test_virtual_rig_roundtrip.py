@@ -19,8 +19,6 @@ from rigdata.virtual_rig import (
     RigPlan,
     RigTruth,
     Sensor,
-    SetPointMiss,
-    Timing,
     VirtualRig,
     locus_points,
     operating_points,
@@ -40,7 +38,8 @@ def small_plan() -> RigPlan:
         locus=locus_points(3),
         dry=(DryTest(1, levels=(500.0, 1500.0)), DryTest(3, levels=(500.0,), branch="cycle")),
         clearance=(ClearanceSweep(seconds=2.0),),
-        timing=Timing(dynamic_seconds=1.0, locus_seconds=0.5),
+        dynamic_seconds=1.0,
+        locus_seconds=0.5,
     )
 
 
@@ -109,7 +108,7 @@ def test_manifest_set_points_are_those_of_the_plan(campaign_of):
     campaign = rigdata.load_campaign(campaign_of(rig))
     for planned, found in zip(rig.runs(), campaign.runs, strict=True):
         assert (planned.id, planned.kind) == (found.id, found.kind)
-        if planned.point is not None:
+        if planned.test is None:
             want, have = planned.point, found.point
             assert have.static_load == pytest.approx(want.static_load, rel=1e-12)
             assert have.static_load_direction == pytest.approx(want.static_load_direction, abs=1e-10)
@@ -125,7 +124,7 @@ def test_stiffness_is_asked_at_the_point_really_run():
 
     plan = replace(small_plan(), dynamic=operating_points([(5000.0, 25.0)]), directions=(0.0,))
     truth = replace(RigTruth.constant(K, C), stiffness=stiffness)
-    noise = replace(Noise.none(), set_point=SetPointMiss(load=0.05))
+    noise = replace(Noise.none(), load_miss=0.05)
     record = quiet_rig(truth=truth, plan=plan, noise=noise).simulate("d-05000-25-01")
     load = record.motion.facts["static_load_N"]
     assert abs(load / 5000 - 1) > 0.005

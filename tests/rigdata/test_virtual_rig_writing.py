@@ -22,7 +22,6 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Timing,
     VirtualRig,
     VirtualRigError,
     locus_points,
@@ -40,7 +39,8 @@ def rig(seed: int = 1, **changes) -> VirtualRig:
         directions=(0.0, 1.5),
         locus=locus_points(2),
         dry=(DryTest(1, levels=(500.0,)),),
-        timing=Timing(dynamic_seconds=0.5, locus_seconds=0.5),
+        dynamic_seconds=0.5,
+        locus_seconds=0.5,
     )
     return replace(VirtualRig(TRUTH, plan, Instruments.like_paper(seed=seed), seed=seed), **changes)
 
@@ -150,7 +150,7 @@ SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=l
         (lambda: DryTest(1, hold=(1.0, 2.0)), "2 values for 10 levels"),
         (lambda: DryTest(1, ramp=0.0), "ramp must be positive"),
         (lambda: DryTest(1, branch="sideways"), "branch must be"),
-        (lambda: Timing(dynamic_rate=0.0), "must be positive"),
+        (lambda: RigPlan(dynamic_rate=0.0), "must be positive"),
         (lambda: RigPlan(dynamic=operating_points([(5000.0, 600.0)])).runs(()), "600 Hz cannot be sampled at 1000 Hz"),
         (lambda: RigPlan(dynamic=operating_points([(5000.0, 0.0)])).runs(()), "0 Hz cannot be sampled"),
         (lambda: RigPlan(dynamic=operating_points([(0.0, 25.0)])).runs(()), "positive static load"),
@@ -184,9 +184,9 @@ def test_manifest_has_the_shape_of_the_samples(tmp_path):
         pytest.skip("no samples beside the checkout")
     sample = tomllib.loads((SAMPLES / "rocker-baseline" / "campaign.toml").read_text())
     ours = VirtualRig(TRUTH, RigPlan.short(), Instruments.like_paper(), seed=1)
-    brief = Timing(dynamic_seconds=0.01, locus_seconds=0.01)
+    brief = {"dynamic_seconds": 0.01, "locus_seconds": 0.01}
     dry = tuple(DryTest(pad, levels=(500.0,), hold=0.01) for pad in range(1, 6))
-    short = replace(ours, plan=replace(ours.plan, timing=brief, dry=dry, clearance=(ClearanceSweep(seconds=0.1),)))
+    short = replace(ours, plan=replace(ours.plan, **brief, dry=dry, clearance=(ClearanceSweep(seconds=0.1),)))
     write_campaign(tmp_path / "c", short, "csv-german")
     made = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
     for manifest in (sample, made):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.calibration import Channel
+from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
@@ -28,9 +30,6 @@ class HeldReader:
     file: str = "memory"
     asked: list = field(default_factory=list)
 
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.data)
-
     def length(self) -> int:
         return len(next(iter(self.data.values())))
 
@@ -44,8 +43,14 @@ class HeldReader:
     def time(self, start: int, stop: int) -> np.ndarray:
         return self.stamps[start:stop] if self.stamps is not None else np.arange(start, stop) / self.sample_rate
 
-    def counted(self) -> bool:
-        return self.stamps is None
+    def devices(self) -> tuple[Device, ...]:
+        return (Device("", tuple(self.data), self.sample_rate, self.length(), self.stamps is None),)
+
+    def apart(self) -> frozenset[str]:
+        return frozenset()
+
+    def opened(self) -> AbstractContextManager[None]:
+        return nullcontext()
 
     def problems(self) -> tuple[Problem, ...]:
         return ()

@@ -20,7 +20,7 @@ from tests.structure.sources import parsed, texts
 LIMITS = {
     "measurement": (131.63, 15_752),
     "model": (91.86, 12_029),
-    "rigdata": (70.84, 9_480),
+    "rigdata": (68.95, 9_236),
     "diagnosis": (38.48, 4_770),
     "cli": (29.4, 4_095),
     "report": (27.28, 3_482),

@@ -21,7 +21,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from rigdata.virtual_rig import RigPlan, Timing, operating_points
+from rigdata.virtual_rig import RigPlan, operating_points
 from tests.good_campaigns import directions, rocker_rig, written
 from tests.studies.results import report, study_parser, table
 
@@ -39,7 +39,7 @@ def make(path: Path, runs: int, gigabytes: float) -> int:
     wanted = [(float(load), frequency) for load in loads for frequency in FREQUENCIES]
     plan = RigPlan(
         dynamic=operating_points(wanted[:points]), directions=directions(DIRECTIONS), locus=(), dry=(), clearance=(),
-        timing=Timing(dynamic_seconds=1.0),
+        dynamic_seconds=1.0,
     )  # fmt: skip
     second = written(path.with_name(f"{path.stem}.seed.h5"), rocker_rig(11, plan=plan))
     rng = np.random.default_rng(3)

@@ -50,10 +50,10 @@ def one_campaign(seed: int, path: Path, programme: str = "up") -> list[tuple[flo
     curves = fit_pivots(source, ANGLES)
     seconds = time.process_time() - before
     polygon = measure_clearance(source, ANGLES, curves)
-    push = float(truth.runs["c-1"]["push_N"])
+    push = float(truth["runs"]["c-1"]["push_N"])
     rows = []
     for k, (curve, law) in enumerate(zip(curves, laws, strict=True)):
-        gap = float(truth.runs[curve.runs[0]]["contact_gap_m"])
+        gap = float(truth["runs"][curve.runs[0]]["contact_gap_m"])
         onset = true_onset(law, gap) if curve.pad in UPPER_PADS else 0.0
         rows.append((
             seed, kind, curve.pad, hash_of(curve.law.name), *np.log(curve.stiffness(AT) * law.compliance(AT)),

@@ -11,9 +11,7 @@ import numpy as np
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.device import Device
-from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import inverse_directions
 from tpjb_ident.phasors.run_data import QUANTITIES
 
 
@@ -76,8 +74,8 @@ def device_readers(run: Run) -> tuple[DeviceReader, ...]:
     """Devices of a run that have channels with a direction, that of the first displacement channel first."""
     _check_directions(run)
     directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
-    tachometers = [c for c in run.channels.values() if c.quantity == "speed"][:1]
-    devices = _devices(run)
+    tachometers = run.of("speed")[:1]
+    devices = run.devices
     for name in directed.keys() - {name for device in devices for name in device.channels}:
         run.record(name, 0, 0)  # says that the file lacks it
     readers = []
@@ -92,25 +90,8 @@ def device_readers(run: Run) -> tuple[DeviceReader, ...]:
     return tuple(readers)
 
 
-def _devices(run: Run) -> tuple[Device, ...]:
-    if hasattr(run.reader, "devices"):
-        return run.devices
-    counted = getattr(run.reader, "counted", None)
-    return (Device("", tuple(run.channels), run.sample_rate, run.length, counted is not None and counted()),)
-
-
 def _check_directions(run: Run) -> None:
     """Refuse a run whose channels of a quantity do not span the plane."""
     for quantity in QUANTITIES:
-        described = [c for c in run.channels.values() if c.quantity == quantity]
-        if quantity == "acceleration" and not described:
-            continue
-        chosen = [c for c in described if c.axis is not None]
-        remedy = f"Describe two {quantity} channels with different axes in the manifest"
-        if len(chosen) < 2:
-            fault = f"has {len(chosen)} channels, two are needed"
-            raise refuse(run.file, f"quantity {quantity}", fault, remedy, run.id)
-        if np.isnan(inverse_directions(tuple(float(c.axis or 0.0) for c in chosen))).any():
-            names = ", ".join(c.name for c in chosen)
-            remedy = "Two channels at different angles (3 deg apart or more) are needed; check their axis"
-            raise refuse(run.file, f"channels {names}", "all measure along one line", remedy, run.id)
+        if quantity != "acceleration" or run.of(quantity):
+            run.vector_channels(quantity)

@@ -80,7 +80,7 @@ def with_kept_beginning(run: Run) -> Run:
     """The run with its beginning kept."""
     if isinstance(run.reader, _ReadingCache | _Beginning):
         return run
-    apart: frozenset[str] = getattr(run.reader, "apart", frozenset)()
+    apart = run.reader.apart()
     names = [name for name, c in run.channels.items() if c.quantity != "time" and name not in apart]
     cached: Any = _ReadingCache(run.reader, names)
     return replace(run, reader=cached)

@@ -171,29 +171,23 @@ def _columns(name: str, value: np.ndarray, texts: dict[str, list[str]]) -> tuple
     """Channels of a variable, and units of those that a list next to it has."""
     if value.ndim == 1 or 1 in value.shape:
         return {name: np.ascontiguousarray(value).reshape(-1)}, {}
-    names: list[str] = []
-    units: list[str] = []
     level = name.rpartition(".")[0]
-    lists = {}
-    for key, cells in texts.items():
-        prefix, _, last = key.rpartition(".")
-        if prefix == level:
-            lists[last.lower()] = cells
-    for key, cells in lists.items():
-        if not names and _NAMES.search(key) and len(cells) in value.shape:
-            names = cells
-    if not names:
-        return {f"{name}_{i + 1}": np.ascontiguousarray(column) for i, column in enumerate(value.T)}, {}
-    for key, cells in lists.items():
-        if not units and _UNITS.search(key) and len(cells) == len(names):
-            units = cells
+    lists = {key.rpartition(".")[2].lower(): cells for key, cells in texts.items() if key.rpartition(".")[0] == level}
+    names = _listed(lists, _NAMES, value.shape) or [name] * value.shape[1]
+    units = _listed(lists, _UNITS, (len(names),)) or [""] * len(names)
     columns, column_units = {}, {}
     for i, column in enumerate(value.T if len(names) == value.shape[1] else value):
-        is_unique = names[i] and names.count(names[i]) == 1
-        label = names[i] if is_unique else f"{names[i] or name}_{i + 1}"
+        label = names[i]
+        if not label or names.count(label) > 1:
+            label = f"{label or name}_{i + 1}"
         columns[label] = np.ascontiguousarray(column)
-        column_units[label] = units[i] if units else ""
+        column_units[label] = units[i]
     return columns, column_units
+
+
+def _listed(lists: dict[str, list[str]], named: re.Pattern[str], lengths: tuple[int, ...]) -> list[str]:
+    """The first list of such a name and length; empty where there is none."""
+    return next((cells for key, cells in lists.items() if named.search(key) and len(cells) in lengths), [])
 
 
 @dataclass

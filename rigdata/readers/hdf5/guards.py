@@ -142,10 +142,11 @@ def claimed_bytes(member: Any) -> int:
 
     if not isinstance(member, h5py.Dataset) or member.shape is None:
         return 0
-    return max(SAMPLE * math.prod(member.shape), _chunk_bytes(member))
+    return max(SAMPLE * math.prod(member.shape), chunk_bytes(member))
 
 
-def _chunk_bytes(dataset: Any) -> int:
+def chunk_bytes(dataset: Any) -> int:
+    """Bytes of a stored chunk; zero of what is stored in one piece."""
     return 0 if dataset.chunks is None else math.prod(dataset.chunks) * int(dataset.dtype.itemsize)
 
 
@@ -172,14 +173,6 @@ def filters(dataset: Any) -> list[Any]:
     """Code, flags and values of every filter of a dataset."""
     creation = dataset.id.get_create_plist()
     return [creation.get_filter(i)[:3] for i in range(creation.get_nfilters())]
-
-
-def chunk_bytes(group: Any, name: str) -> int:
-    """Bytes of a stored chunk; zero of what is no chunked dataset, or leads out of the file."""
-    import h5py
-
-    is_within = isinstance(group.get(name, getlink=True), h5py.HardLink)
-    return _chunk_bytes(group[name]) if is_within and isinstance(group[name], h5py.Dataset) else 0
 
 
 def is_plain(attribute: Any, most: int) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,15 +13,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.device import Grid, planned
+from rigdata.device import Grid
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import (
-    MAX_REQUEST,
-    MAX_SAMPLES,
-    MOST_RATE,
-    RunReader,
-    rate_of_time,
-)
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, SAMPLE, Layout, RunReader, rate_of_time
 from rigdata.readers.hdf5.guards import (
     TEXT,
     UNIT,
@@ -87,19 +81,17 @@ def _first_line(error: BaseException) -> str:
 
 
 @dataclass(frozen=True)
-class _Facts:
+class _Members(Layout):
     """What every request needs, cached until the file changes."""
 
     members: tuple[str, ...]
-    grids: tuple[Grid, ...]  #: the run's own device first
-    faults: dict[str, RigDataError]  #: of channels without usable times
 
 
 @dataclass(frozen=True)
 class Hdf5Reader(RunReader):
     """One run's group in an HDF5 file; the file is opened for every request and closed again."""
 
-    cached_facts: dict[tuple[int, int], _Facts] = field(default_factory=dict, repr=False, compare=False)
+    cached_layout: dict[tuple[int, int], _Members] = field(default_factory=dict, repr=False, compare=False)
     opened_members: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @contextmanager
@@ -144,11 +136,11 @@ class Hdf5Reader(RunReader):
 
     def _cache_bytes(self) -> int:
         """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
-        facts = self._facts()
-        if facts.grids[0].length * 8 <= _LEAST_CACHE:
+        own = self._layout().grids[0]
+        if own.length * SAMPLE <= _LEAST_CACHE:
             return _LEAST_CACHE
         with self._group() as group:
-            largest = max(chunk_bytes(group, name) for name in facts.members[:4])
+            largest = max(chunk_bytes(self._dataset(group, name)) for name in own.channels[:4])
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def _dataset(self, group: Any, name: str) -> Any:
@@ -184,31 +176,28 @@ class Hdf5Reader(RunReader):
             raise self.refuse(place, "holds its data in another file", "Copy the data into this file")
         for code in foreign_filters(dataset):
             raise self.refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
-        chunk = dataset.chunks
-        if chunk is not None and chunk[0] * dataset.dtype.itemsize > _MAX_CHUNK:
-            raise self.refuse(place, f"has chunks of {chunk[0]} samples", "Use chunks below 100 MB")
+        if chunk_bytes(dataset) > _MAX_CHUNK:
+            raise self.refuse(place, f"has chunks of {dataset.chunks[0]} samples", "Use chunks below 100 MB")
 
-    def _facts(self) -> _Facts:
-        """The facts; they are looked for once where the file is kept open."""
+    def _layout(self) -> _Members:
+        """What is sampled together; it is looked for once where the file is kept open."""
         try:
             state = self.path.stat()
         except OSError as error:
             raise self.refuse("", "the file is not there", "Check the path") from error
         signature = (state.st_size, state.st_mtime_ns)
-        if signature not in self.cached_facts:
+        if signature not in self.cached_layout:
             with self._group() as group:
-                rate = self._checked_rate(group.attrs)
-                members = tuple(itertools.islice(group, _MAX_MEMBERS))
-                facts = _Facts(members, *self._planned(group, rate))
-            self.cached_facts.clear()
-            self.cached_facts[signature] = facts
-        return self.cached_facts[signature]
+                layout = self._arranged(group, self._checked_rate(group.attrs))
+            self.cached_layout.clear()
+            self.cached_layout[signature] = layout
+        return self.cached_layout[signature]
 
-    def _lengths(self, group: Any) -> dict[str, int]:
+    def _lengths(self, group: Any, members: Sequence[str]) -> dict[str, int]:
         """Samples of every dataset that can be used."""
         lengths: dict[str, int] = {}
         problems: list[Problem] = []
-        for name in itertools.islice(group, _MAX_MEMBERS):
+        for name in members:
             try:
                 lengths[name] = int(self._dataset(group, name).shape[0])
             except RigDataError as error:  # raised again when that channel is asked for
@@ -220,15 +209,19 @@ class Hdf5Reader(RunReader):
             raise self.refuse("", fault, "Store one dataset per channel")
         return lengths
 
-    def _planned(self, group: Any, attribute: float | None) -> tuple[tuple[Grid, ...], dict[str, RigDataError]]:
+    def _arranged(self, group: Any, attribute: float | None) -> _Members:
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
-        lengths = self._lengths(group)
+        members = tuple(itertools.islice(group, _MAX_MEMBERS))
+        lengths = self._lengths(group, members)
         names = [name for name in self.channels if name in lengths]
         clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
         rates: dict[str, float] = {}
+        begins: dict[str, float] = {}
         run_rate = attribute or self.stated_rate
         for clock in [names[i] for i in clocks]:
-            rate = rate_of_time(self._seconds(group, clock, 0, min(lengths[clock], _LOOK)))
+            time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
+            rate = rate_of_time(time)
+            begins[clock] = float(time[0]) if len(time) else 0.0
             rates[clock] = rate if rate > 0 else run_rate or rate
             if attribute is not None and not self.channels[clock].clock:
                 rates[clock] = attribute
@@ -239,15 +232,13 @@ class Hdf5Reader(RunReader):
                 continue
             if same:
                 clock = names[i] if names[i] in same else same[0]
-                timings[name] = Grid(lengths[name], clock, rates[clock], clock)
+                timings[name] = Grid(lengths[name], clock, rates[clock], clock, begins[clock])
             else:
                 timings[name] = Grid(lengths[name], times=lengths[names[i]])
-        grids, texts = planned(
-            timings, self.channels, run_rate, lambda clock: float(self._seconds(group, clock, 0, 1)[0])
-        )
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
-        faults = {name: self.refuse(f"dataset {name}", text, remedy) for name, text in texts.items()}
-        return grids or (Grid(max(lengths.values()), "", run_rate or float("nan")),), faults
+        layout = self._planned(timings, run_rate, "dataset", remedy)
+        unserved = Grid(max(lengths.values()), "", run_rate or float("nan"))
+        return _Members(layout.grids or (unserved,), layout.faults, members)
 
     def _seconds(self, group: Any, clock: str, start: int, stop: int) -> FloatArray:
         """Some times of a time dataset [s]."""
@@ -266,12 +257,6 @@ class Hdf5Reader(RunReader):
         if not 0.0 < rate < MOST_RATE:
             raise self.refuse(place, f"is {rate}", remedy)
         return rate
-
-    def _grids(self) -> Sequence[Grid]:
-        return self._facts().grids
-
-    def _faults(self) -> Mapping[str, RigDataError]:
-        return self._facts().faults
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
         with self._group() as group:
@@ -297,7 +282,7 @@ class Hdf5Reader(RunReader):
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""
         with self._group() as group:
             usable = {}
-            for name in self._facts().members:
+            for name in self._layout().members:
                 with suppress(RigDataError):  # raised when that channel is asked for; no result can come from it
                     usable[name] = self._dataset(group, name)
             digest = hashlib.sha256()
@@ -310,13 +295,13 @@ class Hdf5Reader(RunReader):
 
     def problems(self) -> tuple[Problem, ...]:
         """Tell which datasets nobody describes, and which state another unit than the manifest."""
-        return self._notes("datasets", self._facts().members, self._units())
+        return self._notes("datasets", self._layout().members, self._units())
 
     def _units(self) -> dict[str, str]:
         """Units that datasets state in an attribute."""
         units = {}
         with self._group() as group:
-            for name in filter(self._facts().members.__contains__, self.channels):
+            for name in filter(self._layout().members.__contains__, self.channels):
                 with suppress(RigDataError):  # raised when that channel is asked for
                     attributes = self._dataset(group, name).attrs
                     stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import codecs
 import datetime
-import io
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,53 +70,31 @@ def is_ascii_based(encoding: str) -> bool:
     return sample.encode(encoding) == sample.encode("ascii")
 
 
-def open_numbers(path: Path, encoding: str, delimiter: str) -> io.BufferedReader:
+def open_numbers(path: Path, encoding: str, delimiter: str) -> Any:
     """Open a text file for pyarrow: every character beyond ASCII has become DEL, runs of blanks that part cells a tab.
 
     Numbers, delimiters and line ends are ASCII; pyarrow takes all text for UTF-8 and must not meet other bytes.
     """
-    return io.BufferedReader(_NumberStream(path, encoding, squeeze=delimiter == " "), 2**18)
+    import pyarrow as pa
 
+    decoder = None if is_ascii_based(encoding) else codecs.getincrementaldecoder(encoding)("replace")
+    begun_line = b""
 
-class _NumberStream(io.RawIOBase):
-    def __init__(self, path: Path, encoding: str, squeeze: bool) -> None:
-        self._file = path.open("rb")
-        decoder = codecs.getincrementaldecoder(encoding)
-        self._decoder = None if is_ascii_based(encoding) else decoder("replace")
-        self._squeeze = squeeze
-        self._begun_line = b""
-        self._ready = memoryview(b"")
-        self._ended = False
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        while not self._ready and not self._ended:
-            self._ready = memoryview(self._next_block())
-        size = min(len(buffer), len(self._ready))
-        buffer[:size] = self._ready[:size]
-        self._ready = self._ready[size:]
-        return size
-
-    def _next_block(self) -> bytes:
-        block = self._file.read(_PIECE)
-        self._ended = not block
-        if self._decoder is not None:
-            block = self._decoder.decode(block, final=self._ended).encode("utf-8", "replace")
+    def plain(buffer: Any) -> bytes:
+        nonlocal begun_line
+        block, is_end = buffer.to_pybytes(), not buffer.size
+        if decoder is not None:
+            block = decoder.decode(block, final=is_end).encode("utf-8", "replace")
         block = block.translate(_ASCII)
-        return self._squeezed(block) if self._squeeze else block
-
-    def _squeezed(self, block: bytes) -> bytes:
-        text = self._begun_line + block
-        end = len(text) if self._ended else text.rfind(b"\n") + 1
-        self._begun_line = text[end:]
+        if delimiter != " ":
+            return block
+        text = begun_line + block
+        end = len(text) if is_end else text.rfind(b"\n") + 1
+        begun_line = text[end:]
         trimmed = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", text[:end])
         return re.sub(rb"[ \t]+", b"\t", trimmed)
 
-    def close(self) -> None:
-        self._file.close()
-        super().close()
+    return pa.TransformInputStream(pa.PythonFile(path.open("rb"), "r"), plain)
 
 
 _CLOCK = r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d{1,9}))?"

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.calibration import OVERFLOW
-from rigdata.problem import Problem, RigDataError, Severity
+from rigdata.problem import Problem, RigDataError
 from rigdata.readers.base import MAX_SAMPLES, RecordFile
 from rigdata.readers.series import Contents, GrowingChannel, Series, is_time, time_columns
 from rigdata.readers.text.cells import (
@@ -39,10 +39,6 @@ class Source:
 
     record: RecordFile
     head: Head = field(repr=False)
-
-    def problem(self, severity: Severity, place: str, fault: str, remedy: str) -> Problem:
-        """Something wrong with the file."""
-        return Problem(severity, self.record.file, place, fault, remedy, self.record.run)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Line number, from 1, and cells of every line of samples that is not blank."""
@@ -250,12 +246,12 @@ def _locate_text(source: Source, places: Sequence[int]) -> list[Problem]:
         more = f", and in {counts[i] - 1} more lines" if counts[i] > 1 else ""
         kind = "time stamp" if i in head.stamps else "number"
         place = f"line {number}, column {i + 1} ({head.names[i]})"
-        problems.append(source.problem("error", place, f"{cell!r} is not a {kind}{more}", remedy))
+        problems.append(source.record.problem("error", place, f"{cell!r} is not a {kind}{more}", remedy))
     return problems
 
 
 def _cut_off(source: Source, place: str, fault: str) -> Problem:
-    return source.problem("warning", place, fault, "Copy the file again from the rig")
+    return source.record.problem("warning", place, fault, "Copy the file again from the rig")
 
 
 def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...]:
@@ -273,7 +269,7 @@ def _judge_odd_lines(source: Source, odd_lines: list[int]) -> tuple[Problem, ...
     problems = []
     for number, count in wrong[:_LISTED]:
         fault = f"has {count} cells, the names have {width}"
-        problems.append(source.problem("error", f"line {number}", fault, remedy))
+        problems.append(source.record.problem("error", f"line {number}", fault, remedy))
     if not problems:
         raise source.record.refuse("", f"{len(odd_lines)} lines have a wrong number of cells", remedy)
     raise RigDataError(problems)

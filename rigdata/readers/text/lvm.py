@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,54 +20,11 @@ _CHANNELS, _X, _COMMENT = "Channels", "X_Value", "Comment"
 _LINES = 5000
 
 
-@dataclass(frozen=True)
-class _Segment:
-    """One table with its header."""
-
-    header: dict[str, list[str]]  #: key -> one cell per channel
-    names: list[str]
-    values: FloatArray  #: (n, columns), NaN where blank
-    decimal: str
-
-    def entry(self, key: str, number: int) -> str:
-        """What the header has under `key` for channel `number`, counted from 1."""
-        return "".join(self.header.get(key, [])[number - 1 : number])
-
-    def number(self, key: str, number: int) -> float:
-        """The same as a number, NaN where it is none."""
-        try:
-            return float(self.entry(key, number).replace(self.decimal, "."))
-        except ValueError:
-            return float("nan")
-
-    def channels(self) -> Iterator[Series]:
-        """Channels over time; the group of each is date and time of day at which the segment began."""
-        x: FloatArray | None = None
-        number = 0
-        for i, name in enumerate(self.names):
-            if name == _X:
-                x = self.values[:, i] if np.isfinite(self.values[:, i]).any() else None
-            elif name and name != _COMMENT:
-                number += 1
-                if self.entry("X_Dimension", number).lower() in ("time", ""):
-                    yield self._series(number, name, self.values[:, i], x)
-
-    def _series(self, number: int, name: str, values: FloatArray, x: FloatArray | None) -> Series:
-        count, step, start = (self.number(key, number) for key in ("Samples", "Delta_X", "X0"))
-        length = int(count) if 0 < count <= len(values) else len(values)
-        time = None if x is None else x[:length]
-        if step > 0:  # X as written is rounded
-            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
-        began = f"{self.entry('Date', number)} {self.entry('Time', number)}".strip()
-        return Series(name, self.entry("Y_Unit_Label", number), values[:length], time, began)
-
-
 def read_lvm(path: Path) -> list[Series]:
     """Read every channel over time; segments of the same channels follow each other."""
     parts: dict[str, list[Series]] = {}
-    for segment in _LvmFile(path).segments():
-        for channel in segment.channels():
-            parts.setdefault(channel.name, []).append(channel)
+    for channel in _LvmFile(path).channels():
+        parts.setdefault(channel.name, []).append(channel)
     if not parts:
         raise refuse(path.name, "", "holds no channel over time", "Export the run again, with its samples")
     return [_joined(segments) for segments in parts.values()]
@@ -91,8 +47,8 @@ class _LvmFile:
             elif line.startswith(_END):
                 break
 
-    def segments(self) -> Iterator[_Segment]:
-        """Segments in order; without headings of their own all samples are one."""
+    def channels(self) -> Iterator[Series]:
+        """Channels of all segments in order; without headings of their own all samples are one."""
         while (line := next(self.lines, None)) is not None:  # a table puts the next heading back
             first, *_ = self._cells(line)
             if first == _CHANNELS:
@@ -103,7 +59,35 @@ class _LvmFile:
             else:
                 continue
             names = self._cells(line)
-            yield _Segment(header, names, self._table(names), self.decimal)
+            yield from self._segment(header, names, self._table(names))
+
+    def _segment(self, header: dict[str, list[str]], names: Sequence[str], table: FloatArray) -> Iterator[Series]:
+        """Channels over time of one table (n, columns); the group of each is when the segment began."""
+        x: FloatArray | None = None
+        number = 0
+        for name, values in zip(names, table.T, strict=True):
+            if name == _X:
+                x = values if np.isfinite(values).any() else None
+            elif name and name != _COMMENT:
+                entries = {key: cells[number] for key, cells in header.items() if number < len(cells)}
+                number += 1
+                if entries.get("X_Dimension", "").lower() in ("time", ""):
+                    yield self._series(entries, name, values, x)
+
+    def _series(self, entries: Mapping[str, str], name: str, values: FloatArray, x: FloatArray | None) -> Series:
+        count, step, start = (self._number(entries.get(key, "")) for key in ("Samples", "Delta_X", "X0"))
+        length = int(count) if 0 < count <= len(values) else len(values)
+        time = None if x is None else x[:length]
+        if step > 0:  # X as written is rounded
+            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
+        began = f"{entries.get('Date', '')} {entries.get('Time', '')}".strip()
+        return Series(name, entries.get("Y_Unit_Label", ""), values[:length], time, began)
+
+    def _number(self, cell: str) -> float:
+        try:
+            return float(cell.replace(self.decimal, "."))
+        except ValueError:
+            return float("nan")
 
     def _cells(self, line: str) -> list[str]:
         return [cell.strip() for cell in line.split(self.separator)]
@@ -176,12 +160,13 @@ def _joined(parts: Sequence[Series]) -> Series:
         return Series(first.name, first.unit, values, None)
     began, bad = stamp_seconds([part.group or None for part in parts])
     times: list[FloatArray] = []
-    for i, part in enumerate(parts):
+    for part, start in zip(parts, began, strict=True):
         time = np.asarray(part.time)
         if times:
-            end = 2.0 * times[-1][-1] - times[-1][-2] if len(times[-1]) > 1 else times[-1][-1]
-            if bad == 0 and np.isfinite(began[i]) and began[i] > 0 and time[0] < end:
-                time = time - time[0] + times[0][0] + began[i]
+            last = times[-1]
+            end = 2.0 * last[-1] - last[-2] if len(last) > 1 else last[-1]
+            if bad == 0 and start > 0 and time[0] < end:
+                time = time - time[0] + times[0][0] + start
             if time[0] < end - 1e-9:
                 time = time - time[0] + end
         times.append(time)

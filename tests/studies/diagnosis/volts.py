@@ -31,7 +31,7 @@ from model.pivots import pivot_laws
 from model.setup import Setup
 from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig import Instruments, Noise, RigPlan, RigTruth, VirtualRig, write_campaign
-from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, Timing
+from rigdata.virtual_rig.plan import ClearanceSweep, DryTest
 from tests.studies.diagnosis.bench import Bench, Drawn, hidden, said
 from tests.studies.diagnosis.strangers import KINDS, draw, stranger
 from tests.studies.diagnosis.tables import tables
@@ -86,7 +86,7 @@ def plan_of(layout: Layout) -> RigPlan:
         locus=tuple(OperatingPoint(test.load, test.direction, test.speed) for test in layout.locus),
         dry=tuple(DryTest(test.pad, levels, start=0.5 * levels[0]) for test in layout.dry),
         clearance=(ClearanceSweep(layout.push_load),) if layout.push_load else (),
-        timing=Timing(dynamic_rate=max(1000.0, 12.0 * fastest)),
+        dynamic_rate=max(1000.0, 12.0 * fastest),
     )
 
 
@@ -140,8 +140,7 @@ def _off(instruments: Instruments, known: Sequence[tuple[Nuisance, float]], effe
     sensors = {sensor.name: sensor for sensor in instruments.sensors}
     for name, place, change in changes:
         at = f"T{place.split()[-1]}" if name == "thermometer" else NAMES[place]
-        error = sensors[at].error
-        more = {"offset": error.offset + change} if name == "thermometer" else {"gain": error.gain * math.exp(change)}
+        more = {"offset": change} if name == "thermometer" else {"gain": math.exp(change)}
         sensors[at] = sensors[at].with_error(**more)
     return replace(instruments, sensors=tuple(sensors.values()))
 
