@@ -4,26 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted, write_identification
 from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, refuse_impossible
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    BearingOption,
-    Coefficients,
-    EffectsFile,
-    MaybeCampaign,
-    Method,
-    Norm,
-    ReadingError,
-    Thermal,
-    named,
-    refuse_unknown,
-)
+from tpjb_ident.cli.common.options import DEMO, named, refuse_unknown
 from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
@@ -31,19 +17,6 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from tpjb_ident.compare.comparison import CompareSettings, Comparison
     from tpjb_ident.compare.difference import Difference, Side
-
-Other = Annotated[
-    Path | None, typer.Argument(metavar="[OTHER]", help="A second campaign, or a folder of results: what changed.")
-]
-Pivots = Annotated[
-    str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
-]
-
-
-Predictions = Annotated[
-    list[Path] | None,
-    typer.Option("--prediction", metavar="TABLE.csv", help="Another program's K and C as well; may be repeated."),
-]
 
 
 @command(
@@ -54,17 +27,17 @@ Predictions = Annotated[
 )
 def compare(
     c: Command,
-    campaign: MaybeCampaign = None,
-    other: Other = None,
-    bearing: BearingOption = None,
-    pivots: Pivots = "rigid, kirk, measured",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    coefficients: Coefficients = None,
-    reading_error: ReadingError = None,
-    method: Method = "mm-eiv",
-    norm: Norm = None,
-    prediction: Predictions = None,
+    campaign: Path | None = None,
+    other: Path | None = None,
+    bearing: Path | None = None,
+    pivots: str = "rigid, kirk, measured",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    coefficients: Path | None = None,
+    reading_error: str | None = None,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    prediction: list[Path] | None = None,
 ) -> None:
     """Compare prediction and measurement, or two campaigns, with a report.
 
@@ -109,7 +82,6 @@ def compare(
                 show("drawing figures", 1, 2)
                 write_report(folder, result, named(c.options), c.inputs, following)
     show_comparison(c, result, following)
-    c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
 
 
@@ -140,7 +112,6 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
         following = f"tpjb diagnose {paths[1]}" if b.campaign is not None else f"tpjb view {c.target}"
         write_difference_report(folder, difference, named(c.options), c.inputs, following)
     _show_difference(c, difference)
-    c.print(f"Report: {c.target / 'report.html'}")
     c.next(following)
     if difference.points.empty:
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")

@@ -61,7 +61,6 @@ def demo(c: Command) -> None:
         f"{counted(counts['warning'], 'warning')}."
     )
     c.print(note)
-    c.print(f"Report: {(c.target / 'report.html').resolve()}")
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     c.next("view", c.target)
     refuse_comparison(result)

@@ -5,24 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import refuse_untrusted, write_identification
 from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    BearingOption,
-    Coefficients,
-    EffectsFile,
-    MaybeCampaign,
-    ReadingError,
-    Thermal,
-    WorkerCount,
-    named,
-)
+from tpjb_ident.cli.common.options import DEMO, named
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
@@ -32,34 +20,21 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
-Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
-ModelTolerance = Annotated[
-    float | None,
-    typer.Option("--model-tolerance", help="What the model is trusted to, share of the direct coefficients [1.5 %]."),
-]
-ToleranceOptions = Annotated[
-    list[str] | None,
-    typer.Option("--tolerance", metavar="NAME=VALUE", help="How well something is known: viscosity=4%; repeatable."),
-]
-Library = Annotated[
-    Path | None, typer.Option("--library", metavar="FILE.py", help="Effects of your own; the file's code is run.")
-]
-
 
 @command(f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found")
 def diagnose(
     c: Command,
-    campaign: MaybeCampaign = None,
-    bearing: BearingOption = None,
-    pivots: Pivots = "kirk",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    model_tolerance: ModelTolerance = None,
-    tolerance: ToleranceOptions = None,
-    coefficients: Coefficients = None,
-    reading_error: ReadingError = None,
-    library: Library = None,
-    workers: WorkerCount = None,
+    campaign: Path | None = None,
+    bearing: Path | None = None,
+    pivots: str = "kirk",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    model_tolerance: float | None = None,
+    tolerance: list[str] | None = None,
+    coefficients: Path | None = None,
+    reading_error: str | None = None,
+    library: Path | None = None,
+    workers: int | None = None,
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
 
@@ -103,7 +78,6 @@ def diagnose(
         following = next_command(str(typed), str(bearing or ""), result.diagnosis.verdict, str(c.target))
         write_diagnosis_report(folder, source, result, named(c.options), c.inputs, following)
     _show_verdict(c, source.id, result, following)
-    c.print(f"Report: {c.target / 'report.html'}")
     if result.identification is not None:
         refuse_untrusted(result.identification)
 

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.identification import (
@@ -18,23 +17,11 @@ from tpjb_ident.cli.common.identification import (
     write_identification,
 )
 from tpjb_ident.cli.common.inputs import parse_amount, parse_values
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    CampaignPath,
-    Delays,
-    Lines,
-    Method,
-    Norm,
-    Scheduler,
-    WorkerCount,
-    refuse_unknown,
-)
+from tpjb_ident.cli.common.options import DEMO, refuse_unknown
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.plain import PlainSettings
     from tpjb_ident.dynamic.runs.run_store import RunStore
@@ -43,11 +30,6 @@ if TYPE_CHECKING:
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
 WORTH_PROCESSES, WORTH_COPIES, MOST_COPIES = 100 * 2**20, 12, 4
-PlainWay = Annotated[
-    bool, typer.Option("--plain", help="Also write plain.csv: Eq. (15) by statsmodels' RLM, nothing corrected.")
-]
-KeepR = Annotated[bool, typer.Option("--keep-r", help="Write the R matrices of Eq. (15) too: r_matrices.h5.")]
-Window = Annotated[str, typer.Option("--window", metavar="TIME", help="Window length of --plain and --keep-r.")]
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
 #: What worker processes need, imported once for all of them.
@@ -63,16 +45,16 @@ PRELOAD = (
 @command(f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm")
 def identify(
     c: Command,
-    campaign: CampaignPath,
-    method: Method = "mm-eiv",
-    norm: Norm = None,
-    lines: Lines = None,
-    delay: Delays = None,
-    workers: WorkerCount = None,
-    scheduler: Scheduler = None,
-    plain: PlainWay = False,
-    keep_r: KeepR = False,
-    window: Window = "0.5 s",
+    campaign: Path,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    lines: str | None = None,
+    delay: list[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    plain: bool = False,
+    keep_r: bool = False,
+    window: str = "0.5 s",
 ) -> None:
     """Identify stiffness and damping with 95 % intervals.
 
@@ -110,7 +92,6 @@ def identify(
         c.next("compare", campaign)
     elif result.points:
         c.next("export", c.target, "--to", "ross")
-    c.print(f"Results: {c.target}")
     refuse_untrusted(result)
 
 

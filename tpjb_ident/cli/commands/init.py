@@ -8,9 +8,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 import model
 from tpjb_ident.cli.common.command import Command, command
@@ -27,21 +25,10 @@ MANIFEST = "campaign.toml"
 BEARING, DRAFT = "bearing.toml", "bearing_draft.toml"
 #: Records that are listed; the manifest has all of them.
 MOST_RECORDS = 20
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the records of a logger.")]
-Bearing = Annotated[
-    str | None, typer.Option("--bearing", metavar="NAME", help="Bearing file in that folder [default: looked for].")
-]
-Update = Annotated[
-    bool, typer.Option("--update", help="Carry on a campaign.toml that was edited: new records, guesses made anew.")
-]
 
 
-@command(
-    "tpjb init exports",
-    "tpjb init exports --bearing rocker.toml",
-    out_help="Folder for the draft [default: beside the records].",
-)
-def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = False) -> None:
+@command("tpjb init exports", "tpjb init exports --bearing rocker.toml")
+def init(c: Command, folder: Path, bearing: str | None = None, update: bool = False) -> None:
     """Draft the campaign.toml of a folder of exports.
 
     And its bearing.toml, where there is none. Channels, units, axes, rates and runs are read from the files or

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
+from tpjb_ident.cli.common.options import DEMO
 from tpjb_ident.columns import UNITS, Column, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @command(f"tpjb locus {DEMO}")
-def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> None:
+def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Measure the shaft centre locus and the clearance polygon by pad.
 
     Writes locus and clearance (.csv, .parquet) and a figure; positions count from the centre of the polygon. With
@@ -51,7 +52,6 @@ def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for polygon in polygons:
         c.print(str(polygon))
-    c.print(f"Results: {c.target}")
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
+from tpjb_ident.cli.common.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
@@ -19,7 +20,7 @@ ABOUT_ALL = ("runs-refused",)
 
 
 @command(f"tpjb pivot {DEMO}")
-def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> None:
+def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Fit the pivot stiffness curves to the dry tests.
 
     Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
@@ -45,7 +46,6 @@ def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
     _show_curves(c, curves, source.id, formula)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
-    c.print(f"Results: {c.target}")
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
     conditions = [(curve.pad, condition) for curve in curves for condition in curve.status]

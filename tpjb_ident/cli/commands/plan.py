@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.inputs import operating_points, pivot_choice, rotation_choice
-from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Rotation, Speeds
+from tpjb_ident.cli.common.options import ROCKER
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed
 from tpjb_ident.runtime.tables import write_text
@@ -28,18 +27,18 @@ if TYPE_CHECKING:
 )
 def plan(
     c: Command,
-    bearing: BearingPath,
-    pivots: PivotChoice = "kirk",
-    load: Loads = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
-    load_direction: LoadDirections = "-90 deg",
-    speed: Speeds = "22 Hz",
-    rotation: Rotation = None,
-    excitation: Annotated[str, typer.Option(help="Excitation frequencies, each at every load.")] = "10, 25, 40 Hz",
-    locus: Annotated[int, typer.Option(min=0, max=360, help="Load directions of the shaft locus; 0: none.")] = 20,
-    dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,
-    push: Annotated[float, typer.Option(min=0.0, help="Push load of the clearance sweep [N]; 0: none.")] = 200.0,
-    temperatures: Annotated[bool, typer.Option(help="A temperature sensor in every pad.")] = True,
-    data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
+    bearing: Path,
+    pivots: str = "kirk",
+    load: str = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
+    load_direction: str = "-90 deg",
+    speed: str = "22 Hz",
+    rotation: str | None = None,
+    excitation: str = "10, 25, 40 Hz",
+    locus: int = 20,
+    dry: bool = True,
+    push: float = 200.0,
+    temperatures: bool = True,
+    data_sets: bool = False,
 ) -> None:
     """Tell which effects a planned campaign could see.
 
@@ -74,7 +73,6 @@ def plan(
         save_isolability(folder, plans)
         write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
     _show(c, result)
-    c.print(f"Results: {c.target}")
     c.next("simulate", bearing)
 
 

@@ -6,9 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
@@ -27,11 +25,6 @@ if TYPE_CHECKING:
 
 #: Runs that are listed.
 MOST_RUNS = 200
-Source = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A campaign, or one record file (CSV, TDMS, UFF, MAT, ..).")
-]
-RunId = Annotated[str | None, typer.Option("--run", metavar="ID", help="One run of a campaign, channel by channel.")]
-Picture = Annotated[bool, typer.Option("--picture", help="Draw channels and spectra to a PNG and an SVG in --out.")]
 BARS = " ▁▂▃▄▅▆▇█"
 #: What is this far below the highest bar is blank.
 DECADES = 3.0
@@ -42,7 +35,7 @@ DECADES = 3.0
     f"tpjb show {DEMO} --run d-05000-25-01 --picture",
     "tpjb show exports/run1.csv",
 )
-def show(c: Command, source: Source, run: RunId = None, picture: Picture = False) -> None:
+def show(c: Command, source: Path, run: str | None = None, picture: bool = False) -> None:
     """Show channels, statistics and spectra of a file.
 
     Of a campaign the list of its runs, or one of them with --run. With --picture or --out also writes channels.csv and
@@ -89,7 +82,6 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
             from tpjb_ident.report.panels import write_quick_look
 
             write_quick_look(folder, title, displayed, looks)
-    c.print(f"Results: {c.target}")
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:

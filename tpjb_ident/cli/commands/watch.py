@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.inputs import parse_amount
 from tpjb_ident.cli.common.interrupts import heard
-from tpjb_ident.cli.common.options import BearingOption
 from tpjb_ident.columns import Column, place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -27,29 +24,17 @@ KEPT = ".tpjb-finished-runs"
 URGENT = ("stop", "repeat")
 #: More records than this at once are counted, not listed.
 MOST_LINES = 12
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Campaign folder, with campaign.toml: the plan.")]
-Once = Annotated[bool, typer.Option("--once", help="Look once and end: exit code 3 if a run must be repeated.")]
-Every = Annotated[str, typer.Option("--every", metavar="TIME", help="How often to look.")]
-Settle = Annotated[
-    str, typer.Option("--settle", metavar="TIME", help="A file that has not changed for so long is written.")
-]
-Within = Annotated[
-    str | None,
-    typer.Option(
-        "--within", metavar="SHARE", help='Interval that you want, such as "3 %": says how many records more.'
-    ),
-]
 
 
 @command("tpjb watch records", 'tpjb watch records --once --within "3 %"')
 def watch(
     c: Command,
-    folder: Folder,
-    bearing: BearingOption = None,
-    once: Once = False,
-    every: Every = "2 s",
-    settle: Settle = "5 s",
-    within: Within = None,
+    folder: Path,
+    bearing: Path | None = None,
+    once: bool = False,
+    every: str = "2 s",
+    settle: str = "5 s",
+    within: str | None = None,
 ) -> None:
     """Check, identify and place each record of a campaign as it lands.
 
@@ -86,7 +71,6 @@ def watch(
         heard()
         c.print("Stopped. The same command goes on from here.")
         return
-    c.print(f"Results: {c.target}")
     urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
