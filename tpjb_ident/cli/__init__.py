@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from tpjb_ident.cli.common import interrupts
+from tpjb_ident.runtime import interrupts
 
 
 def main() -> None:

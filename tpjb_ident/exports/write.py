@@ -52,7 +52,7 @@ class Export:
     def __str__(self) -> str:
         rows = self.chosen.table
         if rows is None:
-            return ", ".join(self.files)
+            return "the bearing"
         return f"{rows.groupby(list(STATIC_KEY)).ngroups} static points, {len(rows)} coefficient sets"
 
 

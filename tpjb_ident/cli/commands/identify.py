@@ -32,14 +32,6 @@ if TYPE_CHECKING:
 WORTH_PROCESSES, WORTH_COPIES, MOST_COPIES = 100 * 2**20, 12, 4
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
-#: What worker processes need, imported once for all of them.
-PRELOAD = (
-    "tpjb_ident.dynamic.runs.run_jobs",
-    "rigdata.readers.hdf5.reader",
-    "rigdata.readers.file_reader",
-    "rigdata.readers.text.csv",
-    "h5py",
-)
 
 
 @command(f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm")
@@ -72,7 +64,7 @@ def identify(
     count, start = _worker_count(source, workers, scheduler)
     with c.results() as folder:
         with (
-            open_workers(count, scheduler, PRELOAD, start) as team,
+            open_workers(count, scheduler, start) as team,
             _finished_runs(c.target) as store,
             c.progress("identifying") as show,
         ):

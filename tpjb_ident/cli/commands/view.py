@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, campaign_place, command
-from tpjb_ident.cli.common.interrupts import heard
 from tpjb_ident.cli.common.options import DEMO
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.interrupts import heard
 from tpjb_ident.runtime.output_folder import former_runs
 from tpjb_ident.schema import TABLES
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.inputs import parse_amount
-from tpjb_ident.cli.common.interrupts import heard
 from tpjb_ident.columns import Column, place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
+from tpjb_ident.runtime.interrupts import heard
 
 if TYPE_CHECKING:
     from model.bearing import Bearing

@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigdata.problem import RigError
-from tpjb_ident.cli.common.interrupts import heard, interrupt_behind
 from tpjb_ident.cli.common.options import option
 from tpjb_ident.cli.common.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
+from tpjb_ident.runtime.interrupts import heard, interrupt_behind
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import TABLE_SCHEMA, sha256, versions
 from tpjb_ident.runtime.tables import write_csv, write_table, write_text

@@ -10,6 +10,8 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 #: s between two looks at what became of a signal
@@ -37,6 +39,8 @@ def stop_listening() -> None:
     heard()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+    if _thread._count():  # a delivery that wakes when the interpreter has ended would be its fatal error
+        time.sleep(2.0 * _PAUSE)
 
 
 def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
@@ -72,3 +76,22 @@ def _without_interrupts(lost: Any) -> None:
     """Print what Python drops, as of a destructor, but not an interrupt, which comes again."""
     if not issubclass(lost.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(lost)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Hear Ctrl-C and SIGTERM only when the block has ended: a process begun and not yet noted would never be ended.
+
+    The end of this one would wait for it, and it for somebody who takes its answer.
+    """
+    held: list[int] = []
+    # other threads are not interrupted
+    kinds = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}
+    try:
+        yield
+    finally:
+        for kind, handler in former.items():
+            signal.signal(kind, handler or signal.SIG_DFL)
+        for number in held[:1]:  # also where the block failed: the signal may have ended the workers that it calls
+            signal.raise_signal(number)
