@@ -20,15 +20,17 @@ from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
+    clearance_cells,
     evidence_sections,
     flags_line,
     set_up_section,
+    stiffness_cell,
     tested_facts,
     values_table,
 )
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import fixed, percent, signed
 from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
@@ -91,7 +93,7 @@ def write_report(
         facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
         key_table=_key_table(deviations(comparison, frame)),
         values=values_table(points),
-        flags=flags_line(_flagged(comparison), len(points)),
+        flags=flags_line([conditions for _, conditions in _flagged(comparison)], len(points)),
         picture=lead,
         then=then,
         sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
@@ -241,26 +243,22 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
     for curve in curves:
         cells = []
         for load in _PIVOT_LOADS:
-            value = float(curve.stiffness(load))
-            low, high = (float(v) for v in curve.stiffness_band(load))
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
-            cells.append(with_interval(value, low, high, size("stiffness")) + remark)
-            cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
+            cells.append(stiffness_cell(curve, load) + remark)
+            cells.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
         rows.append([f"#{curve.pad}", curve.law.name, *cells])
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
 def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad beside the drawing's."""
-    rows, unit = [], size("length")
+    unit = size("length")
     digits = 2 if unit < 1e-5 else 4
-    for k, drawing in enumerate(drawn):
-        value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]
-        rows.append([
-            f"#{k + 1}", f"{drawing / unit:.4g}", with_interval(value, value - half, value + half, unit),
-            signed((value - drawing) / unit, digits),
-            fixed(polygon.clearance_pushed[k] / unit, digits),
-        ])  # fmt: skip
+    rows = []
+    for k, (drawing, measured) in enumerate(zip(drawn, clearance_cells(polygon), strict=True)):
+        off, pushed = polygon.clearance[k] - drawing, polygon.clearance_pushed[k]
+        rows.append([f"#{k + 1}", f"{drawing / unit:.4g}", measured, signed(off / unit, digits),
+                     fixed(pushed / unit, digits)])  # fmt: skip
     name = symbol("length")
     under = f"under {amount(polygon.push_load, 'force', '.3g')}, {name}"
     columns = ["pad", f"drawing, {name}", f"measured, {name}", f"difference, {name}", under]

@@ -46,7 +46,7 @@ def verdict_tab(session: Session) -> Any:
     points = identification.points
     facts = tested_facts(campaign, session.bearing, points)
     notes = [f"{name}: {value}" for name, value in facts.items()]
-    notes.append(flags_line([("", p.quality) for p in points], len(points)))
+    notes.append(flags_line([p.quality for p in points], len(points)))
     values = values_table(points)
     tables = [] if values is None else [values]
     if session.bearing is not None and points:

@@ -143,7 +143,8 @@ class _Millions(ScalarFormatter):
 
 def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Empty axes at a box in inches, in the house look."""
-    axes = figure.add_axes(_fractions(figure, box))
+    width, height = figure.get_size_inches()
+    axes = figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
     axes.patch.set_alpha(0.0)
     axes.yaxis.set_major_formatter(_Millions())
     axes.ticklabel_format(style="plain", useOffset=False)
@@ -154,11 +155,6 @@ def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
         spine.set_color(RULE)
         spine.set_visible(side in ("left", "bottom"))
     return axes
-
-
-def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    width, height = figure.get_size_inches()
-    return box[0] / width, box[1] / height, box[2] / width, box[3] / height
 
 
 def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
@@ -202,9 +198,10 @@ def add_legend(
     centre = (0.5 - box.x0) / box.width if across else 0.5
     heading = 1.4 * _LINE if axes.get_title() else 0.0
     shrink(axes, top=_LINE * math.ceil(len(drawn) / columns) + 0.03)
+    height = axes.get_position().height * _size(axes)[1]
     legend = axes.legend(
         handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
-        bbox_to_anchor=(centre, 1.0 + heading / _height(axes)), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
+        bbox_to_anchor=(centre, 1.0 + heading / height), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
         labelcolor=INK,
     )  # fmt: skip
     return legend
@@ -215,11 +212,6 @@ def _size(axes: Axes) -> tuple[float, float]:
     figure = axes.get_figure(root=True)
     width, height = figure.get_size_inches()  # type: ignore[union-attr]
     return float(width), float(height)
-
-
-def _height(axes: Axes) -> float:
-    """Of a panel, inches."""
-    return float(axes.get_position().height * _size(axes)[1])
 
 
 def _columns(names: Sequence[str], room: float) -> int:
