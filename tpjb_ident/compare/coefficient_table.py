@@ -52,16 +52,6 @@ class TableRow:
     extrapolated: bool = False
 
     @property
-    def k(self) -> FloatArray:
-        """(2, 2) stiffness [N/m]."""
-        return self.values[:4].reshape(2, 2)
-
-    @property
-    def c(self) -> FloatArray:
-        """(2, 2) damping [N s/m]."""
-        return self.values[4:].reshape(2, 2)
-
-    @property
     def coefficients(self) -> dict[str, tuple[float, float]]:
         """Value and standard error of what the row holds, ``"kxx"`` .. ``"cyy"``."""
         pairs = zip(COEFFICIENT_COLUMNS, self.values, self.errors, strict=True)
@@ -107,15 +97,12 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     if not (load > 0.0 and speed > 0.0):
         raise BadInputError(f"{place}: static_load_N and shaft_speed_Hz must be positive numbers.")
     direction, excitation = cells.get("static_load_direction_deg", math.nan), cells.get("excitation_Hz", math.nan)
-    rotation = cells.get("rotation") or ROTATIONS[0]
-    if rotation not in ROTATIONS:
-        raise BadInputError(f"{place}: rotation {rotation[:40]!r} is not known. Write {' or '.join(ROTATIONS)}.")
     point = OperatingPoint(
         load,
         math.radians(-90.0 if math.isnan(direction) else direction),
         speed,
         speed if math.isnan(excitation) else HZ * excitation,
-        rotation,
+        cells.get("rotation", ROTATIONS[0]),
     )
     values, errors, low, high = (
         np.array([cells.get(column + end, math.nan) for column in COEFFICIENT_COLUMNS])

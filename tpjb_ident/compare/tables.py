@@ -62,8 +62,8 @@ def compare_table(
 def _point(row: TableRow) -> PointResult:
     """A row as if it had been identified; what it does not hold is NaN."""
     omega = row.point.excitation
-    h, errors = row.k.astype(complex), row.errors * np.repeat([1.0, omega], 4)
-    h.imag = omega * row.c  # a sum would lose a stiffness that stands without its damping
+    h, errors = row.values[:4].astype(complex).reshape(2, 2), row.errors * np.repeat([1.0, omega], 4)
+    h.imag = omega * row.values[4:].reshape(2, 2)  # a sum would lose a stiffness that stands without its damping
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
     quality = tuple(Condition(name) for name in row.status if name in KINDS)

@@ -93,15 +93,16 @@ def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
         _text(about.cell(row, 1), line)
     content = io.BytesIO()
     book.save(content)
-    write_atomic(folder / f"{NAME}.xlsx", lambda part: _without_times(content, part))
 
+    def write(part: Path) -> None:
+        """Without the times of its making: the same results are the same bytes."""
+        with zipfile.ZipFile(content) as archive, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as written:
+            for name in archive.namelist():
+                entry = archive.read(name)
+                entry = _TIME.sub(_NO_TIME, entry) if name == "docProps/core.xml" else entry
+                written.writestr(zipfile.ZipInfo(name), entry, zipfile.ZIP_DEFLATED)
 
-def _without_times(book: io.BytesIO, path: Path) -> None:
-    """Write a workbook without the times of its making: the same results are the same bytes."""
-    with zipfile.ZipFile(book) as archive, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as written:
-        for name in archive.namelist():
-            entry = _TIME.sub(_NO_TIME, archive.read(name)) if name == "docProps/core.xml" else archive.read(name)
-            written.writestr(zipfile.ZipInfo(name), entry, zipfile.ZIP_DEFLATED)
+    write_atomic(folder / f"{NAME}.xlsx", write)
 
 
 def _fill(cell: Any, value: Any) -> None:

@@ -11,10 +11,9 @@ import pandas as pd
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
+from tpjb_ident.compare.comparison import predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
+from tpjb_ident.compare.summary import agreements, summary_sentences
 from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
@@ -79,8 +78,8 @@ def write_report(
     >>> page.name
     'report.html'
     """
-    frame = comparison_frame(comparison)
-    answer, *more = summary_sentences(comparison, frame)
+    frame = comparison.table
+    answer, *more = summary_sentences(comparison)
     points = comparison.identification.points
     coefficients = coefficient_panels(frame)
     lead = next((p for p in coefficients if p.name.startswith(_LEAD)), next(iter(coefficients), None))
@@ -91,7 +90,7 @@ def write_report(
         answer=answer,
         more=more,
         facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
-        key_table=_key_table(deviations(comparison, frame)),
+        key_table=deviations_table(frame),
         values=values_table(points),
         flags=flags_line([conditions for _, conditions in _flagged(comparison)], len(points)),
         picture=lead,
@@ -103,14 +102,12 @@ def write_report(
     return write_page(folder, page)
 
 
-def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
+def deviations_table(table: pd.DataFrame) -> Table:
+    """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
-    for variant in dict.fromkeys(d.pivots for d in all_deviations):
-        by_name = {d.coefficient: d for d in all_deviations if d.pivots == variant}
-        compared = [by_name[name] for name in DIRECT]
-        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in compared]
-        inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
-        rows.append([VARIANT_LABEL.get(variant, variant), *cells, f"{inside} of {n}"])
+    for found in agreements(table):
+        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in found.deviations]
+        rows.append([VARIANT_LABEL.get(found.pivots, found.pivots), *cells, found.inside])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],
@@ -122,7 +119,7 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequenc
     sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign = comparison.campaign
     tables = [measured_table(comparison.identification)]
-    if not isinstance(campaign, TableSource):
+    if comparison.has_records:
         sections += evidence_sections(campaign, comparison.identification)
         tables.append(budget_table(comparison.identification))
     sections.append(

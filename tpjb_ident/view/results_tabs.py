@@ -11,19 +11,18 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.report.comparison_page import measured_table
-from tpjb_ident.report.drawing.picture import VARIANT_LABEL
+from tpjb_ident.report.comparison_page import deviations_table, measured_table
 from tpjb_ident.report.drawing.series import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
-from tpjb_ident.report.page import Section, Table, render_section
+from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
 from tpjb_ident.report.plots.residuals import residual_map
 from tpjb_ident.report.plots.windows import window_weights
-from tpjb_ident.rounding import counted, percent
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY, coefficient_column
+from tpjb_ident.rounding import counted
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,27 +49,10 @@ def verdict_tab(session: Session) -> Any:
     values = values_table(points)
     tables = [] if values is None else [values]
     if session.bearing is not None and points:
-        tables.append(_deviation_table(_compared(session, [p.point for p in points], identification.to_frame())))
+        tables.append(deviations_table(_compared(session, [p.point for p in points], identification.to_frame())))
     bad = sum(bool(untrusted(p.quality)) for p in points)
     title = f"{counted(len(points), 'operating point')}, {f'{bad} NOT to be trusted' if bad else 'all to be trusted'}"
     return _text("verdict", render_section(Section(title, notes, tables=tables)))
-
-
-def _deviation_table(table: pd.DataFrame) -> Table:
-    """Predicted / measured - 1 of every pivot model: median and largest."""
-    rows = []
-    for pivots, group in table.groupby("pivots", sort=False):
-        cells = []
-        for name in DIRECT:
-            column = coefficient_column(name)
-            off = (group[f"{column}_predicted"] / group[column] - 1.0).dropna().to_numpy(float)
-            if not len(off):
-                cells.append("–")
-                continue
-            worst = float(off[np.argmax(np.abs(off))])
-            cells.append(f"{percent(float(np.median(off)))} ({percent(worst)})")
-        rows.append([VARIANT_LABEL.get(str(pivots), str(pivots)), *cells])
-    return Table("Predicted / measured - 1: median (largest)", ["", *DIRECT], rows)
 
 
 def points_tab(identification: Identification) -> Any:
@@ -174,12 +156,12 @@ def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.D
     """Predictions with every pivot model, and what was measured at the same points; columns as in comparison.csv."""
     import pandas as pd
 
-    keys = list(POINT_KEY)
-    frames = []
+    keys, predicted_columns = list(POINT_KEY), [f"{name}_predicted" for name in COEFFICIENT_COLUMNS]
+    rows = []
     for name, pivots in session.pivots.items():
-        predictions = predict_points(session.bearing, points, ModelSettings(pivots))
-        table = prediction_frame(predictions, mesh_error=False)[[*keys, *COEFFICIENT_COLUMNS]]
-        frames.append(table.rename(columns={c: f"{c}_predicted" for c in COEFFICIENT_COLUMNS}).assign(pivots=name))
+        for predicted in predict_points(session.bearing, points, ModelSettings(pivots)):
+            values = dict(zip(predicted_columns, predicted.values, strict=True))
+            rows.append({"pivots": name, **point_columns(predicted.point), **values})
     columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
-    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.concat(frames), measured))
+    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.DataFrame(rows), measured))
     return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)

@@ -84,19 +84,18 @@ def _forces_repeat(finding: Finding) -> bool:
 
 def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
     """Findings that a third of the runs of their kinds have alike; notes are nobody's trouble."""
-    groups: dict[str, list[Finding]] = {}
-    kinds: dict[str, set[str]] = {}
+    groups: dict[str, list[tuple[Finding, str]]] = {}
     for observation in observations:
         for finding in observation.report.found:
             if finding.problem.severity != "note":
-                groups.setdefault(finding.key, []).append(finding)
-                kinds.setdefault(finding.key, set()).add(observation.run.kind)
+                groups.setdefault(finding.key, []).append((finding, observation.run.kind))
     common = []
-    for key, group in groups.items():
-        affected = {finding.problem.run for finding in group}
-        comparable = sum(observation.run.kind in kinds[key] for observation in observations)
+    for group in groups.values():
+        affected = {finding.problem.run for finding, _ in group}
+        kinds = {kind for _, kind in group}
+        comparable = sum(observation.run.kind in kinds for observation in observations)
         if len(affected) >= _COMMON_RUNS and len(affected) >= _COMMON_SHARE * comparable:
-            common.append(group)
+            common.append([finding for finding, _ in group])
     return common
 
 
@@ -151,12 +150,8 @@ def next_steps(
 
 def _current_run(states: Sequence[RunStatus]) -> Run | None:
     """The running test that landed last: what the rig stands at."""
-    last: RunStatus | None = None
-    for status in states:
-        turning = status.run.kind in _TURNING
-        if status.landed and turning and (last is None or status.landed >= last.landed):
-            last = status
-    return last.run if last else None
+    turning = [status for status in reversed(states) if status.landed and status.run.kind in _TURNING]
+    return max(turning, key=lambda status: status.landed).run if turning else None
 
 
 def _set_up(run: Run) -> tuple[float, float, float]:
@@ -235,10 +230,7 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         elif same_set_up:
             when = "before you change the load"
         step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
-        if same_set_up or run.kind not in _TURNING:
-            now.append(step)
-        else:
-            later.append(step)
+        (now if same_set_up or run.kind not in _TURNING else later).append(step)
     return now + later
 
 

@@ -114,11 +114,7 @@ def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: s
 
     verdict = result.diagnosis.verdict
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
-    conclusion, *more = verdict_sentences(name, verdict, deviations)
-    c.print(conclusion)
-    c.next(following)
-    for line in more:
-        c.print(line)
-    if verdict.effects:
-        columns = [*words("effect", "parameter"), "value"]
-        c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict))
+    with c.conclusion(verdict_sentences(name, verdict, deviations), following):
+        if verdict.effects:
+            columns = [*words("effect", "parameter"), "value"]
+            c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict))

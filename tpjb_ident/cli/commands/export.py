@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import identify_settings
+from tpjb_ident.cli.common.identification import identified
 from tpjb_ident.cli.common.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
@@ -77,9 +77,5 @@ def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tu
     path = result_table(source)
     if path is not None:
         return read_table(c.file(path, refuses_changed=True)), path.parent.resolve().name
-    from tpjb_ident.identification.identify import identify as run_identification
-
     campaign = c.open(source)
-    settings = identify_settings(c, campaign, method, norm)
-    with c.progress("identifying") as show:
-        return run_identification(campaign, settings, show).to_frame(), campaign.id
+    return identified(c, campaign, method, norm).to_frame(), campaign.id

@@ -123,9 +123,9 @@ def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], setti
 def _rows(
     bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings, show: Progress | None = None
 ) -> list[dict[str, Any]]:
-    from tpjb_ident.compare.predictions import predict_points, prediction_rows
+    from tpjb_ident.compare.predictions import predict_points, prediction_row
 
-    return prediction_rows(predict_points(bearing, points, settings, show))
+    return [prediction_row(prediction) for prediction in predict_points(bearing, points, settings, show)]
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:

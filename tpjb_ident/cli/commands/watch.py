@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.common.command import Command, command
 from tpjb_ident.cli.common.inputs import parse_amount
-from tpjb_ident.columns import Column, place_of, symbol
+from tpjb_ident.columns import place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.interrupts import heard
@@ -92,7 +92,7 @@ def _open_watcher(
     from tpjb_ident.dynamic.runs.run_store import RunStore
     from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.watch.landing import NewFiles
-    from tpjb_ident.watch.watcher import Measuring, Watcher
+    from tpjb_ident.watch.watcher import Watcher
 
     campaign = c.open(folder)
     angles: tuple[float, ...] = ()
@@ -108,7 +108,7 @@ def _open_watcher(
             angles = tuple(pad.pivot_angle for pad in drawing.pads)
             clearance = min(pad.assembled_clearance for pad in drawing.pads)
     settings = IdentifySettings(clearance=clearance, keep_weights=False)
-    return Watcher(folder, NewFiles(settle), Measuring(settings, angles, RunStore(c.target / KEPT)), within), drawing
+    return Watcher(folder, NewFiles(settle), settings, angles, RunStore(c.target / KEPT), within), drawing
 
 
 def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refresh: int) -> None:
@@ -158,9 +158,7 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
     if len(snapshot.new) > MOST_LINES:
         from tpjb_ident.report.watch_page import coverage_table
 
-        coverage = coverage_table(snapshot)
-        title = f"{snapshot.campaign.id}: {len(snapshot.new)} records have landed"
-        c.show(title, [Column(name, words=not name) for name in coverage.columns], coverage.rows)
+        c.show_table(coverage_table(snapshot), f"{snapshot.campaign.id}, {len(snapshot.new)} records have landed")
     else:
         status = {s.run.id: s for s in snapshot.states}
         latest = {p.point: run for p in snapshot.measured.points for run in snapshot.new if run in p.runs}

@@ -67,6 +67,15 @@ def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | N
     return IdentifySettings(method=estimator, clearance=_clearance(c, campaign))
 
 
+def identified(c: Command, campaign: Campaign, method: str, norm: str | None) -> Identification:
+    """Identify a campaign."""
+    from tpjb_ident.identification.identify import identify
+
+    settings = identify_settings(c, campaign, method, norm)
+    with c.progress(f"identifying {campaign.id}") as show:
+        return identify(campaign, settings, show)
+
+
 def _clearance(c: Command, campaign: Campaign) -> float | None:
     """Smallest assembled clearance [m], None if the campaign carries no bearing that can be read."""
     from model.bearing import BearingError

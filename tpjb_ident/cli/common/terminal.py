@@ -10,10 +10,13 @@ import textwrap
 import time
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.columns import Column
 from tpjb_ident.runtime.tables import printable, readable
+
+if TYPE_CHECKING:
+    from tpjb_ident.report.page import Table
 
 #: Seconds between two lines about progress where there is no terminal, and between two states of the one line on it.
 LINE_EVERY, _STATE_EVERY = 30.0, 0.1
@@ -106,6 +109,22 @@ class Terminal:
         title, lines = _titled_table(printable(title), shown_headings, shown, words)
         more = [f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}"] if len(head) < len(texts) else []
         print("\n".join(["", title, *lines, "", *more]), flush=True)
+
+    def show_table(self, table: Table, name: str = "") -> None:
+        """Print a table of a page; `name` says what it is of."""
+        columns = [Column(title, words=i in table.text_columns) for i, title in enumerate(table.columns)]
+        self.show(": ".join(filter(None, (name, table.caption))), columns, table.rows)
+
+    @contextlib.contextmanager
+    def conclusion(self, sentences: Sequence[str], following: str) -> Iterator[None]:
+        """Print the answer, what the block shows, and all else; the command that comes next is noted."""
+        answer, *more = sentences
+        self.print(answer)
+        if following:
+            self.next(following)
+        yield
+        for line in more:
+            self.print(line)
 
     @contextlib.contextmanager
     def progress(self, activity: str) -> Iterator[Progress]:

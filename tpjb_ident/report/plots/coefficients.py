@@ -70,7 +70,7 @@ def coefficient(
     """
     if name not in COEFFICIENTS:
         raise ValueError(f"name must be one of {', '.join(COEFFICIENTS)}; got {name!r}")
-    series = longest_series(_comparison_table(comparison), over)
+    series = longest_series(as_table(comparison), over)
     if series is None:
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
     kind = KINDS[name[0]]
@@ -108,16 +108,6 @@ def _draw_deviations(axes: Axes, rows: pd.DataFrame, style: Style, key: str, ove
     off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
     _draw_predicted(axes, off, rows, style, over)
     return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
-
-
-def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
-    if isinstance(comparison, pd.DataFrame):
-        return comparison
-    from tpjb_ident.compare.comparison import comparison_frame
-
-    return comparison_frame(comparison)
 
 
 def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, style: Style, over: str) -> None:

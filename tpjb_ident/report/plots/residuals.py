@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import symbol
-from tpjb_ident.compare.comparison import Comparison, comparison_frame
 from tpjb_ident.compare.effect_words import label_in_words
 from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
 from tpjb_ident.report.drawing.picture import (
@@ -38,10 +37,11 @@ from tpjb_ident.report.drawing.picture import (
     new_pictures,
     shrink,
 )
-from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, axis_of, longest_series, set_point_ticks
+from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, as_table, axis_of, longest_series, set_point_ticks
 from tpjb_ident.schema import POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
+    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
     from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -59,11 +59,10 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
     source : Diagnosis, Comparison or DataFrame
         Or a table of comparison.csv.
     """
-    if isinstance(source, pd.DataFrame):
-        return source if {"model", "entry", "z"} <= set(source.columns) else _of_comparison(source)
-    if isinstance(source, Comparison):
-        return _of_comparison(comparison_frame(source))
-    return _of_diagnosis(source)
+    if hasattr(source, "problem"):
+        return _of_diagnosis(source)
+    table = as_table(source)
+    return table if {"model", "entry", "z"} <= set(table.columns) else _of_comparison(table)
 
 
 def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -157,6 +156,8 @@ def _short(z: float) -> str:
 
 _STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
 
+#: Coefficients that are drawn of a diagnosis: those that disagree most.
+_WORST = 3
 _DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
 
 
@@ -192,7 +193,8 @@ def residual_series(
     if series is None:
         raise ValueError(f"there are no two points that differ in {over} alone")
     models = list(dict.fromkeys(frame["model"]))
-    chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
+    squares = (frame["z"] ** 2).groupby(frame["entry"].where(frame["model"] == models[0])).sum()
+    chosen = list(entries or squares.sort_values(ascending=False).index[:_WORST])
     figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
@@ -207,11 +209,6 @@ def residual_series(
             )  # fmt: skip
     add_legend(axes)
     return figure
-
-
-def _worst(frame: pd.DataFrame, count: int = 3) -> list[str]:
-    size = (frame["z"] ** 2).groupby(frame["entry"]).sum()
-    return [str(name) for name in size.sort_values(ascending=False).index[:count]]
 
 
 def gap(
@@ -230,7 +227,9 @@ def gap(
         Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
     title : str, optional
     """
-    gaps = _gaps(source)
+    # a diagnosis holds a verdict, whose own `verdict` is a word
+    verdict = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
+    gaps = source if isinstance(source, Mapping) else verdict.gap_by_observable
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
@@ -251,13 +250,6 @@ def gap(
     handles = axes.get_legend_handles_labels()[0]
     add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
     return figure
-
-
-def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Mapping[str, Mapping[str, float]]:
-    if isinstance(source, Mapping):
-        return source
-    # a diagnosis holds a verdict, whose own `verdict` is a word
-    return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
 
 
 def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
