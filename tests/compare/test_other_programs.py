@@ -22,9 +22,9 @@ from tpjb_ident.compare.comparison import (
 )
 from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.presentation import us_table
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
-from tpjb_ident.us_table import us_table
 
 DEMO = Path(__file__).parents[2] / "rigdata" / "samples" / "demo.h5"
 MEASURED = """static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m

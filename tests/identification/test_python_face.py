@@ -9,7 +9,7 @@ import pytest
 import tpjb_ident as ti
 from rigdata import load_campaign
 from tpjb_ident.arguments import checked, least_clearance
-from tpjb_ident.cli.common.options import DEMO, ROCKER
+from tpjb_ident.cli.options import DEMO, ROCKER
 
 
 def settings_that_reach(call):

@@ -39,8 +39,8 @@ class Outcome:
 
 def judge(path: Path, rig: Rig) -> Outcome:
     """Identify one campaign and hold it against the truth."""
-    from tpjb_ident.cli.common.command import Command
-    from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted
+    from tpjb_ident.cli.command import Command
+    from tpjb_ident.cli.identification import identify_settings, refuse_untrusted
     from tpjb_ident.identification.identify import identify
 
     outcome = Outcome()

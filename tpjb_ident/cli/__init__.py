@@ -15,7 +15,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
-        from tpjb_ident.cli.app import app
+        from tpjb_ident.cli.commands.app import app
 
         app(prog_name="tpjb")
     except KeyboardInterrupt as error:  # while the libraries are loaded, before any command has begun

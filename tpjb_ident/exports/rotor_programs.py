@@ -23,8 +23,8 @@ from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.columns import amount, in_us_units
 from tpjb_ident.exports.formats import COLUMNS, ROSS_VERSIONS, flags
 from tpjb_ident.exports.table import INTERVALS
+from tpjb_ident.presentation import UNITS
 from tpjb_ident.runtime.tables import printable, write_text
-from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.exports.formats import COLUMNS, ENDS, ExportError, flags
+from tpjb_ident.presentation import us_table
 from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, write_atomic
 from tpjb_ident.schema import KINDS, STATIC_KEY
-from tpjb_ident.us_table import us_table
 
 if TYPE_CHECKING:
     import pandas as pd

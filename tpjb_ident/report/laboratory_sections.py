@@ -17,8 +17,7 @@ from tpjb_ident.report.drawing.series import constant_along, longest_series, poi
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coefficients import frf
-from tpjb_ident.report.plots.records import coherence_spectrum, orbit, spectra
-from tpjb_ident.report.plots.windows import coherence
+from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
 from tpjb_ident.rounding import counted, fixed, with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
 

@@ -19,8 +19,8 @@ from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
 from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
+from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
-from tpjb_ident.report.plots.windows import window_weights
 from tpjb_ident.rounding import counted
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.command import Command, campaign_place, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import identified, identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, refuse_impossible
-from tpjb_ident.cli.common.options import DEMO, named, refuse_unknown
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, refuse_impossible
+from tpjb_ident.cli.options import DEMO, named, refuse_unknown
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 

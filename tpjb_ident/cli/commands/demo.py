@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import named
+from tpjb_ident.cli.options import named
 from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:

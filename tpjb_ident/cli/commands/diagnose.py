@@ -7,10 +7,10 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
-from tpjb_ident.cli.common.options import DEMO, named
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import refuse_untrusted, write_identification
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
+from tpjb_ident.cli.options import DEMO, named
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import identified
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import identified
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
 from tpjb_ident.rounding import counted

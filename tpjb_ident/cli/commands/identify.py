@@ -9,15 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import (
     identify_settings,
     refuse_untrusted,
     show_identification,
     write_identification,
 )
-from tpjb_ident.cli.common.inputs import parse_amount, parse_values
-from tpjb_ident.cli.common.options import DEMO, refuse_unknown
+from tpjb_ident.cli.inputs import parse_amount, parse_values
+from tpjb_ident.cli.options import DEMO, refuse_unknown
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import model
-from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text

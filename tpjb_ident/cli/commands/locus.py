@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import UNITS, Column, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError

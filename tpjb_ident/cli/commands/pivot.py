@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError

@@ -7,9 +7,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import operating_points, pivot_choice, rotation_choice
-from tpjb_ident.cli.common.options import ROCKER
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import operating_points, pivot_choice, rotation_choice
+from tpjb_ident.cli.options import ROCKER
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed
 from tpjb_ident.runtime.tables import write_text

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import (
     model_settings,
     operating_points,
     parse_value,
@@ -16,7 +16,7 @@ from tpjb_ident.cli.common.inputs import (
     refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.common.options import PHYSICS, ROCKER, refuse_unknown
+from tpjb_ident.cli.options import PHYSICS, ROCKER, refuse_unknown
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted

@@ -9,8 +9,8 @@ from typing import Any
 
 import typer
 
+from tpjb_ident.cli.command import COMMANDS, Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
-from tpjb_ident.cli.common.command import COMMANDS, Command, command
 from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of

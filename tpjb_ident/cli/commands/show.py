@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
-from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import HDF5, Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.presentation import UNITS
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign

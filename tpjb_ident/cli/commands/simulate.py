@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import (
     model_settings,
     operating_points,
     pivot_choice,
     refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.common.options import ROCKER, refuse_unknown
+from tpjb_ident.cli.options import ROCKER, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:

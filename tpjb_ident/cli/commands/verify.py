@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tpjb_ident.cli.common.command import Command, campaign_place, command, refuse_special
+from tpjb_ident.cli.command import Command, campaign_place, command, refuse_special
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.command import Command, campaign_place, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.interrupts import heard
 from tpjb_ident.runtime.output_folder import former_runs
@@ -68,7 +68,7 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.cli.common.identification import identify_settings
+        from tpjb_ident.cli.identification import identify_settings
         from tpjb_ident.identification.identify import identify
 
         settings = identify_settings(c, campaign, "mm-eiv", None)

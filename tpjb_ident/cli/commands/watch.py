@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import parse_amount
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import parse_amount
 from tpjb_ident.columns import place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted

@@ -31,15 +31,17 @@ LIGHT = {
     "grey": "#7a828b",
 }
 INK, RULE, PAPER, BLUE, RED, GREY = (LIGHT[name] for name in ("ink", "rule", "paper", "blue", "red", "grey"))
+#: Lines that are told apart without colour.
+DASHED, SHORT_DASHED, DOTTED, DASH_DOTTED = (0, (5, 2)), (0, (4, 2)), (0, (1, 1.5)), (0, (3, 1, 1, 1))
 #: Colour, line and marker.
 Style = tuple[str, Any, str]
 #: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
 VARIANT_STYLE: dict[str, Style] = {
-    "rigid": ("grey", (0, (1, 1.5)), "s"),
-    "kirk": ("orange", (0, (5, 2)), "^"),
-    "kirk-secant": ("purple", (0, (3, 1, 1, 1)), "v"),
+    "rigid": ("grey", DOTTED, "s"),
+    "kirk": ("orange", DASHED, "^"),
+    "kirk-secant": ("purple", DASH_DOTTED, "v"),
     "measured": ("blue", "-", "D"),
-    "model before": ("orange", (0, (5, 2)), "^"),
+    "model before": ("orange", DASHED, "^"),
     "with the effects found": ("blue", "-", "D"),
 }
 VARIANT_LABEL = {
@@ -58,9 +60,9 @@ _TABLE_STYLE: tuple[Style, ...] = (
 )
 _PAD_STYLE: tuple[Style, ...] = (
     ("blue", "-", "o"),
-    ("red", (0, (5, 2)), "s"),
-    ("green", (0, (3, 1, 1, 1)), "^"),
-    ("purple", (0, (1, 1.5)), "D"),
+    ("red", DASHED, "s"),
+    ("green", DASH_DOTTED, "^"),
+    ("purple", DOTTED, "D"),
     ("orange", (0, (8, 2, 1, 2)), "v"),
 )
 #: Blue through paper to orange: signs that nobody confuses.

@@ -14,10 +14,13 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
+    DASHED,
+    DOTTED,
     FONT_SIZE,
     GREY,
     INK,
     LIGHT,
+    SHORT_DASHED,
     VARIANT_LABEL,
     VARIANT_STYLE,
     add_legend,
@@ -31,8 +34,8 @@ if TYPE_CHECKING:
 _POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
     ("ink", "-"),
     ("red", (0, (6, 2, 1, 2))),
-    ("green", (0, (4, 2))),
-    ("purple", (0, (1, 1.5))),
+    ("green", SHORT_DASHED),
+    ("purple", DOTTED),
 )
 
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
@@ -72,7 +75,7 @@ def clearance_and_locus(
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.8)
     if drawing is not None:
         axes.plot(*(per("length") * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
-                  linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip
+                  linestyle=DASHED, label="clearance, drawing")  # fmt: skip
     for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
         _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
     if named:

@@ -13,8 +13,11 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.report.drawing.picture import (
+    DASH_DOTTED,
+    DOTTED,
     INK,
     LIGHT,
+    SHORT_DASHED,
     VARIANT_LABEL,
     Style,
     add_legend,
@@ -128,10 +131,10 @@ _BEARING_COLOURS = ("blue", "red", "green", "purple")
 
 #: Marker, line and fill of the entry: full lines for the loaded direction.
 _ENTRY_STYLE: dict[str, tuple[str, Any, str | None]] = {
-    "xx": ("s", (0, (4, 2)), "paper"),
+    "xx": ("s", SHORT_DASHED, "paper"),
     "yy": ("o", "-", None),
-    "xy": ("<", (0, (1, 1.5)), "paper"),
-    "yx": (">", (0, (3, 1, 1, 1)), "paper"),
+    "xy": ("<", DOTTED, "paper"),
+    "yx": (">", DASH_DOTTED, "paper"),
 }
 
 
@@ -241,7 +244,7 @@ def frf(
 
 def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     label(axes, "frequency, Hz", "multiple coherence")
-    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", (0, (4, 2)))):
+    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", SHORT_DASHED)):
         axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
                   linewidth=1.2, label=f"force along {axis}")  # fmt: skip
     axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)

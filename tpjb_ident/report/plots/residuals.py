@@ -20,7 +20,9 @@ from tpjb_ident.compare.effect_words import label_in_words
 from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
 from tpjb_ident.report.drawing.picture import (
     CHARACTER,
+    DASH_DOTTED,
     DIVERGING,
+    DOTTED,
     FONT_SIZE,
     INK,
     LEFT,
@@ -29,6 +31,7 @@ from tpjb_ident.report.drawing.picture import (
     RED,
     RULE,
     SEQUENTIAL,
+    SHORT_DASHED,
     VARIANT_LABEL,
     add_colour_bar,
     add_legend,
@@ -158,7 +161,7 @@ _STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
 
 #: Coefficients that are drawn of a diagnosis: those that disagree most.
 _WORST = 3
-_DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
+_DASHES: tuple[Any, ...] = (SHORT_DASHED, "-", DOTTED, DASH_DOTTED)
 
 
 def residual_series(
@@ -291,10 +294,9 @@ def isolability(
     words = [label_in_words(name) for name in names]
     room = CHARACTER * max(len(word) for word in words)
     # the panel's own margins and the colour bar come on top of cells and names
-    figure, ((axes,),) = new_pictures(
-        1, 1, title=title, width=_SQUARE * k + room + 2.0, height=max(_SQUARE * k, _TALL) + room + 1.0
-    )
-    label(axes, "could pass for (framed: closer than 3)", "effect at work")
+    width, height = _SQUARE * k + room + 2.0, max(_SQUARE * k, _TALL) + room + 1.0
+    across, down = "could pass for (framed: closer than 3)", "effect at work"
+    figure, axes = new_picture(across, down, title=title, width=width, height=height)
     shrink(axes, left=room - 0.1, bottom=room - 0.1)
     image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE, aspect="auto", interpolation="nearest")
     axes.grid(False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command
-from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.columns import UNITS, Column, amount, size, symbol, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError

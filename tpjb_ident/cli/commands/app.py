@@ -23,7 +23,7 @@ from tpjb_ident.cli.commands.simulate import simulate
 from tpjb_ident.cli.commands.verify import verify
 from tpjb_ident.cli.commands.view import view
 from tpjb_ident.cli.commands.watch import watch
-from tpjb_ident.cli.common.options import GroupedHelp
+from tpjb_ident.cli.options import GroupedHelp
 
 #: What is written outside --out.
 _CACHES = (

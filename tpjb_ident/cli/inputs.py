@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.units import LONGEST, UnitError, parse_quantity
-from tpjb_ident.cli.common.command import Command
-from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:

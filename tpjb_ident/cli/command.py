@@ -1,8 +1,8 @@
 """One object for one run of a command, and the decorator that makes a command of a function.
 
-A command is a function in a file of `tpjb_ident.cli.commands`, decorated with ``@command(..)`` and listed in
-`tpjb_ident.cli.app`. Its first argument is the `Command`: it opens what the user gave, takes tables, messages and the
-next command, and at the end writes run.json, prints the document of ``--json`` and turns errors into exit codes.
+A command is a function in a file of `tpjb_ident.cli.commands`, decorated with ``@command(..)`` and listed in its `app`.
+Its first argument is the `Command`: it opens what the user gave, takes tables, messages and the next command, and at
+the end writes run.json, prints the document of ``--json`` and turns errors into exit codes.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import datetime
 import functools
 import inspect
 import json
+import math
 import os
 import re
 import sys
@@ -26,8 +27,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigdata.problem import RigError
-from tpjb_ident.cli.common.options import option
-from tpjb_ident.cli.common.terminal import Terminal
+from tpjb_ident.cli.options import option
+from tpjb_ident.cli.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.interrupts import heard, interrupt_behind
@@ -149,7 +150,7 @@ class Command(Terminal):
         """Write a table of the results as CSV and Parquet."""
         write_table(self.folder, name, frame)
         if in_us_units():
-            from tpjb_ident.us_table import us_table
+            from tpjb_ident.presentation import us_table
 
             write_csv(self.folder / f"{name}_us.csv", us_table(frame))
 
@@ -279,11 +280,21 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
 
 
 def _print_document(document: Mapping[str, Any]) -> None:
-    from tpjb_ident.presentation import json_data
-
     # escapes where standard output is not UTF-8, which every program that reads JSON expects
     ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
-    typer.echo(json.dumps(json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
+    typer.echo(json.dumps(_json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
+
+
+def _json_data(value: Any) -> Any:
+    """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text."""
+    if isinstance(value, Mapping):
+        return {str(k): _json_data(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_json_data(v) for v in value]
+    value = value.item() if hasattr(value, "dtype") else value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, (str, int, bool)) or value is None else str(value)
 
 
 def _rows(path: Path) -> Any:
