@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import html
+import math
 import re
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +72,18 @@ def _in_display_units(frame: pd.DataFrame) -> pd.DataFrame:
             values = (values / scale).map("{:.4g}".format)
         table[(words + end).replace("_", " ") + (f", {label}" if label else "")] = values
     return pd.DataFrame(table)
+
+
+def json_data(value: Any) -> Any:
+    """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text."""
+    if isinstance(value, Mapping):
+        return {str(k): json_data(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_data(v) for v in value]
+    value = value.item() if hasattr(value, "dtype") else value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, (str, int, bool)) or value is None else str(value)
 
 
 def changed(settings: Any) -> str:

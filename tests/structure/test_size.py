@@ -28,7 +28,7 @@ LIMITS = {
     "clearance": (8.67, 1_149),
     "compare": (13.34, 1_834),
     "watch": (6.44, 824),
-    "top level": (6.9, 1_290),
+    "top level": (6.66, 1_300),  # a column finds its unit by its name: fewer tokens, ten lines more
     "runtime": (7.96, 1_233),  # Ctrl-C and SIGTERM, which were in the command line: folders and processes hold them too
     "exports": (5.53, 852),
     "view": (4.96, 575),

@@ -12,7 +12,6 @@ import datetime
 import functools
 import inspect
 import json
-import math
 import os
 import re
 import sys
@@ -280,21 +279,11 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
 
 
 def _print_document(document: Mapping[str, Any]) -> None:
+    from tpjb_ident.presentation import json_data
+
     # escapes where standard output is not UTF-8, which every program that reads JSON expects
     ascii_only = "utf" not in (sys.stdout.encoding or "").lower()
-    typer.echo(json.dumps(_json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
-
-
-def _json_data(value: Any) -> Any:
-    """A result as JSON can hold it: numbers that it cannot hold become null, what it does not know a text."""
-    if isinstance(value, Mapping):
-        return {str(k): _json_data(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json_data(v) for v in value]
-    value = value.item() if hasattr(value, "dtype") else value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if isinstance(value, (str, int, bool)) or value is None else str(value)
+    typer.echo(json.dumps(json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
 
 def _rows(path: Path) -> Any:
