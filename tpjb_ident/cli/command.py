@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
+    from tpjb_ident.report.figure import Panel
 
 _BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED, _TERMINATED = 1, 2, 3, 130, 143
 #: What numpy says of single operations is for programmers: run.json lists it, people are told by conditions.
@@ -156,6 +157,12 @@ class Command(Terminal):
     def json(self, name: str, document: Mapping[str, Any]) -> None:
         """Write a JSON file of the results."""
         write_text(self.folder / name, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+
+    def draw(self, panels: Sequence[Panel]) -> None:
+        """Write the figures of the results."""
+        from tpjb_ident.report.figure import save_panels
+
+        save_panels(panels, self.folder / "figures")
 
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""

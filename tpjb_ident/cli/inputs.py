@@ -56,8 +56,17 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
     values: list[float] = []
     unit = ""
     for item in reversed(items):
-        several, unit = _item(item, unit, dimension, option)
-        values[:0] = several
+        head, *ends = item.split("..")
+        if ends and ":" not in ends[0]:
+            raise BadInputError(
+                f"{option}: the range {item.strip()!r} has no step. Write from..to:step, for instance "
+                '"2.5..8.75:1.25 kN".'
+            )
+        quantities: list[float] = []
+        for part in reversed([head, *":".join(ends).split(":", 1)] if ends else [item]):
+            quantity, unit = _quantity(part, unit, dimension, option)
+            quantities.insert(0, quantity)
+        values[:0] = _range(*quantities, f"{option}: the range {item.strip()!r}") if ends else quantities
         if len(values) > MAX_VALUES:
             raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
     return tuple(values)
@@ -77,23 +86,6 @@ def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
         return parse_quantity(text, dimension)
     except UnitError as error:
         raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
-
-
-def _item(item: str, unit: str, dimension: str, option: str) -> tuple[list[float], str]:
-    """Return the values of one list item and its leftmost unit, for the item before it."""
-    if ".." not in item:
-        value, unit = _quantity(item, unit, dimension, option)
-        return [value], unit
-    head, colon, step_text = item.partition(":")
-    start_text, _, stop_text = head.partition("..")
-    if not colon:
-        raise BadInputError(
-            f'{option}: the range {item.strip()!r} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".'
-        )
-    step, unit = _quantity(step_text, unit, dimension, option)
-    stop, unit = _quantity(stop_text, unit, dimension, option)
-    start, unit = _quantity(start_text, unit, dimension, option)
-    return _range(start, stop, step, f"{option}: the range {item.strip()!r}"), unit
 
 
 def _range(start: float, stop: float, step: float, where: str) -> list[float]:

@@ -65,25 +65,25 @@ class Terminal:
 
     def error(self, kind: str, text: str) -> None:
         """Print a message to stderr, its lines kept."""
-        lines = "\n".join(printable(line) for line in text.splitlines())
-        self.messages.append({"kind": kind, "text": lines})
-        _print_message(kind, lines)
+        self._say(kind, "\n".join(printable(line) for line in text.splitlines()), True)
 
     def warn(self, text: str) -> None:
         """Print a warning to stderr."""
-        self.messages.append({"kind": "warning", "text": printable(text)})
-        _print_message("warning", printable(text))
+        self._say("warning", printable(text), True)
 
     def note(self, text: str) -> None:
         """Print a remark to stderr; not of a quiet command."""
-        self.messages.append({"kind": "note", "text": printable(text)})
-        if not self._silent:
-            _print_message("note", printable(text))
+        self._say("note", printable(text), not self._silent)
 
     def doing(self, text: str) -> None:
         """Print to stderr what the command is at."""
         if not self._silent:
             _print_message("doing", printable(text))
+
+    def _say(self, kind: str, text: str, aloud: bool) -> None:
+        self.messages.append({"kind": kind, "text": text})
+        if aloud:
+            _print_message(kind, text)
 
     def show(
         self,

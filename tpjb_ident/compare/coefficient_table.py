@@ -117,23 +117,19 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     return TableRow(line, point, values, errors, position, cells.get("converged") is not False, status)
 
 
-@dataclass(frozen=True)
-class Tolerances:
-    """How far two rows may be from each other that are of one operating point."""
+def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:
+    """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is.
 
-    load: float  #: share
-    direction: float  #: [deg]
-    frequency: float  #: of shaft and excitation, share
-
-
-def partners(rows: pd.DataFrame, others: pd.DataFrame, within: Tolerances) -> IntArray:
-    """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is."""
+    `within` says how far two rows of one point may be apart: share of the load, direction [deg], share of the
+    frequencies of shaft and excitation.
+    """
+    load, direction, frequency = within
     if not len(others):
         return np.full(len(rows), -1)
     left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, others))
     apart = np.abs(right[None] - left[:, None])
     apart[..., 1] = np.minimum(apart[..., 1] % 360.0, -apart[..., 1] % 360.0)
-    most = np.abs(left) * [within.load, 0.0, within.frequency, within.frequency] + [0.0, within.direction, 0.0, 0.0]
+    most = np.abs(left) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]
     with np.errstate(invalid="ignore", divide="ignore"):  # a load or speed of zero has no share: equal or apart
         distance = np.nan_to_num(apart / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
     senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, others)]

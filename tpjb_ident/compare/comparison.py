@@ -131,13 +131,13 @@ class Comparison(Presented):
     """
 
     campaign: Campaign | TableSource
-    bearing: Bearing | None = field(repr=False)
+    bearing: Bearing | None
     settings: CompareSettings
-    identification: Identification = field(repr=False)
-    curves: tuple[PivotCurve, ...] = field(repr=False)
-    clearance: ClearancePolygon | None = field(repr=False)
-    locus: Locus | None = field(repr=False)
-    variants: tuple[Variant, ...] = field(repr=False)
+    identification: Identification
+    curves: tuple[PivotCurve, ...]
+    clearance: ClearancePolygon | None
+    locus: Locus | None
+    variants: tuple[Variant, ...]
     remarks: tuple[str, ...] = ()
 
     @property

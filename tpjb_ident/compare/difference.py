@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.compare.coefficient_table import Tolerances, partners
+from tpjb_ident.compare.coefficient_table import partners
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.dynamic.results.identification import Identification
 
-#: Set points of both that are the same.
-_SAME_POINT = Tolerances(load=0.002, direction=0.5, frequency=0.002)
+#: Set points of both that are the same: share of the load, deg of its direction, share of the frequencies.
+_SAME_POINT = (0.002, 0.5, 0.002)
 #: A difference within this share of the point's mean direct coefficient (a pad's stiffness, its clearance) is none:
 #: twice the tolerance that a model is granted.
 _NO_CHANGE = 0.03
@@ -45,17 +45,17 @@ _ENDS = ("", "_lo", "_hi")
 _FREEDOM = np.geomspace(1.0, 1e6, 400)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Side:
     """One of the two: tables as they are on disk; from records also how single sensors move its points."""
 
     name: str
-    coefficients: pd.DataFrame = field(repr=False)
-    pivots: pd.DataFrame | None = field(repr=False, default=None)
-    clearance: pd.DataFrame | None = field(repr=False, default=None)
+    coefficients: pd.DataFrame
+    pivots: pd.DataFrame | None = None
+    clearance: pd.DataFrame | None = None
     campaign: Campaign | None = field(repr=False, default=None)
     #: (P, 8) by parameter, N/m: what one standard deviation of an instrument's error does to the points
-    sensors: Mapping[str, FloatArray] = field(repr=False, default_factory=dict)
+    sensors: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def measured_side(campaign: Campaign, identification: Identification, static: StaticTests | None) -> Side:

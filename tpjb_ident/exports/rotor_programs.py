@@ -10,7 +10,7 @@ import functools
 import importlib.metadata
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -34,13 +34,13 @@ _HZ = 2.0 * np.pi
 _SAME = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Grid:
     """What one file holds: coefficients of one static load over n shaft speeds and m excitation frequencies."""
 
-    rows: pd.DataFrame = field(repr=False)  #: n m of them, by speed and frequency
-    speed: FloatArray = field(repr=False)  #: (n,) [Hz]
-    excitation: FloatArray = field(repr=False)  #: (m,) [Hz]; NaN where it is the running speed
+    rows: pd.DataFrame  #: n m of them, by speed and frequency
+    speed: FloatArray  #: (n,) [Hz]
+    excitation: FloatArray  #: (m,) [Hz]; NaN where it is the running speed
 
     @property
     def values(self) -> FloatArray:

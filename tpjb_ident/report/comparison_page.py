@@ -153,7 +153,7 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
             "Pivots, from the dry tests",
             notes=[note],
             panels=pivot_panels(comparison.curves, formula),
-            tables=[_pivot_points_table(comparison.curves, formula)],
+            tables=[pivot_stiffness_table(comparison.curves, formula, _PIVOT_LOADS)],
         )
     ]
 
@@ -165,7 +165,7 @@ def _position_sections(comparison: Comparison) -> list[Section]:
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
     if not panels:
         return []
-    tables = [] if comparison.clearance is None else [_clearance_table(comparison.clearance, drawn[1])]
+    tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
     return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
 
 
@@ -231,15 +231,15 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
     return parts + [(name, test.status) for name, test in tests if test is not None]
 
 
-def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
-    """Tangent stiffness of every pad at two loads beside the printed formula's."""
+def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None, loads: Sequence[float]) -> Table:
+    """Tangent stiffness of every pad at some loads [N] beside the printed formula's."""
     columns = ["pad", "law"]
-    for load in _PIVOT_LOADS:
+    for load in loads:
         columns += [f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}", "of Kirk's tangent"]
     rows = []
     for curve in curves:
         cells = []
-        for load in _PIVOT_LOADS:
+        for load in loads:
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
             cells.append(stiffness_cell(curve, load) + remark)
             cells.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
@@ -247,7 +247,7 @@ def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
-def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
+def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
     """Clearance per pad beside the drawing's."""
     unit = size("length")
     digits = 2 if unit < 1e-5 else 4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +95,7 @@ def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
     measured = snapshot.measured
     if measured.points or measured.refusals:
         note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
-        tables = [_points_table(measured.points)] if measured.points else []
+        tables = [points_table(measured.points)] if measured.points else []
         sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
     if measured.curves:
         rows = [
@@ -112,7 +112,7 @@ def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
         rows = [[f"#{pad}", cell] for pad, cell in enumerate(clearance_cells(measured.polygon), start=1)]
         table = Table("Assembled clearance by pad, from the sweep", ["pad", symbol("length")], rows)
         sections.append(Section("Clearance", tables=[table]))
-    sections.append(Section("Records", tables=[_records_table(snapshot)]))
+    sections.append(Section("Records", tables=[records_table(snapshot, [s.run.id for s in snapshot.states])]))
     waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
     if waiting:
         rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
@@ -134,7 +134,7 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     return panels
 
 
-def _points_table(points: tuple[PointResult, ...]) -> Table:
+def points_table(points: Sequence[PointResult]) -> Table:
     """K and C of every point so far, with intervals and flags."""
     rows = []
     for p in points:
@@ -148,10 +148,10 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
     return Table("Direct coefficients so far, 95 % intervals", columns, rows)
 
 
-def _records_table(snapshot: Snapshot) -> Table:
-    """Records that have landed, the newest first."""
+def records_table(snapshot: Snapshot, runs: Collection[str]) -> Table:
+    """Records of some runs that have landed, the newest first."""
     why = {placed.run.id: placed.why for placed in snapshot.placed if placed.run is not None}
-    landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
+    landed = sorted((s for s in snapshot.states if s.landed and s.run.id in runs), key=lambda s: s.landed, reverse=True)
     rows = []
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]

@@ -13,7 +13,7 @@ from tpjb_ident.columns import amount, channel_unit, per, symbol
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rigdata.campaign import Campaign
     from rigdata.record import Record
@@ -70,22 +70,26 @@ def records_tab(campaign: Campaign) -> Any:
             fall.title.text = f"waterfall of {records[0].name}"
             data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
-            facts.text = _escaped(f"{text}. {message}")
         except RigDataError as error:
+            message = str(error)
             for source in data.values():
                 source.data = {name: [] for name in source.data}
-            facts.text = _escaped(f"{text}. {error}")
+        facts.text = html.escape(printable(f"{text}. {message}"))
 
-    pick.on_change("value", lambda attr, old, new: update())
-    channel.on_change("value", lambda attr, old, new: update())
-    further.on_change("value", lambda attr, old, new: update())
-    update()
+    follow(update, pick, channel, further)
     left_column, right = (
         column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
     )
     return column(
         _side_by_side(pick, channel, further), facts, _side_by_side(left_column, right), sizing_mode="stretch_width"
     )
+
+
+def follow(update: Callable[[], None], *widgets: Any, event: str = "value") -> None:
+    """Update now and whenever one of the widgets changes."""
+    for widget in widgets:
+        widget.on_change(event, lambda attr, old, new: update())
+    update()
 
 
 def _show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
@@ -163,10 +167,6 @@ def _thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     blocks = np.ma.masked_invalid(values[: count * step].reshape(count, step))
     ends = np.stack([blocks.min(axis=1).filled(np.nan), blocks.max(axis=1).filled(np.nan)], axis=1)
     return np.repeat(time[: count * step : step], 2), ends.ravel()
-
-
-def _escaped(text: str) -> str:
-    return html.escape(printable(text))
 
 
 def _side_by_side(*parts: Any) -> Any:

@@ -23,12 +23,12 @@ from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
 from tpjb_ident.rounding import counted
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.view.records_tab import follow
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.view.server import Session
 
 #: Frequencies of the curves [Hz].
@@ -60,15 +60,22 @@ def points_tab(identification: Identification) -> Any:
     from bokeh.layouts import column
     from bokeh.models import Select
 
-    points = {_label(p): p for p in identification.points}
+    points = {}
+    for p in identification.points:
+        place = f"{amount(p.point.static_load, 'load')} at {p.point.static_load_direction_deg:g} deg"
+        points[f"{place}, {p.point.speed_words}, excitation {p.point.excitation_hz:g} Hz"] = p
     choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
     windows = _text("windows")
 
     def update() -> None:
-        windows.text = _windows_html(points[choice.value])
+        p = points[choice.value]
+        flags = ", ".join(str(condition) for condition in p.quality) or "none"
+        title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
+        windows.text = render_section(
+            Section("Windows", panels=[panel("window-weights", title, window_weights(p), "")])
+        )
 
-    choice.on_change("value", lambda attr, old, new: update())
-    update()
+    follow(update, choice)
     return column(choice, windows, _text("coefficients", _points_html(identification)), sizing_mode="stretch_width")
 
 
@@ -79,21 +86,6 @@ def _text(name: str, html: str = "") -> Any:
     # the page is inverted as a whole; sections of the report know dark screens themselves
     back = "@media (prefers-color-scheme: dark) { :host { filter: invert(1) hue-rotate(180deg); } }"
     return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide, back])
-
-
-def _label(p: PointResult) -> str:
-    """Name of a point that no other point has."""
-    point = p.point
-    return (
-        f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg, {point.speed_words}, "
-        f"excitation {point.excitation_hz:g} Hz"
-    )
-
-
-def _windows_html(p: PointResult) -> str:
-    flags = ", ".join(str(condition) for condition in p.quality) or "none"
-    title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
-    return render_section(Section("Windows", panels=[panel("window-weights", title, window_weights(p), "")]))
 
 
 def _points_html(identification: Identification) -> str:
@@ -121,9 +113,11 @@ def model_tab(session: Session) -> Any:
     def update() -> None:
         curves.text = html(round(load.value * size("load"), 3))
 
-    load.on_change("value_throttled", lambda attr, old, new: update())  # when a moving slider is let go
-    update()
-    return column(load, curves, _text("residuals", _residuals_html(session)), sizing_mode="stretch_width")
+    follow(update, load, event="value_throttled")  # when a moving slider is let go
+    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
+    residuals = panel("residual-map", "Residuals of all points", residual_map(table), "")
+    html_of_all = render_section(Section("All points", panels=[residuals]))
+    return column(load, curves, _text("residuals", html_of_all), sizing_mode="stretch_width")
 
 
 def _curves_html(session: Session, load: float) -> str:
@@ -142,14 +136,6 @@ def _curves_html(session: Session, load: float) -> str:
         panels.append(panel(f"model-{name}", f"{name} over excitation at {amount(load, 'load')}", figure, ""))
     note = f"{counted(len(measured), 'measured point')} at this load."
     return render_section(Section("Prediction and measurement", [note], panels))
-
-
-def _residuals_html(session: Session) -> str:
-    identification = session.identification
-    assert identification is not None
-    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
-    figure = residual_map(table)
-    return render_section(Section("All points", panels=[panel("residual-map", "Residuals of all points", figure, "")]))
 
 
 def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.DataFrame) -> pd.DataFrame:

@@ -139,10 +139,15 @@ def next_steps(
     """Everything to do, most urgent first."""
     stop, stopped = _stop(states)
     at = _current_run(states)
+    repairs = []
+    for group in common:
+        problem, runs = group[0].problem, tuple(dict.fromkeys(str(f.problem.run) for f in group))
+        text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
+        repairs.append(Step("mend", text, runs))
     return [
         *stop,
         *_repeats([s for s in states if s.run.id not in stopped], at),
-        *(_repair(group) for group in common),
+        *repairs,
         *_more(states, points, within),
         *_next(states, at),
     ]
@@ -232,13 +237,6 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
         (now if same_set_up or run.kind not in _TURNING else later).append(step)
     return now + later
-
-
-def _repair(group: Sequence[Finding]) -> Step:
-    problem = group[0].problem
-    runs = tuple(dict.fromkeys(str(f.problem.run) for f in group))
-    text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
-    return Step("mend", text, runs)
 
 
 def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:

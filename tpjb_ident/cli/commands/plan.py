@@ -54,7 +54,7 @@ def plan(
     from model.setup import Setup
     from tpjb_ident.diagnosis.from_python import planned_layout
     from tpjb_ident.diagnosis.plan import plan as plan_campaign
-    from tpjb_ident.report.panels import save_isolability
+    from tpjb_ident.report.panels import isolability_panels
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
@@ -70,7 +70,7 @@ def plan(
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())
-        save_isolability(folder, plans)
+        c.draw(isolability_panels(plans))
         write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
     _show(c, result)
     c.next("simulate", bearing)

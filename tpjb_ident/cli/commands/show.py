@@ -76,12 +76,12 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
 
     c.options = {"source": source, "shown": title}
     c.inputs = {source.name: sha256(source)} if source.is_file() else {}
-    with c.results() as folder:
+    with c.results():
         c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
         if picture:
-            from tpjb_ident.report.panels import write_quick_look
+            from tpjb_ident.report.panels import quick_look
 
-            write_quick_look(folder, title, displayed, looks)
+            c.draw([quick_look(title, displayed, looks)])
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.inputs import parse_amount
-from tpjb_ident.columns import place_of, symbol
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.interrupts import heard
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
-    from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
 #: Folder in the output folder in which phasors of finished runs stay, for the next start.
@@ -146,24 +144,20 @@ def _state_document(snapshot: Snapshot) -> dict[str, Any]:
 
 def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
     """Print how the campaign stands, what landed, and every step that was not printed before; what is printed now."""
-    landed, repeat, look = (
-        sum(bool(s.landed) for s in snapshot.states),
-        snapshot.count("repeat"),
-        snapshot.count("look"),
-    )
+    from tpjb_ident.report.watch_page import coverage_table, points_table, records_table
+
+    name, landed = snapshot.campaign.id, sum(bool(s.landed) for s in snapshot.states)
     c.print(
-        f"{snapshot.campaign.id}: {landed} of {len(snapshot.states)} runs landed, {repeat} to be repeated, "
-        f"{look} to look at."
+        f"{name}: {landed} of {len(snapshot.states)} runs landed, {snapshot.count('repeat')} to be repeated, "
+        f"{snapshot.count('look')} to look at."
     )
     if len(snapshot.new) > MOST_LINES:
-        from tpjb_ident.report.watch_page import coverage_table
-
-        c.show_table(coverage_table(snapshot), f"{snapshot.campaign.id}, {len(snapshot.new)} records have landed")
-    else:
-        status = {s.run.id: s for s in snapshot.states}
-        latest = {p.point: run for p in snapshot.measured.points for run in snapshot.new if run in p.runs}
-        for run in snapshot.new:
-            c.print(_landed_line(status[run], snapshot, run in latest.values()))
+        c.show_table(coverage_table(snapshot), f"{name}, {len(snapshot.new)} records have landed")
+    elif snapshot.new:
+        c.show_table(records_table(snapshot, snapshot.new), name)
+        points = [p for p in snapshot.measured.points if set(p.runs) & set(snapshot.new)]
+        if points:
+            c.show_table(points_table(points), name)
     steps = [step.text for step in snapshot.steps]
     problems = [str(problem) for problem in snapshot.problems]
     lines = [*steps, *snapshot.lacks, *problems, *snapshot.measured.refusals]
@@ -171,26 +165,6 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         if line not in printed:
             c.print(line)
     return set(lines)
-
-
-def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> str:
-    """Time, run, verdict, and what its point is by now."""
-    line = f"{status.landed[11:19]} {status.run.id}: {status.state}"
-    for unnamed in snapshot.placed:
-        if unnamed.run is not None and unnamed.run.id == status.run.id and unnamed.why:
-            line += f" ({unnamed.why})"
-            break
-    point = next((p for p in snapshot.measured.points if status.run.id in p.runs), None)
-    if point is None or not with_result:
-        return line
-    from tpjb_ident.watch.next_steps import lacking
-
-    records = counted(point.n_records, "record")
-    line += f"; {place_of(point.point.static_load, point.point.excitation_hz)}, {records}: "
-    if reason := lacking(point):
-        return line + reason
-    cells = point.stiffness.cells()
-    return f"{line}kxx {cells[0]}, kyy {cells[3]} {symbol('stiffness')}"
 
 
 def _amount(text: str, dimension: str, option: str, example: str) -> float:

@@ -144,17 +144,14 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):
             strong = abs(norm(z) - 0.5) > 0.3
-            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 1.0,
+            text = f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
+            axes.text(j, i, text, ha="center", va="center", fontsize=FONT_SIZE - 1.0,
                       color="white" if strong else _ON_COLOUR)  # fmt: skip
     add_colour_bar(axes, image, "(measured - predicted) / sigma")
     bar = axes.figure.axes[-1]
     ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
     bar.set_yticks(ticks, [str(t) for t in ticks])
     bar.minorticks_off()
-
-
-def _short(z: float) -> str:
-    return f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
 
 
 _STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
@@ -236,7 +233,11 @@ def gap(
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
-    words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
+    words = []
+    for (name, values), left, right in zip(gaps.items(), before, after, strict=True):
+        star = "" if any(key.startswith("heldout") for key in values) else "*"
+        worse = " (worse)" if right > max(1.05 * left, 1.0) else ""
+        words.append(f"{name.replace('_', ' ')}{star}{worse}")
     figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
@@ -253,12 +254,6 @@ def gap(
     handles = axes.get_legend_handles_labels()[0]
     add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
     return figure
-
-
-def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
-    star = "" if any(k.startswith("heldout") for k in gaps) else "*"
-    worse = " (worse)" if after > max(1.05 * before, 1.0) else ""
-    return f"{name.replace('_', ' ')}{star}{worse}"
 
 
 _SQUARE = 0.3  # [inches]
