@@ -247,12 +247,12 @@ def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None,
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
-def clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
-    """Clearance per pad beside the drawing's."""
+def clearance_table(polygon: ClearancePolygon, drawn: FloatArray, calibrated: bool = False) -> Table:
+    """Clearance per pad beside the drawing's; see `clearance_cells`."""
     unit = size("length")
     digits = 2 if unit < 1e-5 else 4
     rows = []
-    for k, (drawing, measured) in enumerate(zip(drawn, clearance_cells(polygon), strict=True)):
+    for k, (drawing, measured) in enumerate(zip(drawn, clearance_cells(polygon, calibrated), strict=True)):
         off, pushed = polygon.clearance[k] - drawing, polygon.clearance_pushed[k]
         rows.append([f"#{k + 1}", f"{drawing / unit:.4g}", measured, signed(off / unit, digits),
                      fixed(pushed / unit, digits)])  # fmt: skip

@@ -139,9 +139,10 @@ def stiffness_cell(curve: PivotCurve, load: float) -> str:
     return with_interval(float(curve.stiffness(load)), low, high, size("stiffness"))
 
 
-def clearance_cells(polygon: ClearancePolygon) -> list[str]:
-    """Clearance of every pad at zero push load, with its interval."""
-    ends = zip(polygon.clearance, 1.96 * polygon.clearance_se, strict=True)
+def clearance_cells(polygon: ClearancePolygon, calibrated: bool = False) -> list[str]:
+    """Clearance of every pad at zero push load with its interval, `calibrated` with that of the probes' gains."""
+    gain = polygon.relative_calibration if calibrated else 0.0
+    ends = zip(polygon.clearance, 1.96 * np.hypot(polygon.clearance_se, gain * polygon.clearance), strict=True)
     return [with_interval(value, value - half, value + half, size("length")) for value, half in ends]
 
 

@@ -14,6 +14,7 @@ from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, refu
 from tpjb_ident.cli.options import DEMO, named, refuse_unknown
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import percent
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
@@ -160,11 +161,12 @@ def write_comparison(c: Command, result: Comparison) -> None:
 
 def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
     """Print what to conclude, the command that comes next, and how far each pivot model is off."""
-    from tpjb_ident.compare.summary import summary_sentences
-    from tpjb_ident.report.comparison_page import deviations_table
+    from tpjb_ident.compare.summary import agreements, summary_sentences
 
+    rows = [[a.pivots, *(percent(d.median) for d in a.deviations), a.inside] for a in agreements(result.table)]
+    columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy", "inside"]
     with c.conclusion(summary_sentences(result), following):
-        c.show_table(deviations_table(result.table), result.campaign.id)
+        c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
 
 
 def next_command(result: Comparison, source: str, bearing: Path | None) -> str:

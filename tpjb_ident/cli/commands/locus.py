@@ -105,7 +105,8 @@ def _show(c: Command, static: StaticTests, drawn: FloatArray, name: str, refused
 
     polygon = static.clearance
     if polygon is not None:
-        c.show_table(clearance_table(polygon, drawn), name)
+        # a table's reader has no other place that says how far the probes' gains are known
+        c.show_table(clearance_table(polygon, drawn, calibrated=True), name)
     printed: tuple[str, ...] = ()
     if static.locus is not None:
         c.print(f"locus: {static.locus}")
