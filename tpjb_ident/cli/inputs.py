@@ -56,17 +56,15 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
     values: list[float] = []
     unit = ""
     for item in reversed(items):
-        head, *ends = item.split("..")
-        if ends and ":" not in ends[0]:
-            raise BadInputError(
-                f"{option}: the range {item.strip()!r} has no step. Write from..to:step, for instance "
-                '"2.5..8.75:1.25 kN".'
-            )
+        start, dots, end = item.partition("..")
+        where = f"{option}: the range {item.strip()!r}"
+        if dots and ":" not in end:
+            raise BadInputError(f'{where} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".')
         quantities: list[float] = []
-        for part in reversed([head, *":".join(ends).split(":", 1)] if ends else [item]):
+        for part in reversed([start, *end.split(":", 1)] if dots else [item]):
             quantity, unit = _quantity(part, unit, dimension, option)
             quantities.insert(0, quantity)
-        values[:0] = _range(*quantities, f"{option}: the range {item.strip()!r}") if ends else quantities
+        values[:0] = _range(*quantities, where) if dots else quantities
         if len(values) > MAX_VALUES:
             raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
     return tuple(values)
