@@ -274,7 +274,7 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         functools.update_wrapper(run, function)
         parameters = []
         for parameter in (*own, *common):
-            annotation = Annotated[hints[parameter.name], option(name, parameter.name)]
+            annotation: Any = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
             run.__annotations__[parameter.name] = annotation
             parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

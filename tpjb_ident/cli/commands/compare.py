@@ -19,6 +19,7 @@ from tpjb_ident.rounding import percent
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.compare.difference import Side
+    from tpjb_ident.compare.predictions import Progress
 
 
 @command(
@@ -63,10 +64,10 @@ def compare(
     tables = read_predictions([c.file(path) for path in prediction or ()])
     source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
     refuse_impossible(settings.effects, effects, drawing)
-    with c.results() as folder:
+    with c.results():
         job = background_job(model_side, source, drawing, settings) if coefficients is None else nullcontext()
         with job as ahead, c.progress("comparing") as show:
-            from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
+            import tpjb_ident.report.comparison_page  # noqa: F401  (loaded while the model is at work)
 
             if coefficients is None:
                 settings = replace(settings, identify=identify_settings(c, source, method, norm))
@@ -76,10 +77,7 @@ def compare(
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
             following = next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
-            show("writing tables", 0, 2)
-            write_comparison(c, result)
-            show("drawing figures", 1, 2)
-            write_report(folder, result, named(c.options), c.inputs, following)
+            write_comparison(c, result, show, following)
     show_comparison(c, result, following)
     refuse_comparison(result)
 
@@ -140,12 +138,14 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(c: Command, result: Comparison) -> None:
-    """Write every table and pivots.toml."""
+def write_comparison(c: Command, result: Comparison, show: Progress, following: str, note: str = "") -> None:
+    """Write every table, pivots.toml and the report."""
     from tpjb_ident.compare.comparison import locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
+    from tpjb_ident.report.comparison_page import write_report
 
+    show("writing tables", 0, 2)
     if result.has_records:
         write_identification(c, result.identification)
     c.table("comparison", result.table)
@@ -157,6 +157,8 @@ def write_comparison(c: Command, result: Comparison) -> None:
     if result.locus is not None:
         c.table("locus", result.locus.to_frame())
         c.table("locus_comparison", locus_frame(result))
+    show("drawing figures", 1, 2)
+    write_report(c.folder, result, named(c.options), c.inputs, following, note)
 
 
 def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
