@@ -64,7 +64,7 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
         for part in reversed([start, *end.split(":", 1)] if dots else [item]):
             quantity, unit = _quantity(part, unit, dimension, option)
             quantities.insert(0, quantity)
-        values[:0] = _range(*quantities, where) if dots else quantities
+        values[:0] = _range(quantities, where) if dots else quantities
         if len(values) > MAX_VALUES:
             raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
     return tuple(values)
@@ -86,7 +86,8 @@ def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
         raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
 
 
-def _range(start: float, stop: float, step: float, where: str) -> list[float]:
+def _range(quantities: Sequence[float], where: str) -> list[float]:
+    start, stop, step = quantities
     if step == 0 or (stop - start) * step < 0:
         raise BadInputError(
             f"{where} never reaches its end. Give a step that leads from the first to the second value."

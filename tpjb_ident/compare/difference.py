@@ -190,18 +190,18 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
 
 
 def _coefficient(frame: pd.DataFrame, name: str) -> _Values:
-    ends = [frame[name + end].to_numpy(float) for end in _ENDS]
+    value, low, high = (frame[name + end].to_numpy(float) for end in _ENDS)
     if f"{name}_se_systematic" not in frame:  # of another program: its interval is all that is known
-        return _Values(*ends, _variance(*ends))
+        return _Values(value, low, high, _variance(low, high))
     error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
     with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
         quantile = frame[f"{name}_random95"].to_numpy(float) / error
     table = stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL)
     freedom = np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM)
-    return _Values(*ends, error**2, systematic**2, freedom)
+    return _Values(value, low, high, error**2, systematic**2, freedom)
 
 
-def _variance(value: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def _variance(low: FloatArray, high: FloatArray) -> FloatArray:
     return ((high - low) / (2 * 1.96)) ** 2
 
 
@@ -253,9 +253,9 @@ def _pivot(pad: float, curves: Sequence[pd.DataFrame], same: bool, number: int) 
     force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
     sides = []
     for curve in curves:
-        ends = [np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS]
+        value, low_end, high_end = (np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS)
         scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve and len(curve) else 0.0
-        sides.append(_Values(*ends, _variance(*ends), (scale * ends[0]) ** 2))
+        sides.append(_Values(value, low_end, high_end, _variance(low_end, high_end), (scale * value) ** 2))
     common = np.sqrt(sides[0].systematic * sides[1].systematic) if same else 0.0
     judged = _judged(TANGENT, sides, common, _NO_CHANGE * sides[0].value, number)
     return pd.DataFrame({"pad": pad, "force_N": force, **judged})

@@ -117,7 +117,7 @@ def deviations_table(table: pd.DataFrame) -> Table:
 
 def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequence[Panel]) -> list[Section]:
     sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
-    campaign = comparison.campaign
+    campaign: Any = comparison.campaign
     tables = [measured_table(comparison.identification)]
     if comparison.has_records:
         sections += evidence_sections(campaign, comparison.identification)

@@ -28,6 +28,15 @@ _INK, _BLUE, _RED = "#1c2024", "#0072b2", "#d55e01"
 _COLOURS = (_INK, _BLUE, "#d98c00", "#009e73", _RED, "#b9609a", "#7a828b")
 
 
+#: Columns of what is drawn.
+_COLUMNS = {"orbit": "x y", "without": "x y", "time": "x y colour name", "spectrum": "x y colour name",
+            "waterfall": "image x y dw dh"}  # fmt: skip
+
+
+def _nothing(name: str) -> dict[str, Any]:
+    return {column: [] for column in _COLUMNS[name].split()}
+
+
 def records_tab(campaign: Campaign) -> Any:
     """Build the tab."""
     from bokeh.layouts import column
@@ -41,9 +50,7 @@ def records_tab(campaign: Campaign) -> Any:
         title="beside it (same quantity)", options=list(first.channels), value=[], name="others", width=320
     )
     facts = Div(name="run-facts", sizing_mode="stretch_width")
-    data = {name: ColumnDataSource({"x": [], "y": []}) for name in ("orbit", "without")}
-    data |= {name: ColumnDataSource({"x": [], "y": [], "colour": [], "name": []}) for name in ("time", "spectrum")}
-    data["waterfall"] = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
+    data = {name: ColumnDataSource(_nothing(name)) for name in _COLUMNS}
     time = _new_plot("channels over time", "time, s", "", name="time-plot")
     spectrum = _new_plot("amplitude spectrum", "frequency, Hz", "amplitude", y_axis_type="log", name="spectrum-plot")
     for plot, name in ((time, "time"), (spectrum, "spectrum")):
@@ -72,8 +79,8 @@ def records_tab(campaign: Campaign) -> Any:
             data["orbit"].data, data["without"].data = _orbits(run)
         except RigDataError as error:
             message = str(error)
-            for source in data.values():
-                source.data = {name: [] for name in source.data}
+            for name, source in data.items():
+                source.data = _nothing(name)
         facts.text = html.escape(printable(f"{text}. {message}"))
 
     follow(update, pick, channel, further)
@@ -134,7 +141,7 @@ def waterfall(record: Record) -> dict[str, Any]:
     values = np.nan_to_num(record.values - np.nanmean(record.values))
     length = min(_MOST_LINES, len(values) // _STRETCHES * 2)
     if length < 64:
-        return {"image": [], "x": [], "y": [], "dw": [], "dh": []}
+        return _nothing("waterfall")
     starts = np.linspace(0, len(values) - length, 2 * _STRETCHES).astype(int)
     spectra = np.stack([amplitude_spectrum(values[i : i + length], record.rate)[1] for i in starts])
     level = 20.0 * np.log10(np.maximum(spectra / max(float(spectra[:, 2:].max()), 1e-300), 1e-6))
@@ -147,7 +154,7 @@ def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         record = run.vector("displacement")
     except RigDataError:  # a run whose probes cannot be turned into X and Y has no orbit; its channels still show
-        return {"x": [], "y": []}, {"x": [], "y": []}
+        return _nothing("orbit"), _nothing("without")
     path = per("length") * (record.values - np.nanmean(record.values, axis=0))
     good = np.isfinite(path).all(axis=1)
     omega, without_synchronous = run.point.shaft_speed, np.full((0, 2), np.nan)

@@ -145,9 +145,9 @@ def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.D
     keys, predicted_columns = list(POINT_KEY), [f"{name}_predicted" for name in COEFFICIENT_COLUMNS]
     rows = []
     for name, pivots in session.pivots.items():
-        for predicted in predict_points(session.bearing, points, ModelSettings(pivots)):
-            values = dict(zip(predicted_columns, predicted.values, strict=True))
-            rows.append({"pivots": name, **point_columns(predicted.point), **values})
+        for prediction in predict_points(session.bearing, points, ModelSettings(pivots)):
+            values = dict(zip(predicted_columns, prediction.values, strict=True))
+            rows.append({"pivots": name, **point_columns(prediction.point), **values})
     columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
     predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.DataFrame(rows), measured))
     return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)

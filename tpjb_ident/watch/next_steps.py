@@ -222,7 +222,8 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
 
 
 def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
-    now, later = [], []
+    now: list[Step] = []
+    later: list[Step] = []
     for status in states:
         problem = status.first
         if status.state != "repeat" or problem is None:

@@ -115,7 +115,8 @@ class Watcher:
         placed = []
         for path in filter(stable.__contains__, unlisted):
             mark = stable[path], self._manifest
-            placed.append(self._unless_changed(path, mark, lambda path=path: place_record(campaign, path, done)))
+            make = functools.partial(place_record, campaign, path, done)
+            placed.append(self._unless_changed(path, mark, make))
         runs = [*campaign.runs, *(record.run for record in placed if record.run is not None)]
         new = self._observe(runs, stable)
         # a record that changed while it was read is looked at again: the next look must not take this one for it

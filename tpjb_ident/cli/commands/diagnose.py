@@ -16,8 +16,9 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
-    from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
+    from tpjb_ident.diagnosis.campaign import Baseline, CampaignDiagnosis
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+    from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
 
 @command(f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found")
@@ -58,8 +59,7 @@ def diagnose(
         from tpjb_ident.compare.static_tests import measure_static
         from tpjb_ident.runtime.executors import background_job, cores, forks
 
-        # in a copy of this process, while it identifies
-        is_quicker = coefficients is None and workers != 1 and cores() > 1 and forks()
+        is_quicker = coefficients is None and workers != 1 and cores() > 1 and forks()  # in a copy of this process
         job = background_job(measure_static, source, drawing) if is_quicker else nullcontext()
         with job as ahead, c.progress("diagnosing") as show:
             if coefficients is None:
@@ -69,15 +69,12 @@ def diagnose(
                 result = diagnose_table(coefficients, drawing, baseline, settings, error, show)
         if result.identification is not None:
             write_identification(c, result.identification)
-        verdict, before = result.diagnosis.verdict, (baseline.effects, baseline.from_measured)
-        write_text(folder / "diagnosis.json", verdict.to_json())
-        write_text(folder / "updated.effects.toml", verdict.effects_toml(*before))
-        if verdict.behaves_like:
-            write_text(folder / "with-terms.effects.toml", verdict.terms_toml(*before))
+        verdict = result.diagnosis.verdict
+        _write_verdict(folder, baseline, verdict)
         from tpjb_ident.report.diagnosis_page import next_command, write_diagnosis_report
 
-        typed = campaign or f"--coefficients {coefficients}"
-        following = next_command(str(typed), str(bearing or ""), verdict, str(c.target))
+        typed = str(campaign or f"--coefficients {coefficients}")
+        following = next_command(typed, str(bearing or ""), verdict, str(c.target))
         write_diagnosis_report(folder, source, result, named(c.options), c.inputs, following)
     _show_verdict(c, source.id, result, following)
     if result.identification is not None:
@@ -99,6 +96,14 @@ def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers:
     if model_tolerance is not None:
         typed["model"] = model_tolerance
     return DiagnoseSettings(tolerances=Tolerances().states(typed, "command line"), workers=workers)
+
+
+def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
+    before = baseline.effects, baseline.from_measured
+    write_text(folder / "diagnosis.json", verdict.to_json())
+    write_text(folder / "updated.effects.toml", verdict.effects_toml(*before))
+    if verdict.behaves_like:
+        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(*before))
 
 
 def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: str) -> None:

@@ -98,16 +98,19 @@ def coefficient(
     if apart:
         below = grid[1][0]
         label(below, axis_label, "off measured, %")
-        reach = []
-        for variant, rows in variants.items():
-            off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
-            _draw_predicted(below, off, rows, styles[variant], over)
-            reach.append(float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0)))
+        reach = [_draw_deviations(below, rows, styles[variant], key, over) for variant, rows in variants.items()]
         below.errorbar(measured[column] / axis_scale, np.zeros_like(value), yerr=shares, **_BARS)
         below.margins(x=0.06)
         limit = 1.4 * max(float(np.max(shares)), min((r for r in reach if r > _EXACT), default=1.0))
         below.set_ylim(-limit, limit)
     return figure
+
+
+def _draw_deviations(axes: Axes, rows: pd.DataFrame, style: Style, key: str, over: str) -> float:
+    """Draw predicted / measured - 1 [%] of one prediction; how far it reaches."""
+    off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
+    _draw_predicted(axes, off, rows, style, over)
+    return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
 
 
 def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, style: Style, over: str) -> None:

@@ -63,7 +63,7 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
         Or a table of comparison.csv.
     """
     if hasattr(source, "problem"):
-        return _of_diagnosis(source)
+        return _of_diagnosis(source)  # type: ignore[arg-type]
     table = as_table(source)
     return table if {"model", "entry", "z"} <= set(table.columns) else _of_comparison(table)
 
@@ -228,7 +228,7 @@ def gap(
     title : str, optional
     """
     # a diagnosis holds a verdict, whose own `verdict` is a word
-    verdict = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
+    verdict: Any = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
     gaps = source if isinstance(source, Mapping) else verdict.gap_by_observable
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
