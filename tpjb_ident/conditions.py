@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from rigdata import problem
 from tpjb_ident.condition_kinds import ERRORS, condition_kind
+
+#: How grave a condition or a finding can be, the gravest first.
+SEVERITIES = get_args(problem.Severity)
 
 
 class Condition(problem.Condition):

@@ -22,7 +22,7 @@ from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.units import LONGEST, UnitError, parse_quantity
 from tpjb_ident.cli.command import Command
-from tpjb_ident.cli.options import refuse_unknown
+from tpjb_ident.cli.options import THERMAL, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -113,7 +113,6 @@ def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float,
 
 
 _PIVOTS = ("rigid", "kirk", "kirk-secant")
-_THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
 def operating_points(
@@ -162,7 +161,7 @@ def pivot_choice(c: Command, text: str) -> str | float | Path:
 
 def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects: Path | None) -> ModelSettings:
     """Build `ModelSettings` from options."""
-    refuse_unknown(thermal, _THERMAL, "--thermal")
+    refuse_unknown(thermal, THERMAL, "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings
 
     if effects is None:

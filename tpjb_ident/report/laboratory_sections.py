@@ -12,6 +12,7 @@ import numpy as np
 from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
@@ -94,7 +95,7 @@ def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first."""
     counts = Counter((str(c), c.severity) for conditions in flags for c in conditions)
     texts = []
-    for grave in ("error", "warning", "note"):
+    for grave in SEVERITIES:
         texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"

@@ -15,12 +15,12 @@ from rigdata.run import Run
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.dynamic.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
 _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
-_GRAVITY = ("error", "warning", "note")
 #: A finding in so many runs at least, and in this share of those of their kinds, is not the runs' fault.
 _COMMON_RUNS, _COMMON_SHARE = 3, 1 / 3
 
@@ -60,7 +60,7 @@ def judge_states(
     of_run: dict[str, list[Finding]] = {}
     for observation in observations:
         findings = [finding for finding in observation.report.found if id(finding) not in shared]
-        of_run[observation.run.id] = sorted(findings, key=lambda f: _GRAVITY.index(f.problem.severity))
+        of_run[observation.run.id] = sorted(findings, key=lambda f: SEVERITIES.index(f.problem.severity))
     states = []
     for run in runs:
         findings = of_run.get(run.id, [])

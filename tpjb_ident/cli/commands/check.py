@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from tpjb_ident.cli.command import Command, campaign_place, command
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
 #: From as many problems of one sort on they are counted, not listed.
 ALIKE = 4
-SEVERITIES = ("error", "warning", "note")
 
 
 def span(*values: float) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.commands.identify import KEPT
 from tpjb_ident.cli.inputs import parse_amount
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
-#: Folder in the output folder in which phasors of finished runs stay, for the next start.
-KEPT = ".tpjb-finished-runs"
 #: Steps that forbid to go on as planned.
 URGENT = ("stop", "repeat")
 #: More records than this at once are counted, not listed.
