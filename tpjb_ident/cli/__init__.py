@@ -20,7 +20,10 @@ def main() -> None:
         app(prog_name="tpjb")
     except KeyboardInterrupt as error:  # while the libraries are loaded, before any command has begun
         print("tpjb: interrupted: nothing was written.", file=sys.stderr)
-        sys.exit(143 if error.args else 130)
+        interrupts.leave_if_signalled(143 if error.args else 130)
+    except SystemExit as end:
+        interrupts.leave_if_signalled(end.code)
+        raise
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)

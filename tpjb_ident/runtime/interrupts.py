@@ -6,18 +6,20 @@ A signal is delivered again until the error that it raises is being handled or t
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 #: s between two looks at what became of a signal
 _PAUSE = 0.1
-#: the signal that nobody has heard yet
+#: the signal that nobody has heard yet, and the number of the last one that came
 _open: object | None = None
+_signalled = 0
 
 
 def listen() -> None:
@@ -39,8 +41,17 @@ def stop_listening() -> None:
     heard()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    if _thread._count():  # a delivery that wakes when the interpreter has ended would be its fatal error
-        time.sleep(2.0 * _PAUSE)
+
+
+def leave_if_signalled(code: Any) -> None:
+    """End at once if a signal came: libraries that it caught while they were loaded may fail at the very end."""
+    if _signalled:
+        stop_listening()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        # a library that it caught may have lost its number
+        os._exit(128 + _signalled if code in (130, 143) else code)
 
 
 def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
@@ -51,7 +62,8 @@ def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
 
 
 def _interrupt(number: int, frame: Any) -> None:
-    global _open
+    global _open, _signalled
+    _signalled = number
     if _open is None:
         _open = object()
         _thread.start_new_thread(_deliver_again, (number, _open))  # threading's own locks may be held here
