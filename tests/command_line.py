@@ -8,7 +8,7 @@ from unittest import mock
 
 import typer.testing
 
-from tpjb_ident.cli.app import app
+from tpjb_ident.cli.commands.app import app
 from tpjb_ident.runtime import executors
 
 # typer builds all commands anew for every call, which takes longer than most calls that are tested; where a version has

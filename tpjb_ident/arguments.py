@@ -62,27 +62,27 @@ def _comparison(value: Any, name: str) -> Any:
     return value
 
 
-def least_clearance(campaign: Campaign) -> float | None:
-    """Smallest assembled clearance [m] of the bearing that a campaign carries; None where it carries none."""
+def least_clearance(campaign: Campaign, warn: Callable[[str], Any]) -> float | None:
+    """Smallest assembled clearance [m] of the bearing that a campaign carries; None without one that can be read."""
+    from model.bearing import BearingError
     from model.bearing_file import parse_bearing
 
     if not campaign.bearing_text:
         return None
-    bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+    try:
+        bearing = parse_bearing(campaign.bearing_text, campaign.bearing_name)
+    except BearingError as error:  # coefficients need no bearing
+        warn(f"{error} Until then the amplitude is not held against the clearance.")
+        return None
     return min(pad.assembled_clearance for pad in bearing.pads)
 
 
 def _with_clearance(settings: Any, campaign: Campaign) -> Any:
     """Settings whose amplitude check knows the campaign's bearing, as those of the command line do."""
-    from model.bearing import BearingError
-
     if settings.clearance is not None:
         return settings
-    try:
-        return dataclasses.replace(settings, clearance=least_clearance(campaign))
-    except BearingError as error:  # coefficients need no bearing
-        warnings.warn(f"identify: {error} Until then the amplitude is not held against the clearance.", stacklevel=3)
-        return settings
+    clearance = least_clearance(campaign, lambda text: warnings.warn(f"identify: {text}", stacklevel=5))
+    return dataclasses.replace(settings, clearance=clearance)
 
 
 #: What arguments of these names may be.

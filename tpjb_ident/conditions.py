@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from rigdata import problem
-from tpjb_ident.condition_kinds import condition_kind
+from tpjb_ident.condition_kinds import ERRORS, condition_kind
+
+#: How grave a condition or a finding can be, the gravest first.
+SEVERITIES = get_args(problem.Severity)
 
 
 class Condition(problem.Condition):
@@ -45,3 +48,8 @@ def untrusted(conditions: Iterable[Condition]) -> tuple[Condition, ...]:
 def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
     """Every condition as one line, name and detail."""
     return tuple(condition.sentence() for condition in conditions)
+
+
+def errors_in(quality: object) -> list[str]:
+    """Names in a cell of a column `quality` that forbid trust in its row."""
+    return [name for name in str(quality).split("; ") if name in ERRORS]

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.command_line import tpjb
-from tpjb_ident.cli.app import app
+from tpjb_ident.cli.commands.app import app
 from tpjb_ident.cli.commands.show import BARS, sparkline
 
 

@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from rigdata.problem import Problem, RigDataError
-from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tpjb_ident.cli.common.inputs import parse_value, parse_values
+from tpjb_ident.cli.inputs import parse_value, parse_values
 from tpjb_ident.errors import BadInputError
 
 

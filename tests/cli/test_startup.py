@@ -11,7 +11,7 @@ import pytest
 SCRIPT = """
 import os, signal, sys, time, weakref
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background of a shell has interrupts ignored
-from tpjb_ident.cli.common import interrupts
+from tpjb_ident.runtime import interrupts
 
 class Lock:
     "Stands in for a lock of the import machinery, whose end calls back."

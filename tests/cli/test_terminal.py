@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.command_line import tpjb
-from tpjb_ident.cli.common import terminal
-from tpjb_ident.cli.common.identification import cross_coupling_matters, with_half
-from tpjb_ident.cli.common.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
+from tpjb_ident.cli import terminal
+from tpjb_ident.cli.identification import cross_coupling_matters, with_half
+from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
 from tpjb_ident.columns import Column, words
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]

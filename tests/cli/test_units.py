@@ -11,9 +11,9 @@ import pytest
 from tests.command_line import tpjb
 from tpjb_ident.columns import SYSTEMS, amount, degrees, place_of, use_units
 from tpjb_ident.compare.effect_words import shown_unit
+from tpjb_ident.presentation import us_table
 from tpjb_ident.report.drawing.series import axis_of
 from tpjb_ident.schema import DAMPING, STIFFNESS, TABLES
-from tpjb_ident.us_table import us_table
 
 
 @pytest.fixture

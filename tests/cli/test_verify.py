@@ -8,8 +8,8 @@ import shutil
 import pytest
 
 from tests.command_line import tpjb
+from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.commands.verify import files_of
-from tpjb_ident.cli.common.command import Command
 from tpjb_ident.runtime.output_folder import READY
 
 

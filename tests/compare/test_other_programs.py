@@ -17,15 +17,14 @@ from tpjb_ident.cli.commands.compare import refuse_comparison
 from tpjb_ident.compare.comparison import (
     CompareSettings,
     compare_campaign,
-    comparison_frame,
     locus_distance,
     locus_frame,
 )
 from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.presentation import us_table
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
-from tpjb_ident.us_table import us_table
 
 DEMO = Path(__file__).parents[2] / "rigdata" / "samples" / "demo.h5"
 MEASURED = """static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,kxx_N_per_m,kyy_N_per_m,cyy_Ns_per_m
@@ -56,7 +55,7 @@ def test_rows_meet_points_by_load_direction_speed_and_excitation_and_gaps_stay_g
     rows = "2510,22.05,25.1,1.2e8,1e-6,-2e-5\n5000,22,25,2.2e8,,\n5000,22,40,2.5e8,,\n"
     theirs = written(tmp_path, f"static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m,x_m,y_m\n{rows}")
     result = compared(measured, theirs)
-    frame = comparison_frame(result).set_index(["static_load_N", "excitation_Hz"])
+    frame = result.to_dataframe().set_index(["static_load_N", "excitation_Hz"])
     assert set(frame["pivots"]) == {"theirs"}
     assert frame["kyy_N_per_m_predicted"].to_dict() == pytest.approx(
         {(2500.0, 10.0): math.nan, (2500.0, 25.0): 1.2e8, (5000.0, 25.0): 2.2e8}, nan_ok=True
@@ -86,7 +85,7 @@ def test_tolerances_are_those_that_are_stated(tmp_path, measured, change, meets)
     head = "static_load_N,static_load_direction_deg,shaft_speed_Hz,excitation_Hz,rotation,kyy_N_per_m"
     theirs = written(tmp_path, f"{head}\n{','.join(map(str, row.values()))},1.2e8\n")
     if meets:
-        frame = comparison_frame(compared(measured, theirs))
+        frame = compared(measured, theirs).to_dataframe()
         assert frame["kyy_N_per_m_predicted"].notna().tolist() == [False, True, False]
     else:
         with pytest.raises(BadInputError, match="no row meets an operating point"):
@@ -97,7 +96,7 @@ def test_the_nearest_of_several_rows_is_taken(tmp_path, measured):
     theirs = written(tmp_path, "static_load_N,shaft_speed_Hz,excitation_Hz,kyy_N_per_m\n"
                                "2490,22,25,1e8\n2501,22,25,2e8\n2515,22,25,3e8\n")  # fmt: skip
     result = compared(measured, theirs)
-    assert comparison_frame(result)["kyy_N_per_m_predicted"].tolist()[1] == 2e8
+    assert result.to_dataframe()["kyy_N_per_m_predicted"].tolist()[1] == 2e8
     assert "line 2" in result.remarks[0]
     assert "line 4" in result.remarks[0]
 
@@ -195,7 +194,7 @@ def test_a_table_stands_beside_a_campaign_with_a_locus(tmp_path):
     table = result.variant("theirs")
     assert math.isnan(locus_distance(result, table))
     assert "theirs.csv predicts 3 of 7 points" in result.summary()
-    assert comparison_frame(result)["kyy_N_per_m_predicted"].notna().sum() == 7 + 3
+    assert result.to_dataframe()["kyy_N_per_m_predicted"].notna().sum() == 7 + 3
 
 
 def test_every_table_has_a_line_and_marker_of_its_own(tmp_path, measured):

@@ -52,7 +52,7 @@ def test_no_excitation_means_synchronous(bearing):
     settings = ModelSettings("rigid", "isothermal")
     none, given = predict_points(bearing, [point(3000.0, 0.0), point(3000.0, 22.0)], settings)
     assert np.array_equal(none.k, given.k)
-    assert prediction_frame([none], mesh_error=False)["excitation_Hz"].tolist() == [22.0]
+    assert prediction_frame([none])["excitation_Hz"].tolist() == [22.0]
 
 
 def test_prediction_table_adds_up(bearing):

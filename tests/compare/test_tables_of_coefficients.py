@@ -10,7 +10,7 @@ import pytest
 
 from model.bearing_file import load_bearing
 from tests.command_line import tpjb
-from tpjb_ident.compare.comparison import CompareSettings, comparison_frame
+from tpjb_ident.compare.comparison import CompareSettings
 from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
 from tpjb_ident.compare.tables import compare_table
 from tpjb_ident.diagnosis.observations.observe import observe_table
@@ -27,7 +27,7 @@ def table(tmp_path):
 
 def test_the_table_is_read_as_the_diagnosis_reads_it_and_gaps_stay_gaps(table, rocker_file):
     result = compare_table(table, load_bearing(rocker_file), CompareSettings(("kirk",), "isothermal"), 0.05)
-    frame, seen = comparison_frame(result), observe_table(table, 0.05)
+    frame, seen = result.to_dataframe(), observe_table(table, 0.05)
     told = dict(zip(((e.observable, e.place("load")) for e in seen.elements), seen.value, strict=True))
     assert frame["kyy_N_per_m"].tolist() == [told["kyy", 5000.0], told["kyy", 8750.0]]
     assert frame["cyy_Ns_per_m"][0] == pytest.approx(told["cyy", 5000.0] / (2 * math.pi * 25))
@@ -43,8 +43,8 @@ def test_predictions_are_those_of_predict_and_measured_pivots_are_no_choice(tabl
     assert [v.name for v in result.variants] == ["rigid", "kirk"]
     assert any("no dry tests" in remark for remark in result.remarks)
     points = [p.point for p in result.identification.points]
-    own = prediction_frame(predict_points(bearing, points, ModelSettings("kirk", "isothermal")), mesh_error=False)
-    frame = comparison_frame(result)
+    own = prediction_frame(predict_points(bearing, points, ModelSettings("kirk", "isothermal")))
+    frame = result.to_dataframe()
     assert frame[frame["pivots"] == "kirk"]["kyy_N_per_m_predicted"].tolist() == own["kyy_N_per_m"].tolist()
 
 

@@ -371,7 +371,7 @@ def command_target(folder: Path) -> Target:
 
     import typer
 
-    from tpjb_ident.cli.app import app
+    from tpjb_ident.cli.commands.app import app
 
     command = typer.main.get_command(app)  # typer would build it again for every case, which costs three times the rest
     place = folder / "cli"

@@ -100,7 +100,7 @@ def start(words: list[str], log: Path, at_step: Callable[[int], None] = lambda s
     watch_steps(at_step)
     code = 1
     try:
-        from tpjb_ident.cli.app import app
+        from tpjb_ident.cli.commands.app import app
 
         app(words, prog_name="tpjb")
         code = 0
@@ -159,7 +159,7 @@ def make_bench(folder: Path, commands: tuple[str, ...]) -> Bench:
     """Campaign and libraries, ready to fork from."""
     from typer.testing import CliRunner
 
-    from tpjb_ident.cli.app import app
+    from tpjb_ident.cli.commands.app import app
 
     campaign = write_small_campaign(folder / "campaign.h5")
     bench = Bench(campaign, "", 0, folder)

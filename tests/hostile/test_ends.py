@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import tpjb
-from tpjb_ident.cli.common.command import Command
+from tpjb_ident.cli.command import Command
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "rigdata" / "samples" / "demo.h5"

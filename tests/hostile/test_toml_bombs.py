@@ -14,7 +14,7 @@ from model.toml_text import MAX_DEPTH, parse_toml
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError
 from rigdata.units import UnitError, parse_quantity
-from tpjb_ident.cli.common.inputs import parse_values
+from tpjb_ident.cli.inputs import parse_values
 from tpjb_ident.errors import BadInputError
 
 BOMBS = {

@@ -16,8 +16,8 @@ from rigdata import load_campaign
 from rigdata.problem import RigDataError
 from tests.rigs.campaign_file import plans_of
 from tests.rigs.field_rig import CHANNELS, Device, Plan, Rig
-from tpjb_ident.cli.common.command import Command
-from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.identification import identify_settings, refuse_untrusted
 from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.identification.identify import identify

@@ -25,6 +25,7 @@ from tpjb_ident.runtime.executors import (
     map_ordered,
     open_workers,
 )
+from tpjb_ident.runtime.interrupts import interrupts_held
 from tpjb_ident.runtime.threads import _loaded, limit_threads, one_thread_each
 
 
@@ -233,7 +234,7 @@ def test_what_somebody_else_froze_for_the_garbage_collector_stays_frozen():
 
 def test_a_signal_that_is_held_is_heard_where_the_block_fails_too():
     def call_a_worker():
-        with executors._interrupts_held():
+        with interrupts_held():
             signal.raise_signal(signal.SIGINT)
             raise RuntimeError("the same signal ended the worker")
 

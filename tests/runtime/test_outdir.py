@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tpjb_ident.cli.common.command import write_record
+from tpjb_ident.cli.command import write_record
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.output_folder import READY, former_runs, output_folder
 

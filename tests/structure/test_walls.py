@@ -91,7 +91,7 @@ def test_a_breach_is_seen(path, source):
     [
         ("tpjb_ident/compare/x.py", "from model.predict import predict"),
         ("model/x.py", "from rigdata.units import parse_quantity"),
-        ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.common.command import command"),
+        ("tpjb_ident/cli/x.py", "from tpjb_ident.cli.command import command"),
         ("tpjb_ident/report/x.py", "from matplotlib.figure import Figure"),
     ],
 )

@@ -19,7 +19,7 @@ from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.watch.landing import NewFiles
-from tpjb_ident.watch.watcher import Measuring, Watcher
+from tpjb_ident.watch.watcher import Watcher
 
 pytestmark = pytest.mark.slow
 DYNAMIC = [f"d-05000-25-0{i}" for i in (1, 2, 3)]
@@ -69,7 +69,7 @@ def land(source, live, *runs):
 
 
 def watcher(live, settle: float = 0.0) -> Watcher:
-    return Watcher(live, NewFiles(settle), Measuring(IdentifySettings()))
+    return Watcher(live, NewFiles(settle), IdentifySettings())
 
 
 def states(snapshot) -> dict[str, str]:

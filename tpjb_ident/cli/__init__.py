@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from tpjb_ident.cli.common import interrupts
+from tpjb_ident.runtime import interrupts
 
 
 def main() -> None:
@@ -15,12 +15,15 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         _never_refuse(stream)
     try:
-        from tpjb_ident.cli.app import app
+        from tpjb_ident.cli.commands.app import app
 
         app(prog_name="tpjb")
     except KeyboardInterrupt as error:  # while the libraries are loaded, before any command has begun
         print("tpjb: interrupted: nothing was written.", file=sys.stderr)
-        sys.exit(143 if error.args else 130)
+        interrupts.leave_if_signalled(143 if error.args else 130)
+    except SystemExit as end:
+        interrupts.leave_if_signalled(end.code)
+        raise
     except OSError as error:  # of the streams: commands turn their own into messages
         print(f"tpjb: error: cannot print: {error.strerror or error}.", file=sys.stderr)
         sys.exit(2)

@@ -52,16 +52,6 @@ class TableRow:
     extrapolated: bool = False
 
     @property
-    def k(self) -> FloatArray:
-        """(2, 2) stiffness [N/m]."""
-        return self.values[:4].reshape(2, 2)
-
-    @property
-    def c(self) -> FloatArray:
-        """(2, 2) damping [N s/m]."""
-        return self.values[4:].reshape(2, 2)
-
-    @property
     def coefficients(self) -> dict[str, tuple[float, float]]:
         """Value and standard error of what the row holds, ``"kxx"`` .. ``"cyy"``."""
         pairs = zip(COEFFICIENT_COLUMNS, self.values, self.errors, strict=True)
@@ -107,15 +97,12 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     if not (load > 0.0 and speed > 0.0):
         raise BadInputError(f"{place}: static_load_N and shaft_speed_Hz must be positive numbers.")
     direction, excitation = cells.get("static_load_direction_deg", math.nan), cells.get("excitation_Hz", math.nan)
-    rotation = cells.get("rotation") or ROTATIONS[0]
-    if rotation not in ROTATIONS:
-        raise BadInputError(f"{place}: rotation {rotation[:40]!r} is not known. Write {' or '.join(ROTATIONS)}.")
     point = OperatingPoint(
         load,
         math.radians(-90.0 if math.isnan(direction) else direction),
         speed,
         speed if math.isnan(excitation) else HZ * excitation,
-        rotation,
+        cells.get("rotation", ROTATIONS[0]),
     )
     values, errors, low, high = (
         np.array([cells.get(column + end, math.nan) for column in COEFFICIENT_COLUMNS])
@@ -130,23 +117,19 @@ def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
     return TableRow(line, point, values, errors, position, cells.get("converged") is not False, status)
 
 
-@dataclass(frozen=True)
-class Tolerances:
-    """How far two rows may be from each other that are of one operating point."""
+def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:
+    """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is.
 
-    load: float  #: share
-    direction: float  #: [deg]
-    frequency: float  #: of shaft and excitation, share
-
-
-def partners(rows: pd.DataFrame, others: pd.DataFrame, within: Tolerances) -> IntArray:
-    """The nearest of other rows that is of the same operating point, for every row (n,); -1 where none is."""
+    `within` says how far two rows of one point may be apart: share of the load, direction [deg], share of the
+    frequencies of shaft and excitation.
+    """
+    load, direction, frequency = within
     if not len(others):
         return np.full(len(rows), -1)
     left, right = (frame[list(POINT_COLUMNS)].to_numpy(float) for frame in (rows, others))
     apart = np.abs(right[None] - left[:, None])
     apart[..., 1] = np.minimum(apart[..., 1] % 360.0, -apart[..., 1] % 360.0)
-    most = np.abs(left) * [within.load, 0.0, within.frequency, within.frequency] + [0.0, within.direction, 0.0, 0.0]
+    most = np.abs(left) * [load, 0.0, frequency, frequency] + [0.0, direction, 0.0, 0.0]
     with np.errstate(invalid="ignore", divide="ignore"):  # a load or speed of zero has no share: equal or apart
         distance = np.nan_to_num(apart / most[:, None], nan=0.0, posinf=np.inf).max(axis=2)
     senses = [frame["rotation"].to_numpy(str) if "rotation" in frame else ROTATIONS[0] for frame in (rows, others)]

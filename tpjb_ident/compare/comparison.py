@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -130,14 +131,19 @@ class Comparison(Presented):
     """
 
     campaign: Campaign | TableSource
-    bearing: Bearing | None = field(repr=False)
+    bearing: Bearing | None
     settings: CompareSettings
-    identification: Identification = field(repr=False)
-    curves: tuple[PivotCurve, ...] = field(repr=False)
-    clearance: ClearancePolygon | None = field(repr=False)
-    locus: Locus | None = field(repr=False)
-    variants: tuple[Variant, ...] = field(repr=False)
+    identification: Identification
+    curves: tuple[PivotCurve, ...]
+    clearance: ClearancePolygon | None
+    locus: Locus | None
+    variants: tuple[Variant, ...]
     remarks: tuple[str, ...] = ()
+
+    @property
+    def has_records(self) -> bool:
+        """Whether the measured side was identified from records."""
+        return not isinstance(self.campaign, TableSource)
 
     def variant(self, name: str) -> Variant:
         """The predictions with one pivot model.
@@ -149,9 +155,20 @@ class Comparison(Presented):
         """
         return next(v for v in self.variants if v.name == name)
 
+    @functools.cached_property
+    def table(self) -> pd.DataFrame:
+        """``comparison.csv``."""
+        import pandas as pd
+
+        rows = []
+        for variant in self.variants:
+            pairs = zip(self.identification.points, variant.points, strict=True)
+            rows += [_row(variant, measured, predicted) for measured, predicted in pairs]
+        return pd.DataFrame(rows)
+
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
-        return comparison_frame(self)
+        return self.table
 
     def summary(self) -> str:
         """What to conclude, and what it rests on."""
@@ -369,29 +386,16 @@ def locus_frame(comparison: Comparison) -> pd.DataFrame:
 DIRECT = tuple(name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy"))
 
 
-def comparison_frame(comparison: Comparison) -> pd.DataFrame:
-    """Build comparison.csv."""
-    import pandas as pd
-
-    rows = [
-        _row(variant, measured, predicted)
-        for variant in comparison.variants
-        for measured, predicted in zip(comparison.identification.points, variant.points, strict=True)
-    ]
-    return pd.DataFrame(rows)
-
-
 def _row(variant: Variant, measured: PointResult, predicted: PointPrediction | TableRow) -> dict[str, Any]:
     row: dict[str, Any] = {"pivots": variant.name, **point_columns(measured.point)}
     row["static_load_measured_N"] = measured.static_load_measured
     values = coefficient_columns(measured.stiffness)
-    model = dict(zip(COEFFICIENT_COLUMNS, np.concatenate([predicted.k.ravel(), predicted.c.ravel()]), strict=True))
-    for name in COEFFICIENT_COLUMNS:
+    for name, model in zip(COEFFICIENT_COLUMNS, predicted.values, strict=True):
         low, high = values[f"{name}_lo"], values[f"{name}_hi"]
         row[name], row[f"{name}_lo"], row[f"{name}_hi"] = values[name], low, high
-        row[f"{name}_predicted"] = model[name]
-        row[f"{name}_difference"] = model[name] - values[name]
-        row[f"{name}_ratio"] = model[name] / values[name] if low * high > 0 else np.nan
+        row[f"{name}_predicted"] = model
+        row[f"{name}_difference"] = model - values[name]
+        row[f"{name}_ratio"] = model / values[name] if low * high > 0 else np.nan
     row.update(
         x_m_predicted=predicted.position[0],
         y_m_predicted=predicted.position[1],

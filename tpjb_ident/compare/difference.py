@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.compare.coefficient_table import Tolerances, partners
-from tpjb_ident.condition_kinds import ERRORS
+from tpjb_ident.compare.coefficient_table import partners
+from tpjb_ident.conditions import errors_in
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, TANGENT
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.static_tests import StaticTests
     from tpjb_ident.dynamic.results.identification import Identification
 
-#: Set points of both that are the same.
-_SAME_POINT = Tolerances(load=0.002, direction=0.5, frequency=0.002)
+#: Set points of both that are the same: share of the load, deg of its direction, share of the frequencies.
+_SAME_POINT = (0.002, 0.5, 0.002)
 #: A difference within this share of the point's mean direct coefficient (a pad's stiffness, its clearance) is none:
 #: twice the tolerance that a model is granted.
 _NO_CHANGE = 0.03
@@ -45,17 +45,17 @@ _ENDS = ("", "_lo", "_hi")
 _FREEDOM = np.geomspace(1.0, 1e6, 400)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Side:
     """One of the two: tables as they are on disk; from records also how single sensors move its points."""
 
     name: str
-    coefficients: pd.DataFrame = field(repr=False)
-    pivots: pd.DataFrame | None = field(repr=False, default=None)
-    clearance: pd.DataFrame | None = field(repr=False, default=None)
+    coefficients: pd.DataFrame
+    pivots: pd.DataFrame | None = None
+    clearance: pd.DataFrame | None = None
     campaign: Campaign | None = field(repr=False, default=None)
     #: (P, 8) by parameter, N/m: what one standard deviation of an instrument's error does to the points
-    sensors: Mapping[str, FloatArray] = field(repr=False, default_factory=dict)
+    sensors: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def measured_side(campaign: Campaign, identification: Identification, static: StaticTests | None) -> Side:
@@ -101,15 +101,33 @@ class Difference:
     shared: tuple[str, ...]  #: errors that cancel
     unmatched: tuple[str, ...]  #: points of one side alone, in words
 
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Tables that hold anything, by the names of their files."""
+        named = {"difference": self.points, "pivot_difference": self.pivots, "clearance_difference": self.clearance}
+        return {name: frame for name, frame in named.items() if len(frame)}
+
     def untrusted_points(self) -> list[str]:
         """Matched points with a flag that forbids trust, in words."""
-        rows = self.points.to_dict("records")
-        return [
-            f"{side.name}, {place_of(row['static_load_N'], row['excitation_Hz'])}: {row[f'quality_{end}']}"
-            for row in rows
-            for end, side in (("a", self.a), ("b", self.b))
-            if any(flag in ERRORS for flag in str(row.get(f"quality_{end}", "ok")).split("; "))
-        ]
+        untrusted = []
+        for row in self.points.to_dict("records"):
+            for end, side in (("a", self.a), ("b", self.b)):
+                quality = row.get(f"quality_{end}")
+                if errors_in(quality):
+                    place = place_of(row["static_load_N"], row["excitation_Hz"])
+                    untrusted.append(f"{side.name}, {place}: {quality}")
+        return untrusted
+
+
+class _Values(NamedTuple):
+    """A quantity of one side at several places (n,): value and interval, and what makes it uncertain."""
+
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    random: FloatArray  #: variance
+    systematic: FloatArray | float = 0.0  #: variance from calibration
+    freedom: FloatArray | float = np.inf  #: degrees of freedom of the random part
 
 
 def difference_of(a: Side, b: Side) -> Difference:
@@ -155,76 +173,60 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
     for name in ("static_load_measured_N", "quality"):
         if name in left and name in right:
             columns |= {f"{name}_a": left[name], f"{name}_b": right[name]}
-    usable = ~(_untrusted(left) | _untrusted(right))
+    flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (left, right)]
+    usable = [not errors_in(f"{a}; {b}") for a, b in zip(*flags, strict=True)]
     per_omega = [1 / (2 * np.pi * frame["excitation_Hz"].to_numpy(float)) for frame in (left, right)]
     for j, name in enumerate(COEFFICIENT_COLUMNS):
         scale = 1.0 if j < 4 else per_omega[0] * per_omega[1]
         common = np.zeros(len(pairs))
         for parameter in shared:
             common += a.sensors[parameter][pairs[:, 0], j] * b.sensors[parameter][pairs[:, 1], j] * scale
-        parts = [_random_and_systematic(frame, name) for frame in (left, right)]
-        kind = COEFFICIENT_COLUMNS[:4] if j < 4 else COEFFICIENT_COLUMNS[4:]
-        direct = left[[kind[0], kind[3]]].abs().mean(axis=1).to_numpy()
-        sides = [[frame[name + end].to_numpy(float) for end in _ENDS] for frame in (left, right)]
-        judged = _judged(name, sides, _joint(parts, common), _NO_CHANGE * direct, 8 * len(pairs))
-        judged[f"{name[:3]}_changed"][~usable] = "cannot tell"
+        direct = left[[KINDS[name[0]].column(entry) for entry in ("xx", "yy")]].abs().mean(axis=1).to_numpy()
+        sides = [_coefficient(frame, name) for frame in (left, right)]
+        judged = _judged(name, sides, common, _NO_CHANGE * direct, 8 * len(pairs))
+        judged[f"{name[:3]}_changed"] = np.where(usable, judged[f"{name[:3]}_changed"], "cannot tell")
         columns |= judged
     return pd.DataFrame(columns)
 
 
-def _untrusted(frame: pd.DataFrame) -> BoolArray:
-    """Whether a flag of a row forbids trust in it."""
-    if "quality" not in frame:
-        return np.zeros(len(frame), bool)
-    return np.array([any(flag in ERRORS for flag in str(text).split("; ")) for text in frame["quality"]], bool)
-
-
-def _random_and_systematic(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Variances of the random part and from calibration, and the first one's degrees of freedom, (n,) each."""
-    half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float)
+def _coefficient(frame: pd.DataFrame, name: str) -> _Values:
+    value, low, high = (frame[name + end].to_numpy(float) for end in _ENDS)
     if f"{name}_se_systematic" not in frame:  # of another program: its interval is all that is known
-        return (half / 1.96) ** 2, np.zeros_like(half), np.full_like(half, np.inf)
+        return _Values(value, low, high, _variance(low, high))
     error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
     with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
         quantile = frame[f"{name}_random95"].to_numpy(float) / error
     table = stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL)
-    return error**2, systematic**2, np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM)
+    freedom = np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM)
+    return _Values(value, low, high, error**2, systematic**2, freedom)
 
 
-def _joint(
-    parts: Sequence[tuple[FloatArray, FloatArray, FloatArray]], common: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Variance of the difference and its degrees of freedom (Welch and Satterthwaite)."""
-    random = sum(part[0] for part in parts)
-    systematic = sum(part[1] for part in parts) - 2 * common
-    total = np.asarray(random + np.maximum(systematic, 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
-        freedom = total**2 / sum(part[0] ** 2 / part[2] for part in parts)
-    return total, np.clip(np.nan_to_num(freedom, nan=_FREEDOM[-1]), 1.0, _FREEDOM[-1])
+def _variance(low: FloatArray, high: FloatArray) -> FloatArray:
+    return ((high - low) / (2 * 1.96)) ** 2
 
 
 def _judged(
-    name: str,
-    sides: Sequence[Sequence[FloatArray]],
-    joint: tuple[FloatArray, FloatArray],
-    none: FloatArray,
-    number: int,
+    name: str, sides: Sequence[_Values], common: FloatArray | float, none: FloatArray, number: int
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
-    `sides` hold value, lower and upper end (n,) each, `joint` the difference's variance and its degrees of freedom.
-    Of `number` differences that are looked at together one in twenty is beyond its own interval by chance; "yes" holds
-    for all of them at once (Bonferroni).
+    `common` is the covariance of the two. The difference's degrees of freedom are Welch's and Satterthwaite's. Of
+    `number` differences that are looked at together one in twenty is beyond its own interval by chance; "yes" holds for
+    all of them at once (Bonferroni).
     """
-    variance, freedom = joint
-    difference = sides[1][0] - sides[0][0]
+    systematic = sum(side.systematic for side in sides) - 2 * common
+    variance = np.asarray(sum(side.random for side in sides) + np.maximum(systematic, 0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
+        freedom = variance**2 / sum(side.random**2 / side.freedom for side in sides)
+    freedom = np.clip(np.nan_to_num(freedom, nan=_FREEDOM[-1]), 1.0, _FREEDOM[-1])
+    difference = sides[1].value - sides[0].value
     deviation = np.sqrt(variance)
     half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * deviation
     sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * deviation
     verdict = np.where(np.abs(difference) + half <= none, "no", "cannot tell")
     verdict = np.where(np.abs(difference) > sure, "yes", verdict)
     columns: dict[str, Any] = {}
-    shown = (*sides, (difference, difference - half, difference + half))
+    shown = (sides[0][:3], sides[1][:3], (difference, difference - half, difference + half))
     for side, ends in zip(("a", "b", "difference"), shown, strict=True):
         columns |= zip((f"{name}_{side}{end}" for end in _ENDS), ends, strict=True)
     return columns | {f"{name.partition('_')[0]}_changed": verdict}
@@ -249,15 +251,13 @@ def _pivot(pad: float, curves: Sequence[pd.DataFrame], same: bool, number: int) 
     low = max(curve["force_N"].min() for curve in curves)
     high = min(curve["force_N"].max() for curve in curves)
     force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
-    sides, parts, scales = [], [], []
+    sides = []
     for curve in curves:
-        at = [np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS]
+        value, low_end, high_end = (np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS)
         scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve and len(curve) else 0.0
-        sides.append(at)
-        scales.append(scale * at[0])
-        parts.append((((at[2] - at[1]) / (2 * 1.96)) ** 2, scales[-1] ** 2, np.full_like(force, np.inf)))
-    common = scales[0] * scales[1] if same else np.zeros_like(force)
-    judged = _judged(TANGENT, sides, _joint(parts, common), _NO_CHANGE * sides[0][0], number)
+        sides.append(_Values(value, low_end, high_end, _variance(low_end, high_end), (scale * value) ** 2))
+    common = np.sqrt(sides[0].systematic * sides[1].systematic) if same else 0.0
+    judged = _judged(TANGENT, sides, common, _NO_CHANGE * sides[0].value, number)
     return pd.DataFrame({"pad": pad, "force_N": force, **judged})
 
 
@@ -267,13 +267,11 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
         return pd.DataFrame()
     name = "clearance_m"
     joined = a.clearance.merge(b.clearance, on="pad", suffixes=("_a", "_b"))
-    sides, variance = [], np.zeros(len(joined))
+    sides = []
     for side in "ab":
         value, error = (joined[f"{name}{ending}_{side}"].to_numpy(float) for ending in ("", "_se"))
-        sides.append((value, value - 1.96 * error, value + 1.96 * error))
-        variance += error**2
-    joint = variance, np.full_like(variance, _FREEDOM[-1])
-    judged = _judged(name, sides, joint, _NO_CHANGE * sides[0][0], len(joined))
+        sides.append(_Values(value, value - 1.96 * error, value + 1.96 * error, error**2))
+    judged = _judged(name, sides, 0.0, _NO_CHANGE * sides[0].value, len(joined))
     return pd.DataFrame({"pad": joined["pad"], **judged})
 
 

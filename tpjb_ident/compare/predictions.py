@@ -105,6 +105,11 @@ class PointPrediction:
         return np.asarray(self.prediction.c[self.index])
 
     @property
+    def values(self) -> np.ndarray:
+        """(8,) kxx .. kyy [N/m], cxx .. cyy [N s/m]."""
+        return np.concatenate([self.k.ravel(), self.c.ravel()])
+
+    @property
     def position(self) -> tuple[float, float]:
         """Of the shaft centre [m]."""
         return float(self.prediction.position[0]), float(self.prediction.position[1])
@@ -178,23 +183,18 @@ def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     return dict(zip(POINT_KEY, excited.key, strict=True))
 
 
-def prediction_frame(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> pd.DataFrame:
+def prediction_frame(predictions: Sequence[PointPrediction]) -> pd.DataFrame:
     """Build prediction.csv: one row per operating point."""
     import pandas as pd
 
-    return pd.DataFrame(prediction_rows(predictions, mesh_error))
+    return pd.DataFrame([prediction_row(prediction) for prediction in predictions])
 
 
-def prediction_rows(predictions: Sequence[PointPrediction], mesh_error: bool = True) -> list[dict[str, Any]]:
-    """Rows of `prediction_frame`, for a process that loads no pandas."""
-    return [_row(prediction, mesh_error) for prediction in predictions]
-
-
-def _row(point_prediction: PointPrediction, mesh_error: bool) -> dict[str, Any]:
+def prediction_row(point_prediction: PointPrediction) -> dict[str, Any]:
+    """A row of `prediction_frame`, for a process that loads no pandas."""
     p = point_prediction.prediction
     row: dict[str, Any] = dict(point_columns(point_prediction.point))
-    coefficients = np.concatenate([point_prediction.k.ravel(), point_prediction.c.ravel()])
-    row.update(zip(COEFFICIENT_COLUMNS, coefficients, strict=True))
+    row.update(zip(COEFFICIENT_COLUMNS, point_prediction.values, strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))
@@ -209,7 +209,7 @@ def _row(point_prediction: PointPrediction, mesh_error: bool) -> dict[str, Any]:
         attitude_angle_deg=math.degrees(p.attitude_angle),
         converged=p.converged,
         idle_pads=" ".join(str(n) for n in p.idle_pads),
-        mesh_error=p.mesh_error if mesh_error else math.nan,
+        mesh_error=p.mesh_error,
         status="; ".join(p.status),
     )
     return row

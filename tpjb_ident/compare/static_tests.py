@@ -6,7 +6,7 @@ Single bad records are left out and named; clearance sweeps are held against the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 _SCALE = (0.5, 2.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StaticTests:
     """Results of the static tests."""
 
-    curves: tuple[PivotCurve, ...] = field(repr=False)
-    clearance: ClearancePolygon | None = field(repr=False)
-    locus: Locus | None = field(repr=False)
+    curves: tuple[PivotCurve, ...]
+    clearance: ClearancePolygon | None
+    locus: Locus | None
     left_out: tuple[Condition, ...] = ()
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.comparison import DIRECT, comparison_frame, locus_distance
+from tpjb_ident.compare.comparison import DIRECT, locus_distance
 from tpjb_ident.compare.effect_words import Estimate, finding
 from tpjb_ident.compare.predictions import PointPrediction, printed_formula
 from tpjb_ident.rounding import percent, signed
@@ -36,9 +38,8 @@ def _in_words(variant: str) -> str:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How one pivot model does on one direct coefficient."""
+    """How one pivot model does on one direct coefficient: predicted / measured - 1."""
 
-    pivots: str
     coefficient: str
     median: float
     worst: float
@@ -46,62 +47,75 @@ class Deviation:
     inside: int
 
 
-def deviations(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[Deviation, ...]:
-    """Deviation of every pivot model in every direct coefficient."""
-    table = comparison_frame(comparison) if frame is None else frame
-    all_deviations = []
-    for variant in comparison.variants:
-        rows = table[table["pivots"] == variant.name]
-        for name in DIRECT:
-            off = (rows[f"{name}_ratio"] - 1.0).to_numpy()
-            off = off[np.isfinite(off)]
-            predicted = rows[f"{name}_predicted"]
-            inside = int(((predicted >= rows[f"{name}_lo"]) & (predicted <= rows[f"{name}_hi"])).sum())
-            worst = float(off[np.argmax(np.abs(off))]) if len(off) else math.nan
-            median = float(np.median(off)) if len(off) else math.nan
-            all_deviations.append(Deviation(variant.name, name[:3], median, worst, len(off), inside))
-    return tuple(all_deviations)
+@dataclass(frozen=True)
+class Agreement:
+    """How one pivot model does on the direct coefficients."""
 
+    pivots: str
+    deviations: tuple[Deviation, ...]
 
-def closest(all_deviations: tuple[Deviation, ...]) -> str | None:
-    """Pivot model with the smallest mean size of its four medians; None if nothing could be compared."""
-    scores: dict[str, list[float]] = {}
-    for d in all_deviations:
-        if math.isfinite(d.median):
-            scores.setdefault(d.pivots, []).append(abs(d.median))
-    return min(scores, key=lambda name: sum(scores[name]) / len(scores[name])) if scores else None
+    @property
+    def compared(self) -> list[Deviation]:
+        """Coefficients that could be compared at all."""
+        return [d for d in self.deviations if math.isfinite(d.median)]
+
+    @property
+    def medians(self) -> str:
+        """Median deviation of every coefficient, in words."""
+        return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in self.deviations)
+
+    @property
+    def inside(self) -> str:
+        """How many predictions are within the measured intervals."""
+        return f"{sum(d.inside for d in self.deviations)} of {sum(d.n for d in self.deviations)}"
+
+    @property
+    def is_off(self) -> bool:
+        """Whether a direct coefficient is off by its tolerance, half of its points or more."""
+        return any(abs(d.median) > _OFF and d.inside <= 0.5 * d.n for d in self.compared)
 
 
 #: Median deviation of a direct coefficient from which a model is said to be off.
 _OFF = 0.05
 
 
-def worth_a_diagnosis(all_deviations: tuple[Deviation, ...]) -> bool:
-    """Whether even the closest pivot model is off.
+def agreements(table: pd.DataFrame) -> list[Agreement]:
+    """How every pivot model of a table of comparison.csv does."""
+    found = []
+    for pivots, rows in table.groupby("pivots", sort=False):
+        deviations = []
+        for name in DIRECT:
+            off = (rows[f"{name}_predicted"] / rows[name] - 1.0)[rows[f"{name}_lo"] * rows[f"{name}_hi"] > 0].to_numpy()
+            off = off[np.isfinite(off)]
+            inside = rows[f"{name}_predicted"].between(rows[f"{name}_lo"], rows[f"{name}_hi"])
+            worst = float(off[np.argmax(np.abs(off))]) if len(off) else math.nan
+            median = float(np.median(off)) if len(off) else math.nan
+            deviations.append(Deviation(name[:3], median, worst, len(off), int(inside.sum())))
+        found.append(Agreement(str(pivots), tuple(deviations)))
+    return found
 
-    A direct coefficient by its tolerance, half of its points or more.
-    """
-    best_deviations = [d for d in all_deviations if d.pivots == closest(all_deviations) and math.isfinite(d.median)]
-    return any(abs(d.median) > _OFF and d.inside <= 0.5 * d.n for d in best_deviations)
+
+def closest(found: Sequence[Agreement]) -> Agreement | None:
+    """The pivot model with the smallest mean size of its medians; None if nothing could be compared."""
+    compared = [agreement for agreement in found if agreement.compared]
+    return min(compared, key=lambda a: fmean(abs(d.median) for d in a.compared), default=None)
 
 
-def _verdict_sentence(comparison: Comparison, all_deviations: tuple[Deviation, ...]) -> str:
+def _verdict_sentence(comparison: Comparison, best: Agreement | None) -> str:
     """Say in one sentence what to conclude."""
-    name, best = comparison.campaign.id, closest(all_deviations)
+    name = comparison.campaign.id
     if best is None:
         return f"{name}: no coefficient could be compared; see the quality flags."
-    best_deviations = [d for d in all_deviations if d.pivots == best and math.isfinite(d.median)]
-    worst = max(best_deviations, key=lambda d: abs(d.median))
-    if worth_a_diagnosis(all_deviations):
+    worst = max(best.compared, key=lambda d: abs(d.median))
+    if best.is_off:
         who = "No prediction agrees: the closest" if len(comparison.variants) > 1 else "The prediction"
         off = f"is off by {percent(worst.median)} in {worst.coefficient} (median)"
-        return f"{name}: {who}, with {_in_words(best)}, {off}."
-    largest = max((d for d in best_deviations if math.isfinite(d.worst)), key=lambda d: abs(d.worst))
-    agrees = f"agree within {100 * max(abs(d.median) for d in best_deviations):.1f} % (median)"
-    inside = f"{sum(d.inside for d in best_deviations)} of {sum(d.n for d in best_deviations)}"
+        return f"{name}: {who}, with {_in_words(best.pivots)}, {off}."
+    largest = max(best.compared, key=lambda d: abs(d.worst))
     return (
-        f"{name}: prediction and measurement {agrees} with {_in_words(best)}; the largest single deviation is "
-        f"{percent(largest.worst)} in {largest.coefficient}, and {inside} direct coefficients are "
+        f"{name}: prediction and measurement agree within {100 * abs(worst.median):.1f} % (median) with "
+        f"{_in_words(best.pivots)}; the largest single deviation is {percent(largest.worst)} in {largest.coefficient}, "
+        f"and {sum(d.inside for d in best.compared)} of {sum(d.n for d in best.compared)} direct coefficients are "
         "inside their interval."
     )
 
@@ -122,32 +136,21 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     )
 
 
-def summary_sentences(comparison: Comparison, frame: pd.DataFrame | None = None) -> tuple[str, ...]:
+def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
     """Say what the comparison found, the answer first."""
-    all_deviations = deviations(comparison, frame)
-    best = closest(all_deviations)
-    sentences = []
+    found = agreements(comparison.table)
+    best = closest(found)
+    sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
     if best is None:
         sentences.append("No coefficient could be compared: see the quality flags.")
     else:
-        best_deviations = [d for d in all_deviations if d.pivots == best]
-        sentences.append(
-            f"The prediction comes closest with {_in_words(best)}: {_medians(best_deviations)} (median over "
-            f"{max(d.n for d in best_deviations)} points)."
-        )
-    sentences += [
-        f"With {_in_words(v.name)}: {_medians([d for d in all_deviations if d.pivots == v.name])}."
-        for v in comparison.variants
-        if v.name != best
-    ]
-    sentences[:0] = [_verdict_sentence(comparison, all_deviations), *_effects_sentences(comparison)]
+        points = max(d.n for d in best.deviations)
+        with_best = f"The prediction comes closest with {_in_words(best.pivots)}: {best.medians}"
+        sentences.append(f"{with_best} (median over {points} points).")
+    sentences += [f"With {_in_words(other.pivots)}: {other.medians}." for other in found if other is not best]
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
     sentences += _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
-
-
-def _medians(compared: list[Deviation]) -> str:
-    return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in compared)
 
 
 def _pivot_sentence(comparison: Comparison) -> list[str]:

@@ -14,7 +14,6 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import (
     TableRow,
     TableSource,
-    Tolerances,
     partners,
     read_coefficients,
     read_rows,
@@ -62,8 +61,8 @@ def compare_table(
 def _point(row: TableRow) -> PointResult:
     """A row as if it had been identified; what it does not hold is NaN."""
     omega = row.point.excitation
-    h, errors = row.k.astype(complex), row.errors * np.repeat([1.0, omega], 4)
-    h.imag = omega * row.c  # a sum would lose a stiffness that stands without its damping
+    h, errors = row.values[:4].astype(complex).reshape(2, 2), row.errors * np.repeat([1.0, omega], 4)
+    h.imag = omega * row.values[4:].reshape(2, 2)  # a sum would lose a stiffness that stands without its damping
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
     quality = tuple(Condition(name) for name in row.status if name in KINDS)
@@ -74,7 +73,7 @@ def _point(row: TableRow) -> PointResult:
 
 
 #: What set points are rounded by in tables.
-_ROUNDED = Tolerances(load=0.01, direction=1.0, frequency=0.005)
+_ROUNDED = (0.01, 1.0, 0.005)
 _TOLERANCES = "its load within 1 %, direction within 1 deg, speed and excitation within 0.5 %, the same rotation"
 #: Points and lines that a remark lists.
 _MOST = 6
@@ -131,14 +130,9 @@ def _at(point: OperatingPoint, row: TableRow | None) -> TableRow:
 def _remark(table: PredictionTable, total: int, alone: Sequence[str], unmet: Sequence[TableRow]) -> str:
     """Say how many points a table meets, and what has no partner."""
     sentences = [f"{table.file} predicts {total - len(alone)} of {total} points"]
-    if alone:
-        sentences.append(f"without a row: {_listed(alone)}")
-    if unmet:
-        lines = [f"line {row.line} ({row.point})" for row in unmet]
-        sentences.append(f"rows that meet no point: {_listed(lines)}")
+    lines = [f"line {row.line} ({row.point})" for row in unmet]
+    for words, texts in (("without a row", alone), ("rows that meet no point", lines)):
+        if texts:
+            more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+            sentences.append(f"{words}: {'; '.join(texts[:_MOST])}{more}")
     return "; ".join(sentences) + "."
-
-
-def _listed(texts: Sequence[str]) -> str:
-    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
-    return "; ".join(texts[:_MOST]) + more

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
 from tpjb_ident.columns import in_us_units, place_of
-from tpjb_ident.condition_kinds import ERRORS
+from tpjb_ident.conditions import errors_in
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, KINDS, POINT_COLUMNS, STATIC_KEY
 
@@ -119,8 +119,7 @@ def _distrust(row: Mapping[Any, Any]) -> str:
     A film's direct stiffness and damping are positive by the sign convention of CONTRIBUTING; a wrong polarity of a
     probe or cell turns the sign of one or of all of them.
     """
-    quality = row.get("quality")
-    reasons = [name for name in quality.split("; ") if name in ERRORS] if isinstance(quality, str) else []
+    reasons = errors_in(row.get("quality"))
     if str(row.get("converged")) == "False":
         reasons.append("the model did not converge")
     for name in ("kxx", "kyy", "cxx", "cyy"):

@@ -10,7 +10,7 @@ import functools
 import importlib.metadata
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -19,11 +19,12 @@ import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
+from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.columns import amount, in_us_units
 from tpjb_ident.exports.formats import COLUMNS, ROSS_VERSIONS, flags
 from tpjb_ident.exports.table import INTERVALS
+from tpjb_ident.presentation import UNITS
 from tpjb_ident.runtime.tables import printable, write_text
-from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,13 +34,13 @@ _HZ = 2.0 * np.pi
 _SAME = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Grid:
     """What one file holds: coefficients of one static load over n shaft speeds and m excitation frequencies."""
 
-    rows: pd.DataFrame = field(repr=False)  #: n m of them, by speed and frequency
-    speed: FloatArray = field(repr=False)  #: (n,) [Hz]
-    excitation: FloatArray = field(repr=False)  #: (m,) [Hz]; NaN where it is the running speed
+    rows: pd.DataFrame  #: n m of them, by speed and frequency
+    speed: FloatArray  #: (n,) [Hz]
+    excitation: FloatArray  #: (m,) [Hz]; NaN where it is the running speed
 
     @property
     def values(self) -> FloatArray:
@@ -79,13 +80,10 @@ class Grid:
             parts.append(f"shaft speed {60 * self.speed[0]:g} rpm")
         doubtful = self.rows.loc[~self.rows["trusted"], "shaft_speed_Hz"].unique()
         speeds = ", ".join(f"{60 * speed:.6g}" for speed in doubtful)
-        warning = [f"NOT TO BE TRUSTED at {speeds} rpm"] if speeds else []
-        remarks = [
-            printable(source).replace("\n", " "),
-            ", ".join(parts),
-            *warning,
-            f"intervals and flags: {INTERVALS}{'_us' if in_us_units() else ''}.csv",
-        ]
+        remarks = [printable(source).replace("\n", " "), ", ".join(parts)]
+        if speeds:
+            remarks.append(f"NOT TO BE TRUSTED at {speeds} rpm")
+        remarks.append(f"intervals and flags: {INTERVALS}{'_us' if in_us_units() else ''}.csv")
         if self.mirrored:
             remarks.append("the rig's shaft turns clockwise: here, and in the intervals, it turns counter-clockwise")
         return remarks
@@ -106,7 +104,7 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
         by_speed = [part for _, part in rows.groupby("shaft_speed_Hz")]
         if axes == "speed":
             parts += [part for _, part in rows.groupby("line")]
-        elif axes == "both" and (_all_alike(by_speed, "excitation_Hz") or (line == _SYNCHRONOUS).all()):
+        elif axes == "both" and (_alike(by_speed) or (line == _SYNCHRONOUS).all()):
             parts.append(rows)
         else:
             parts += by_speed
@@ -117,8 +115,9 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
 _SYNCHRONOUS = -1.0
 
 
-def _all_alike(by_speed: Sequence[pd.DataFrame], column: str) -> bool:
-    axes = [part[column].to_numpy() for part in by_speed]
+def _alike(by_speed: Sequence[pd.DataFrame]) -> bool:
+    """Whether all speeds were run at the same frequencies."""
+    axes = [part["excitation_Hz"].to_numpy() for part in by_speed]
     return all(len(axis) == len(axes[0]) and np.allclose(axis, axes[0], rtol=_SAME, atol=0.0) for axis in axes)
 
 
@@ -217,10 +216,7 @@ write_dyrobes = functools.partial(_write_by_speed, "dyrobes", _dyrobes)
 write_ansys = functools.partial(_write_by_speed, "ansys", _ansys)
 
 
-_ZERO_CELSIUS = 273.15
 _CLOCKWISE = ROTATIONS[1]
-
-
 #: What the versions call the same thing.
 _NAMES = {
     2: {"speed": "frequency", "preload": "pre_load", "match": "determine_eccentricity", "load": "load=[fx, fy]"},
@@ -243,7 +239,9 @@ def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -
         '    """At node n: speed [rad/s], an array; fx, fy: static load on the shaft [N]; any option of TiltingPad."""',
         "    arguments = dict(",
     ]  # fmt: skip
-    arguments = {names["preload"]: _preloads(bearing), **_arguments(bearing)}
+    assembled = fmean(pad.assembled_clearance for pad in bearing.pads)  # that ROSS takes: preloads give each its own
+    preloads = [1.0 - assembled / pad.pad_clearance for pad in bearing.pads]
+    arguments = {names["preload"]: preloads, **_arguments(bearing)}
     lines = [f"        {name}={value!r}," for name, value in arguments.items()]
     tail = [
         f"        {names['load']}, {names['speed']}=speed,",
@@ -260,9 +258,9 @@ def _arguments(bearing: Any) -> dict[str, Any]:
     angles = [pad.pivot_angle for pad in pads]
     lubricant = {
         "liquid_viscosity1": oil.viscosity_40,
-        "temperature1": 40.0 + _ZERO_CELSIUS,
+        "temperature1": 40.0 + ZERO_CELSIUS,
         "liquid_viscosity2": float(oil.viscosity(hot)),
-        "temperature2": hot + _ZERO_CELSIUS,
+        "temperature2": hot + ZERO_CELSIUS,
         "liquid_density": oil.density_40,
         "liquid_specific_heat": oil.specific_heat,
         "liquid_thermal_conductivity": oil.conductivity,
@@ -276,14 +274,8 @@ def _arguments(bearing: Any) -> dict[str, Any]:
         "pad_axial_length": [bearing.length] * len(pads),
         "offset": [pad.pivot_offset for pad in pads],
         "lubricant": lubricant,
-        "oil_supply_temperature": oil.supply_temperature + _ZERO_CELSIUS,
+        "oil_supply_temperature": oil.supply_temperature + ZERO_CELSIUS,
     }
-
-
-def _preloads(bearing: Any) -> list[float]:
-    """Preload by pad that gives each its machined clearance from the one assembled clearance that ROSS takes."""
-    assembled = fmean(pad.assembled_clearance for pad in bearing.pads)
-    return [1.0 - assembled / pad.pad_clearance for pad in bearing.pads]
 
 
 def _not_held(bearing: Any, version: int) -> list[str]:

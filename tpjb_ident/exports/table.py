@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tpjb_ident.exports.formats import COLUMNS, ENDS, ExportError, flags
+from tpjb_ident.presentation import us_table
 from tpjb_ident.runtime import tables
 from tpjb_ident.runtime.tables import printable, write_atomic
 from tpjb_ident.schema import KINDS, STATIC_KEY
-from tpjb_ident.us_table import us_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,24 +62,13 @@ def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
     Every text is written as text, so that no cell from outside can become a formula. Rows that are not to be trusted
     are red.
     """
+    import pandas as pd
+
     try:
-        from openpyxl import Workbook
-        from openpyxl.styles import Font
+        import openpyxl.styles
     except ModuleNotFoundError as error:
         raise ExportError('an Excel file needs openpyxl. Install it: pip install "tpjb-ident[excel]"') from error
-    book = Workbook()
-    sheet = book.active
-    sheet.title = "coefficients"
     frame = _coefficient_table(points)
-    for column, name in enumerate(frame.columns, start=1):
-        _text(sheet.cell(1, column), str(name))
-        sheet.column_dimensions[sheet.cell(1, column).column_letter].width = max(12, len(str(name)) + 2)
-        for row, value in enumerate(frame[name], start=2):
-            _fill(sheet.cell(row, column), value)
-            if not frame["trusted"].iloc[row - 2]:
-                sheet.cell(row, column).font = Font(color="C00000")
-    sheet.freeze_panes = "A2"
-    about = book.create_sheet("about")
     lines = [
         printable(source),
         "K = Re h, C = Im h / omega at the excitation frequency; SI units.",
@@ -89,33 +78,30 @@ def write_excel(folder: Path, points: pd.DataFrame, source: str) -> None:
     ]
     for load, rows in points.groupby("static_load_N"):
         lines += [f"{load:g} N {flag}" for flag in flags(rows)]
-    for row, line in enumerate(lines, start=1):
-        _text(about.cell(row, 1), line)
     content = io.BytesIO()
-    book.save(content)
-    write_atomic(folder / f"{NAME}.xlsx", lambda part: _without_times(content, part))
+    with pd.ExcelWriter(content, engine="openpyxl") as writer:
+        frame.to_excel(writer, sheet_name="coefficients", index=False, freeze_panes=(1, 0))
+        pd.DataFrame(lines).to_excel(writer, sheet_name="about", index=False, header=False)
+        sheet = writer.sheets["coefficients"]
+        for column in sheet.columns:
+            sheet.column_dimensions[column[0].column_letter].width = max(12, len(str(column[0].value)) + 2)
+        for row, trusted in zip(sheet.iter_rows(min_row=2), frame["trusted"], strict=True):
+            for cell in row if not trusted else ():
+                cell.font = openpyxl.styles.Font(color="C00000")
+        for row in (*sheet.rows, *writer.sheets["about"].rows):
+            for cell in row:
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"  # openpyxl would take a leading = for a formula
 
+    def write(part: Path) -> None:
+        """Without the times of its making: the same results are the same bytes."""
+        with zipfile.ZipFile(content) as archive, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as written:
+            for name in archive.namelist():
+                entry = archive.read(name)
+                entry = _TIME.sub(_NO_TIME, entry) if name == "docProps/core.xml" else entry
+                written.writestr(zipfile.ZipInfo(name), entry, zipfile.ZIP_DEFLATED)
 
-def _without_times(book: io.BytesIO, path: Path) -> None:
-    """Write a workbook without the times of its making: the same results are the same bytes."""
-    with zipfile.ZipFile(book) as archive, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as written:
-        for name in archive.namelist():
-            entry = _TIME.sub(_NO_TIME, archive.read(name)) if name == "docProps/core.xml" else archive.read(name)
-            written.writestr(zipfile.ZipInfo(name), entry, zipfile.ZIP_DEFLATED)
-
-
-def _fill(cell: Any, value: Any) -> None:
-    if isinstance(value, (bool, np.bool_)):
-        cell.value = bool(value)
-    elif isinstance(value, str):
-        _text(cell, value)
-    else:
-        cell.value = float(value) if np.isfinite(value) else None
-
-
-def _text(cell: Any, text: str) -> None:
-    cell.value = text
-    cell.data_type = "s"  # openpyxl would take a leading = for a formula
+    write_atomic(folder / f"{NAME}.xlsx", write)
 
 
 def write_mat(folder: Path, points: pd.DataFrame, source: str) -> None:

@@ -52,7 +52,7 @@ class Export:
     def __str__(self) -> str:
         rows = self.chosen.table
         if rows is None:
-            return ", ".join(self.files)
+            return "the bearing"
         return f"{rows.groupby(list(STATIC_KEY)).ngroups} static points, {len(rows)} coefficient sets"
 
 
@@ -100,7 +100,11 @@ def export(
     options = _ross_options(to, ross)
     target = Path(folder)
     if hasattr(source, "pads"):
-        return _export_bearing(source, to, target, options)
+        if to != "ross":
+            raise ExportError(f"a bearing file leaves for ROSS alone, not for {to}. Export a prediction of it.")
+        target.mkdir(parents=True, exist_ok=True)
+        write_ross_bearing(target, source, **options)
+        return Export(target, ("ross_bearing.py",), Chosen())
     frame, origin = _table(source)
     chosen = chosen_rows(frame, force)
     rows = chosen.table
@@ -124,14 +128,6 @@ def _write(target: Path, rows: pd.DataFrame, to: str, source: str, options: dict
     getattr(rotor_programs if rotor else table, f"write_{to}")(target, rows, source, **options)
     if in_us_units():
         table.write_us(target, rows, beside)
-
-
-def _export_bearing(bearing: Any, to: str, target: Path, options: dict[str, int]) -> Export:
-    if to != "ross":
-        raise ExportError(f"a bearing file leaves for ROSS alone, not for {to}. Export a prediction of it.")
-    target.mkdir(parents=True, exist_ok=True)
-    write_ross_bearing(target, bearing, **options)
-    return Export(target, ("ross_bearing.py",), Chosen())
 
 
 def _ross_options(to: str, version: int | None) -> dict[str, int]:

@@ -11,24 +11,25 @@ import pandas as pd
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.coefficient_table import TableSource
-from tpjb_ident.compare.comparison import comparison_frame, predicted_locus
+from tpjb_ident.compare.comparison import predicted_locus
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.compare.summary import Deviation, deviations, summary_sentences
+from tpjb_ident.compare.summary import agreements, summary_sentences
 from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
+    clearance_cells,
     evidence_sections,
     flags_line,
     set_up_section,
+    stiffness_cell,
     tested_facts,
     values_table,
 )
 from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
 from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
-from tpjb_ident.rounding import fixed, percent, signed, with_interval
+from tpjb_ident.rounding import fixed, percent, signed
 from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
@@ -77,8 +78,8 @@ def write_report(
     >>> page.name
     'report.html'
     """
-    frame = comparison_frame(comparison)
-    answer, *more = summary_sentences(comparison, frame)
+    frame = comparison.table
+    answer, *more = summary_sentences(comparison)
     points = comparison.identification.points
     coefficients = coefficient_panels(frame)
     lead = next((p for p in coefficients if p.name.startswith(_LEAD)), next(iter(coefficients), None))
@@ -89,9 +90,9 @@ def write_report(
         answer=answer,
         more=more,
         facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
-        key_table=_key_table(deviations(comparison, frame)),
+        key_table=deviations_table(frame),
         values=values_table(points),
-        flags=flags_line(_flagged(comparison), len(points)),
+        flags=flags_line([conditions for _, conditions in _flagged(comparison)], len(points)),
         picture=lead,
         then=then,
         sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
@@ -101,14 +102,12 @@ def write_report(
     return write_page(folder, page)
 
 
-def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
+def deviations_table(table: pd.DataFrame) -> Table:
+    """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
-    for variant in dict.fromkeys(d.pivots for d in all_deviations):
-        by_name = {d.coefficient: d for d in all_deviations if d.pivots == variant}
-        compared = [by_name[name] for name in DIRECT]
-        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in compared]
-        inside, n = sum(d.inside for d in compared), sum(d.n for d in compared)
-        rows.append([VARIANT_LABEL.get(variant, variant), *cells, f"{inside} of {n}"])
+    for found in agreements(table):
+        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in found.deviations]
+        rows.append([VARIANT_LABEL.get(found.pivots, found.pivots), *cells, found.inside])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],
@@ -118,9 +117,9 @@ def _key_table(all_deviations: tuple[Deviation, ...]) -> Table:
 
 def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequence[Panel]) -> list[Section]:
     sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
-    campaign = comparison.campaign
+    campaign: Any = comparison.campaign
     tables = [measured_table(comparison.identification)]
-    if not isinstance(campaign, TableSource):
+    if comparison.has_records:
         sections += evidence_sections(campaign, comparison.identification)
         tables.append(budget_table(comparison.identification))
     sections.append(
@@ -154,7 +153,7 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
             "Pivots, from the dry tests",
             notes=[note],
             panels=pivot_panels(comparison.curves, formula),
-            tables=[_pivot_points_table(comparison.curves, formula)],
+            tables=[pivot_stiffness_table(comparison.curves, formula, _PIVOT_LOADS)],
         )
     ]
 
@@ -166,7 +165,7 @@ def _position_sections(comparison: Comparison) -> list[Section]:
     panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
     if not panels:
         return []
-    tables = [] if comparison.clearance is None else [_clearance_table(comparison.clearance, drawn[1])]
+    tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]
     return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
 
 
@@ -232,35 +231,31 @@ def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
     return parts + [(name, test.status) for name, test in tests if test is not None]
 
 
-def _pivot_points_table(curves: Sequence[PivotCurve], formula: Formula | None) -> Table:
-    """Tangent stiffness of every pad at two loads beside the printed formula's."""
+def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None, loads: Sequence[float]) -> Table:
+    """Tangent stiffness of every pad at some loads [N] beside the printed formula's."""
     columns = ["pad", "law"]
-    for load in _PIVOT_LOADS:
+    for load in loads:
         columns += [f"at {amount(load, 'load', '.4g')}, {symbol('stiffness')}", "of Kirk's tangent"]
     rows = []
     for curve in curves:
         cells = []
-        for load in _PIVOT_LOADS:
-            value = float(curve.stiffness(load))
-            low, high = (float(v) for v in curve.stiffness_band(load))
+        for load in loads:
             remark = " (extrapolated)" if bool(curve.is_extrapolated(load)) else ""
-            cells.append(with_interval(value, low, high, size("stiffness")) + remark)
-            cells.append(f"{100 * value / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
+            cells.append(stiffness_cell(curve, load) + remark)
+            cells.append(f"{100 * curve.stiffness(load) / formula(curve.pad, load)[1]:.0f} %" if formula else "–")
         rows.append([f"#{curve.pad}", curve.law.name, *cells])
     return Table("Measured tangent stiffness, 95 %", columns, rows)
 
 
-def _clearance_table(polygon: ClearancePolygon, drawn: FloatArray) -> Table:
-    """Clearance per pad beside the drawing's."""
-    rows, unit = [], size("length")
+def clearance_table(polygon: ClearancePolygon, drawn: FloatArray, calibrated: bool = False) -> Table:
+    """Clearance per pad beside the drawing's; see `clearance_cells`."""
+    unit = size("length")
     digits = 2 if unit < 1e-5 else 4
-    for k, drawing in enumerate(drawn):
-        value, half = polygon.clearance[k], 1.96 * polygon.clearance_se[k]
-        rows.append([
-            f"#{k + 1}", f"{drawing / unit:.4g}", with_interval(value, value - half, value + half, unit),
-            signed((value - drawing) / unit, digits),
-            fixed(polygon.clearance_pushed[k] / unit, digits),
-        ])  # fmt: skip
+    rows = []
+    for k, (drawing, measured) in enumerate(zip(drawn, clearance_cells(polygon, calibrated), strict=True)):
+        off, pushed = polygon.clearance[k] - drawing, polygon.clearance_pushed[k]
+        rows.append([f"#{k + 1}", f"{drawing / unit:.4g}", measured, signed(off / unit, digits),
+                     fixed(pushed / unit, digits)])  # fmt: skip
     name = symbol("length")
     under = f"under {amount(polygon.push_load, 'force', '.3g')}, {name}"
     columns = ["pad", f"drawing, {name}", f"measured, {name}", f"difference, {name}", under]

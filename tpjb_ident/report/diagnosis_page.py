@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Remainder, Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")
@@ -58,12 +58,14 @@ def verdict_sentences(
         sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
     if verdict.effects:
         tested = "was tested on points left out of the fit"
-        if not _tested(verdict):
+        if not verdict.gap.get("heldout_numbers", 1):
             tested = "could not be tested, since no point can be left out; over all of them"
+        gap_within = verdict.gap.get("within_tolerances")
+        within = "" if gap_within is None else f", {gap_within:.1f} with it free within its tolerances"
         sentences.append(
             f"The sizes were fitted to these data; that they close the gap {tested}: "
             f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after "
-            f"with all else as stated{_within(verdict)}."
+            f"with all else as stated{within}."
         )
         words = [words_of(effect.name) for effect in verdict.effects]
         checks = [word.check for word in words if word is not None]
@@ -75,7 +77,10 @@ def verdict_sentences(
     if verdict.verdict != "consistent" and verdict.disagreement:
         worst = verdict.disagreement[0]
         sentences.append(f"The model and the rig part most in {observable(worst.observable)}, {place(worst.where)}.")
-    worse = [observable(o) for o, g in verdict.gap_by_observable.items() if _worse(g)]
+    worse = []
+    for name_of_observable, gaps in verdict.gap_by_observable.items():
+        if gap_at(gaps, "_after") > max(gap_at(gaps, "_before") + 0.3, 1.0):
+            worse.append(observable(name_of_observable))
     if verdict.effects and worse:
         sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
     sentences += [_beyond(one) for one in verdict.assumptions if abs(one.deviation) > Deciding.visible]
@@ -97,17 +102,6 @@ def _beyond(one: Assumption) -> str:
     )
 
 
-def _tested(verdict: Verdict) -> bool:
-    """Whether there were points that the sizes had not seen."""
-    return verdict.gap.get("heldout_numbers", 1) > 0
-
-
-def _within(verdict: Verdict) -> str:
-    """The same gap once clearances, oil and sensors may be anywhere within their tolerances."""
-    gap = verdict.gap.get("within_tolerances")
-    return "" if gap is None else f", {gap:.1f} with it free within its tolerances"
-
-
 def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None) -> str:
     found = " and ".join(finding(e.name, e.parameters) for e in verdict.effects)
     found = found[:1].upper() + found[1:]
@@ -120,7 +114,10 @@ def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, f
         return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."
     if verdict.effects:
         return f"{name}: {found}. That explains most of the disagreement, and something is left."
-    worst = _largest(deviations)
+    worst = ""
+    if deviations:
+        name_of_worst = max(deviations, key=lambda c: abs(deviations[c][0]))
+        worst = f", {name_of_worst} is off by {percent(deviations[name_of_worst][0])}"
     return f"{name}: unexplained{worst}. Nothing in the library of effects closes the gap."
 
 
@@ -131,13 +128,6 @@ def _deciding(verdict: Verdict) -> str:
     where = "on points left out of the fit" if gap["touched_unseen"] else "over all points (none left out shows it)"
     shrunk = f"from {gap['touched_before']:.1f} to {gap['touched_after']:.1f} standard deviations"
     return f"That explains the disagreement: where {acting}, {where}, it shrinks {shrunk}."
-
-
-def _largest(deviations: Mapping[str, tuple[float, float]] | None) -> str:
-    if not deviations:
-        return ""
-    name = max(deviations, key=lambda c: abs(deviations[c][0]))
-    return f", {name} is off by {percent(deviations[name][0])}"
 
 
 def _remainder_sentences(verdict: Verdict) -> list[str]:
@@ -185,10 +175,6 @@ def _read(number: re.Match[str]) -> str:
     return f"{significant(float(number[1]) / scale)} {unit}".replace("-", MINUS)
 
 
-def _worse(gap: Mapping[str, float]) -> bool:
-    return gap_at(gap, "_after") > max(gap_at(gap, "_before") + 0.3, 1.0)
-
-
 def next_command(campaign: str, bearing: str, verdict: Verdict, folder: str) -> str:
     """How to use what was found, as a command to type."""
     drawn = f" --bearing {bearing}" if bearing else ""
@@ -219,7 +205,7 @@ _GAPS = {
     "within_tolerances": "points that no fit has seen, clearances, oil, sensors, .. free within their tolerances too",
     "noise_floor": "what noise alone would leave",
 }
-_GROUP = "Where model and measurement part"
+_GROUP, _EFFECTS = "Where model and measurement part", "Effects added to the model, with 95 % intervals"
 OVER = (
     ("load", "residuals-load", "Residuals over static load, the coefficients that disagree most"),
     ("frequency", "residuals-excitation", "Residuals over excitation frequency, the same coefficients"),
@@ -249,21 +235,17 @@ def write_diagnosis_report(
         more=more,
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
-        flags=flags_line([("", p.quality) for p in points], len(points)),
+        flags=flags_line([p.quality for p in points], len(points)),
         picture=lead,
         then=then,
-        key_table=_effects_table(verdict) if verdict.effects else _gap_table(verdict),
+        key_table=Table(_EFFECTS, ["effect", "parameter", "value"], parameter_rows(verdict))
+        if verdict.effects
+        else _gap_table(verdict),
         sections=_sections(result, [p for p in coefficients if p is not lead]),
         settings=settings,
         inputs=inputs,
     )
     return write_page(folder, page)
-
-
-def _effects_table(verdict: Verdict) -> Table:
-    return Table(
-        "Effects added to the model, with 95 % intervals", ["effect", "parameter", "value"], parameter_rows(verdict)
-    )  # fmt: skip
 
 
 def _gap_table(verdict: Verdict) -> Table:
@@ -378,17 +360,13 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
     )
     columns = ["tolerance", "stated", "source", "fitted", "deviations"]
     table = Table("Stated tolerances", columns, [_row(a) for a in verdict.assumptions])
-    left = Section("What is left", [_left_sentence(verdict.remainder)])
-    return [left, Section("What may be off", [note], tables=[table])]
-
-
-def _left_sentence(remainder: Remainder) -> str:
-    """Say what is left on unseen points; what it behaves like, and what drifts, stands with the verdict."""
-    return (
+    remainder = verdict.remainder
+    left = (
         "On points that no fit has seen, with all that has a tolerance free within it, "
         f"{remainder.sigma:.2f} sigma are left: {100 * remainder.share:.1f} % of the squared gap above noise, most in "
         f"{in_words(remainder.where)}; against noise and stated tolerances p = {remainder.p:.2g}."
     )
+    return [Section("What is left", [left]), Section("What may be off", [note], tables=[table])]
 
 
 def _row(one: Assumption) -> list[str]:

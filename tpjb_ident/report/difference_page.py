@@ -44,7 +44,7 @@ def write_difference_report(
         subtitle="Second less first, with 95 % intervals",
         facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
-        flags=flags_line([("", _flags(points))], len(points)),
+        flags=flags_line([_flags(points)], len(points)),
         picture=panel("difference", _TITLE, _drawn, "", points) if len(points) else None,
         answer=answer,
         more=more,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import html
 import io
-import itertools
 import multiprocessing
 import re
 from collections.abc import Callable, Sequence
@@ -70,8 +69,7 @@ def shape(svg: str) -> str:
 #: Panels from which on a second process draws too, and how many processes do at most.
 _TOGETHER, _MOST_HANDS = 6, 4
 #: What is being drawn, for processes that are forked from this one.
-_drawn: dict[int, tuple[Panel, ...]] = {}
-_numbers = itertools.count()
+_drawn: list[Panel] = []
 
 
 def panel(name: str, title: str, figure: Figure | Callable[..., Figure], group: str, *arguments: Any) -> Panel:
@@ -125,35 +123,27 @@ def prefixed_ids(svg: str, prefix: str) -> str:
 def save_panels(panels: Sequence[Panel], folder: Path) -> dict[str, str]:
     """Write every panel as SVG and PNG, on white ground; return the SVG texts, without ground, by name."""
     folder.mkdir(exist_ok=True)
-    number = next(_numbers)
-    _drawn[number] = tuple(panels)
-    try:
-        # forked: what is drawn is there already, and a few panels are not worth a second process
-        alone = len(panels) < _TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
-        with local_workers(1 if alone else min(cores(), _MOST_HANDS), start="fork") as opened:
-            jobs = [(number, index, folder) for index in range(len(panels))]
-            texts = list(map_ordered(opened, _save_panel, jobs))
-    finally:
-        del _drawn[number]
+    _drawn[:] = panels
+    # forked: what is drawn is there already, and a few panels are not worth a second process
+    alone = len(panels) < _TOGETHER or "fork" not in multiprocessing.get_all_start_methods()
+    with local_workers(1 if alone else min(cores(), _MOST_HANDS), start="fork") as opened:
+        texts = list(map_ordered(opened, _save_panel, [(index, folder) for index in range(len(panels))]))
+    _drawn.clear()
     return {panel.name: text for panel, text in zip(panels, texts, strict=True)}
 
 
-def _save_panel(number: int, index: int, folder: Path) -> str:
+def _save_panel(index: int, folder: Path) -> str:
     """Write one panel; its text as SVG."""
-    panel = _drawn[number][index]
+    panel = _drawn[index]
     text = svg_text(panel.figure, panel.name)
-    write_text(folder / f"{panel.name}.svg", _on_white(text))
+    ground = text.index(">", text.index("<svg")) + 1  # in a file of its own: dark viewers would swallow the ink
+    on_white = f'{text[:ground]}<rect width="100%" height="100%" fill="white"/>{text[ground:]}'
+    write_text(folder / f"{panel.name}.svg", on_white)
     write_atomic(folder / f"{panel.name}.png", functools.partial(_save_png, panel.figure))
     return text
 
 
-def _on_white(svg: str) -> str:
-    """Give a file of its own a ground: dark viewers would swallow the ink."""
-    start = svg.index(">", svg.index("<svg")) + 1
-    return f'{svg[:start]}<rect width="100%" height="100%" fill="white"/>{svg[start:]}'
-
-
-def _save_png(figure: Figure, path: Path | io.BytesIO) -> None:
+def _save_png(figure: Figure, path: Path) -> None:
     pixels = io.BytesIO()
     figure.savefig(pixels, format="rgba", dpi=_PNG_DPI, facecolor="white")
     width, height = (int(inches * _PNG_DPI) for inches in figure.get_size_inches())

@@ -10,26 +10,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigdata.problem import RigDataError
-from tpjb_ident.columns import amount, channel_unit, degrees, per, spinning, symbol
+from tpjb_ident.columns import amount, channel_unit, degrees, per, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coefficients import frf
-from tpjb_ident.report.plots.records import coherence_spectrum, orbit, spectra
-from tpjb_ident.report.plots.windows import coherence
-from tpjb_ident.rounding import counted, fixed
+from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
+from tpjb_ident.rounding import counted, fixed, with_interval
 from tpjb_ident.schema import DAMPING, STIFFNESS
 
 if TYPE_CHECKING:
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
     from rigdata.run import Run
+    from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.conditions import Condition
     from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.pivot import PivotCurve
 
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip
@@ -89,11 +91,11 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
     return Table(caption, columns, rows)
 
 
-def flags_line(named: Iterable[tuple[str, Iterable[Condition]]], points: int) -> str:
+def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:
     """The flags of a result with how often each is there, gravest first."""
-    counts = Counter((str(c), c.severity) for _, conditions in named for c in conditions)
+    counts = Counter((str(c), c.severity) for conditions in flags for c in conditions)
     texts = []
-    for grave in ("error", "warning", "note"):
+    for grave in SEVERITIES:
         texts += [f"{name} ({n})" if n > 1 else name for (name, severity), n in counts.items() if severity == grave]
     bad = sum(n for (_, severity), n in counts.items() if severity == "error")
     head = f"{counted(bad, 'flag')} against trust" if bad else f"Flags on {points} points, none forbids trust"
@@ -130,6 +132,19 @@ def _sensor_table(channels: Sequence[Channel]) -> Table:
         )
     columns = ["channel", "quantity", "direction or pad", "calibration", "uncertainty (1 standard deviation)"]
     return Table("Sensors", columns, rows)
+
+
+def stiffness_cell(curve: PivotCurve, load: float) -> str:
+    """Tangent stiffness of a pivot at a load [N], with its interval."""
+    low, high = (float(v) for v in curve.stiffness_band(load))
+    return with_interval(float(curve.stiffness(load)), low, high, size("stiffness"))
+
+
+def clearance_cells(polygon: ClearancePolygon, calibrated: bool = False) -> list[str]:
+    """Clearance of every pad at zero push load with its interval, `calibrated` with that of the probes' gains."""
+    gain = polygon.relative_calibration if calibrated else 0.0
+    ends = zip(polygon.clearance, 1.96 * np.hypot(polygon.clearance_se, gain * polygon.clearance), strict=True)
+    return [with_interval(value, value - half, value + half, size("length")) for value, half in ends]
 
 
 def _by_pad(values: Iterable[str]) -> str:

@@ -77,21 +77,9 @@ class Page:
     beside: str = "Figures are beside this file as SVG and PNG, tables as CSV and Parquet."
 
 
-def _templates() -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=_printable_cell,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
-    environment = _templates()
-    script = environment.get_template("sort.js").render()
+    script = _TEMPLATES.get_template("sort.js").render()
     shown: list[frozenset[str]] = []
     drawings = {}
     for panel in panels_of(page):
@@ -100,14 +88,15 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
         drawings[panel.name] = drawing if repeated else svg[panel.name]
         shown += [legend] if legend else []
     running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
-    return environment.get_template("report.html").render(
+    drawn, shapes = _elements(panels_of(page), drawings)
+    return _TEMPLATES.get_template("report.html").render(
         page=page,
-        drawn={panel.name: _element(drawings[panel.name], panel) for panel in panels_of(page)},
+        drawn=drawn,
         # our own text; the one text from outside is escaped, character by character
-        style=markupsafe.Markup(environment.get_template("style.css").render(running=_css_text(running))),
+        style=markupsafe.Markup(_TEMPLATES.get_template("style.css").render(running=_css_text(running))),
         script=markupsafe.Markup(script),  # likewise
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        shapes={name: shape(drawing) for name, drawing in drawings.items()},
+        shapes=shapes,
         versions=versions(),
         finished=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )
@@ -127,12 +116,10 @@ def _css_text(text: str) -> markupsafe.Markup:
 
 def render_section(section: Section) -> str:
     """Render one section with its style, as the text of an element that has a shadow root of its own."""
-    environment = _templates()
     svg = {panel.name: svg_text(panel.figure, panel.name) for panel in section.panels}
-    drawn = {panel.name: _element(svg[panel.name], panel) for panel in section.panels}
-    shapes = {name: shape(text) for name, text in svg.items()}
-    style = environment.get_template("style.css").render(running="").replace(":root", ":host")
-    html = environment.get_template("section.html").module.section(section, drawn, shapes, "")  # type: ignore[attr-defined]
+    style = _TEMPLATES.get_template("style.css").render(running="").replace(":root", ":host")
+    macros: Any = _TEMPLATES.get_template("section.html").module
+    html = macros.section(section, *_elements(section.panels, svg), "")
     return f"<style>{style} :host {{ background: var(--paper); color: var(--ink); }}</style>{html}"
 
 
@@ -152,12 +139,27 @@ def grouped(panels: Iterable[Panel]) -> list[Section]:
     return [Section(heading, panels=group) for heading, group in groups.items()]
 
 
-def _element(svg: str, panel: Panel) -> markupsafe.Markup:
-    # matplotlib has escaped the labels inside the drawing already; the title is ours to escape
-    return markupsafe.Markup(inline_svg(svg, panel.name, str(markupsafe.escape(printable(panel.title)))))
+def _elements(panels: Iterable[Panel], svg: Mapping[str, str]) -> tuple[dict[str, markupsafe.Markup], dict[str, str]]:
+    """Drawings as elements of a page, and how each stands on it, by name."""
+    elements = {}
+    for panel in panels:
+        # matplotlib has escaped the labels inside the drawing already; the title is ours to escape
+        title = str(markupsafe.escape(printable(panel.title)))
+        elements[panel.name] = markupsafe.Markup(inline_svg(svg[panel.name], panel.name, title))
+    return elements, {name: shape(svg[name]) for name in elements}
 
 
 def _printable_cell(value: object) -> object:
     if isinstance(value, list | tuple):  # a setting with several values, or with none
         value = ", ".join(map(str, value)) or None
     return value if isinstance(value, markupsafe.Markup) else readable("none" if value is None else str(value))
+
+
+_TEMPLATES = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    autoescape=True,
+    undefined=jinja2.StrictUndefined,
+    finalize=_printable_cell,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)

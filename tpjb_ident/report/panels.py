@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,7 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.picture import BLUE, FONT_SIZE, INK, RULE
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series
-from tpjb_ident.report.figure import Panel, panel, save_panels
+from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 from tpjb_ident.report.plots.coefficients import coefficient
 from tpjb_ident.report.plots.pivots import Formula, load_deflection, pad_projection, pivot_stiffness
@@ -84,13 +83,10 @@ def position_panels(
                   "Clearance and shaft centre locus")]  # fmt: skip
 
 
-def save_isolability(folder: Path, plans: Mapping[str, CampaignPlan]) -> None:
-    """Draw the isolability matrix of every plan as ``figures/NAME.svg`` and ``.png``."""
-    panels = [
-        panel(name.replace("_", "-"), f"Isolability, {name}", isolability(p), "Isolability")
-        for name, p in plans.items()
-    ]
-    save_panels(panels, folder / "figures")
+def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
+    """Draw the isolability matrix of every plan."""
+    named = {name.replace("_", "-"): (f"Isolability, {name}", plan) for name, plan in plans.items()}
+    return [panel(name, title, isolability, "", plan) for name, (title, plan) in named.items()]
 
 
 #: A picture of more channels could not be read.
@@ -99,13 +95,12 @@ _ROW, _WIDTH = 1.15, 9.0
 _POINTS = 4000
 
 
-def write_quick_look(folder: Path, title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> None:
-    """Write ``figures/quick-look.svg`` and ``.png``."""
-    save_panels([panel("quick-look", title, _quick_look(title, series, looks), "")], folder / "figures")
+def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
+    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
+    return panel("quick-look", title, _quick_look, "", title, series, looks)
 
 
 def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
-    """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
     shown = list(series)[:_MOST]
     height = _ROW * len(shown) + 0.9
     figure = Figure(figsize=(_WIDTH, height))

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tpjb_ident.columns import amount, per, size, spinning, symbol
+from tpjb_ident.columns import amount, per, spinning, symbol
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel, svg_text
-from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
+from tpjb_ident.report.laboratory_sections import (
+    clearance_cells,
+    flags_line,
+    stiffness_cell,
+    tested_facts,
+    values_table,
+)
 from tpjb_ident.report.page import Page, Section, Table, panels_of, render_page
 from tpjb_ident.report.plots.coefficients import direct_coefficients
-from tpjb_ident.rounding import significant, with_interval
+from tpjb_ident.rounding import significant
 from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located
 
@@ -46,7 +52,7 @@ def write_watch_page(
         facts=tested_facts(snapshot.campaign, bearing, points),
         key_table=coverage_table(snapshot),
         values=values_table(points),
-        flags=flags_line([("", p.quality) for p in points], len(points)) if points else "",
+        flags=flags_line([p.quality for p in points], len(points)) if points else "",
         picture=panels[0] if panels else None,
         then="" if snapshot.count("to run", "being written") else then,
         sections=_sections(snapshot, panels[1:]),
@@ -89,10 +95,13 @@ def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
     measured = snapshot.measured
     if measured.points or measured.refusals:
         note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
-        tables = [_points_table(measured.points)] if measured.points else []
+        tables = [points_table(measured.points)] if measured.points else []
         sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
     if measured.curves:
-        rows = [[f"#{c.pad}", significant(c.valid_to * per("load"), ".3g"), _pivot(c)] for c in measured.curves]
+        rows = [
+            [f"#{c.pad}", significant(c.valid_to * per("load"), ".3g"), stiffness_cell(c, c.valid_to)]
+            for c in measured.curves
+        ]
         table = Table(
             "Tangent stiffness of the pivots at the highest load",
             ["pad", f"load, {symbol('load')}", symbol("stiffness")],
@@ -100,23 +109,16 @@ def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
         )
         sections.append(Section("Pivots so far", tables=[table]))
     if measured.polygon is not None:
-        c, se = (per("length") * part for part in (measured.polygon.clearance, measured.polygon.clearance_se))
-        rows = [[f"#{i + 1}", with_interval(c[i], c[i] - 1.96 * se[i], c[i] + 1.96 * se[i])] for i in range(len(c))]
+        rows = [[f"#{pad}", cell] for pad, cell in enumerate(clearance_cells(measured.polygon), start=1)]
         table = Table("Assembled clearance by pad, from the sweep", ["pad", symbol("length")], rows)
         sections.append(Section("Clearance", tables=[table]))
-    sections.append(Section("Records", tables=[_records_table(snapshot)]))
+    sections.append(Section("Records", tables=[records_table(snapshot, [s.run.id for s in snapshot.states])]))
     waiting = [s for s in snapshot.states if s.state in ("to run", "being written")]
     if waiting:
         rows = [[s.run.id, s.run.kind, described(s.run), s.run.file] for s in waiting]
         table = Table("Runs to come", ["run", "kind", "set points", "file"], rows)
         sections.append(Section("Still to run", tables=[table]))
     return sections
-
-
-def _pivot(curve: object) -> str:
-    load = curve.valid_to  # type: ignore[attr-defined]
-    low, high = (float(v) for v in curve.stiffness_band(load))  # type: ignore[attr-defined]
-    return with_interval(float(curve.stiffness(load)), low, high, size("stiffness"))  # type: ignore[attr-defined]
 
 
 def _panels(snapshot: Snapshot) -> list[Panel]:
@@ -132,7 +134,7 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     return panels
 
 
-def _points_table(points: tuple[PointResult, ...]) -> Table:
+def points_table(points: Sequence[PointResult]) -> Table:
     """K and C of every point so far, with intervals and flags."""
     rows = []
     for p in points:
@@ -146,10 +148,10 @@ def _points_table(points: tuple[PointResult, ...]) -> Table:
     return Table("Direct coefficients so far, 95 % intervals", columns, rows)
 
 
-def _records_table(snapshot: Snapshot) -> Table:
-    """Records that have landed, the newest first."""
+def records_table(snapshot: Snapshot, runs: Collection[str]) -> Table:
+    """Records of some runs that have landed, the newest first."""
     why = {placed.run.id: placed.why for placed in snapshot.placed if placed.run is not None}
-    landed = sorted((s for s in snapshot.states if s.landed), key=lambda s: s.landed, reverse=True)
+    landed = sorted((s for s in snapshot.states if s.landed and s.run.id in runs), key=lambda s: s.landed, reverse=True)
     rows = []
     for s in landed:
         remarks = [located(f.problem) for f in s.findings if f.problem.severity != "note"][:3]

@@ -4,7 +4,7 @@ A job is a module-level function and its arguments. It depends on nothing else, 
 once more where a worker was lost with it. Whoever has work to spread takes a `Workers` and asks `map_ordered`:
 
 ```python
-with open_workers(count=4) as workers:   # of runtime.workers; or open_workers(scheduler="tcp://host:8786")
+with open_workers(count=4) as workers:   # or open_workers(scheduler="tcp://host:8786")
     for answer in map_ordered(workers, task, [(argument,), ..]):
         ...
 ```
@@ -31,6 +31,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.runtime.interrupts import interrupts_held
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.threads import limit_threads, one_thread_each
 
@@ -105,7 +106,7 @@ class PoolWorkers(Workers):
 
     def submit(self, *call: Any) -> Future[Any]:
         """Hand a call to the executor, which is opened for the first one."""
-        with _interrupts_held():
+        with interrupts_held():
             if self._executor is None:
                 self._executor = self._opened()
             return self._executor.submit(*call)
@@ -222,18 +223,18 @@ def cores() -> int:
     return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
 
 
+def _start_method() -> str:
+    return "fork" if forks() else "spawn"  # a copy need not import anything again
+
+
 @contextmanager
-def local_workers(count: int, start: str | None = None, preload: Sequence[str] = ()) -> Iterator[Workers]:
+def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
     """Open processes on this machine; one alone is this process itself."""
     if count <= 1:
         yield Workers()
         return
-    methods = multiprocessing.get_all_start_methods()
-    method = start or ("forkserver" if "forkserver" in methods else "spawn")
+    method = start or _start_method()
     context: Any = multiprocessing.get_context(method)
-    if method == "forkserver":
-        context.set_forkserver_preload(["tpjb_ident.runtime.executors", *preload])
-        _start_forkserver()
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     with one_thread_each(), _shared_memory(method == "fork"):
         try:
@@ -242,50 +243,8 @@ def local_workers(count: int, start: str | None = None, preload: Sequence[str] =
             yield pool
         except BaseException:  # nobody waits for what its workers are still at
             pool.close(at_once=True)
-            _stop_forkserver()
             raise
         pool.close()
-
-
-def _start_forkserver() -> None:
-    """Start the process that workers are copies of deaf to Ctrl-C: it would end with a traceback while it imports."""
-    from multiprocessing import forkserver, resource_tracker
-
-    resource_tracker.ensure_running()  # the forkserver starts it otherwise, and that lets Ctrl-C through again
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what comes meanwhile is delivered afterwards
-    try:
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-
-
-def _stop_forkserver() -> None:
-    """End the process that workers are copies of: it may still import, and start workers that nobody waits for."""
-    from multiprocessing import forkserver
-
-    pid = getattr(forkserver._forkserver, "_forkserver_pid", None)
-    if pid is not None:
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGTERM)
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hear Ctrl-C and SIGTERM only when the block has ended: a process begun and not yet noted would never be ended.
-
-    The end of this one would wait for it, and it for somebody who takes its answer.
-    """
-    held: list[int] = []
-    # other threads are not interrupted
-    kinds = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-    former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}
-    try:
-        yield
-    finally:
-        for kind, handler in former.items():
-            signal.signal(kind, handler or signal.SIG_DFL)
-        for number in held[:1]:  # also where the block failed: the signal may have ended the workers that it calls
-            signal.raise_signal(number)
 
 
 @contextmanager
@@ -311,11 +270,11 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     if cores() < 2:
         yield lambda: None
         return
-    context: Any = multiprocessing.get_context("fork" if forks() else "spawn")  # a copy need not import anything again
+    context: Any = multiprocessing.get_context(_start_method())
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send_outcome, args=(sender, task, job))
     try:
-        with one_thread_each(), _interrupts_held():
+        with one_thread_each(), interrupts_held():
             process.start()
         sender.close()
         yield functools.cache(lambda: _received_value(receiver))
@@ -341,12 +300,10 @@ def _received_value(receiver: Connection) -> Any | None:
 
 
 def open_workers(
-    count: int | None = None, scheduler: str | None = None, preload: Sequence[str] = (), start: str | None = None
+    count: int | None = None, scheduler: str | None = None, start: str | None = None
 ) -> AbstractContextManager[Workers]:
     """Open the workers that were asked for."""
-    if scheduler is not None:
-        return dask_workers(scheduler)
-    return local_workers(cores() if count is None else count, start, preload)
+    return local_workers(count or cores(), start) if scheduler is None else dask_workers(scheduler)
 
 
 #: Seconds to wait for the scheduler, and for its first worker.

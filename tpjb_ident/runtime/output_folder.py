@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.interrupts import interrupts_held
 from tpjb_ident.runtime.provenance import read_document, schema, sha256
 from tpjb_ident.runtime.tables import write_text
 
@@ -25,12 +26,10 @@ _FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Iterator[Path]:
     """Give a temporary folder to fill; move its content to `out` when the block ends well."""
     target = _checked(out, inputs)
+    staging = None
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
-    except OSError as error:
-        raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
-    try:
+        with interrupts_held():  # a folder that has no name here yet would stay
+            staging = _new_folder(target, out)
         with locked(staging):
             _clear_abandoned(target)
             yield staging
@@ -44,8 +43,17 @@ def output_folder(out: Path, command: str, inputs: tuple[Path, ...] = ()) -> Ite
             f"--out {out}: {why}; nothing was written. Make room on the disk or give a folder on another one."
         ) from error
     finally:
-        if staging.exists():
-            shutil.rmtree(staging)
+        with interrupts_held():
+            if staging is not None and staging.exists():
+                shutil.rmtree(staging)
+
+
+def _new_folder(target: Path, out: Path) -> Path:
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.part-"))
+    except OSError as error:
+        raise BadInputError(f"--out {out}: cannot be made ({error.strerror or error}). Give another folder.") from error
 
 
 def _bring(staging: Path, target: Path, command: str) -> None:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.presentation import UNITS
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, TABLES, Column
-from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd

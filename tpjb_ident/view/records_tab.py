@@ -13,7 +13,7 @@ from tpjb_ident.columns import amount, channel_unit, per, symbol
 from tpjb_ident.runtime.tables import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rigdata.campaign import Campaign
     from rigdata.record import Record
@@ -26,6 +26,15 @@ _HARMONICS = 2
 _STRETCHES, _MOST_LINES = 12, 2048
 _INK, _BLUE, _RED = "#1c2024", "#0072b2", "#d55e01"
 _COLOURS = (_INK, _BLUE, "#d98c00", "#009e73", _RED, "#b9609a", "#7a828b")
+
+
+#: Columns of what is drawn.
+_COLUMNS = {"orbit": "x y", "without": "x y", "time": "x y colour name", "spectrum": "x y colour name",
+            "waterfall": "image x y dw dh"}  # fmt: skip
+
+
+def _nothing(name: str) -> dict[str, Any]:
+    return {column: [] for column in _COLUMNS[name].split()}
 
 
 def records_tab(campaign: Campaign) -> Any:
@@ -41,9 +50,7 @@ def records_tab(campaign: Campaign) -> Any:
         title="beside it (same quantity)", options=list(first.channels), value=[], name="others", width=320
     )
     facts = Div(name="run-facts", sizing_mode="stretch_width")
-    data = {name: ColumnDataSource({"x": [], "y": []}) for name in ("orbit", "without")}
-    data |= {name: ColumnDataSource({"x": [], "y": [], "colour": [], "name": []}) for name in ("time", "spectrum")}
-    data["waterfall"] = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
+    data = {name: ColumnDataSource(_nothing(name)) for name in _COLUMNS}
     time = _new_plot("channels over time", "time, s", "", name="time-plot")
     spectrum = _new_plot("amplitude spectrum", "frequency, Hz", "amplitude", y_axis_type="log", name="spectrum-plot")
     for plot, name in ((time, "time"), (spectrum, "spectrum")):
@@ -70,22 +77,26 @@ def records_tab(campaign: Campaign) -> Any:
             fall.title.text = f"waterfall of {records[0].name}"
             data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
-            facts.text = _escaped(f"{text}. {message}")
         except RigDataError as error:
-            for source in data.values():
-                source.data = {name: [] for name in source.data}
-            facts.text = _escaped(f"{text}. {error}")
+            message = str(error)
+            for name, source in data.items():
+                source.data = _nothing(name)
+        facts.text = html.escape(printable(f"{text}. {message}"))
 
-    pick.on_change("value", lambda attr, old, new: update())
-    channel.on_change("value", lambda attr, old, new: update())
-    further.on_change("value", lambda attr, old, new: update())
-    update()
+    follow(update, pick, channel, further)
     left_column, right = (
         column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
     )
     return column(
         _side_by_side(pick, channel, further), facts, _side_by_side(left_column, right), sizing_mode="stretch_width"
     )
+
+
+def follow(update: Callable[[], None], *widgets: Any, event: str = "value") -> None:
+    """Update now and whenever one of the widgets changes."""
+    for widget in widgets:
+        widget.on_change(event, lambda attr, old, new: update())
+    update()
 
 
 def _show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict[str, Any]) -> str:
@@ -130,7 +141,7 @@ def waterfall(record: Record) -> dict[str, Any]:
     values = np.nan_to_num(record.values - np.nanmean(record.values))
     length = min(_MOST_LINES, len(values) // _STRETCHES * 2)
     if length < 64:
-        return {"image": [], "x": [], "y": [], "dw": [], "dh": []}
+        return _nothing("waterfall")
     starts = np.linspace(0, len(values) - length, 2 * _STRETCHES).astype(int)
     spectra = np.stack([amplitude_spectrum(values[i : i + length], record.rate)[1] for i in starts])
     level = 20.0 * np.log10(np.maximum(spectra / max(float(spectra[:, 2:].max()), 1e-300), 1e-6))
@@ -143,7 +154,7 @@ def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         record = run.vector("displacement")
     except RigDataError:  # a run whose probes cannot be turned into X and Y has no orbit; its channels still show
-        return {"x": [], "y": []}, {"x": [], "y": []}
+        return _nothing("orbit"), _nothing("without")
     path = per("length") * (record.values - np.nanmean(record.values, axis=0))
     good = np.isfinite(path).all(axis=1)
     omega, without_synchronous = run.point.shaft_speed, np.full((0, 2), np.nan)
@@ -163,10 +174,6 @@ def _thinned(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     blocks = np.ma.masked_invalid(values[: count * step].reshape(count, step))
     ends = np.stack([blocks.min(axis=1).filled(np.nan), blocks.max(axis=1).filled(np.nan)], axis=1)
     return np.repeat(time[: count * step : step], 2), ends.ravel()
-
-
-def _escaped(text: str) -> str:
-    return html.escape(printable(text))
 
 
 def _side_by_side(*parts: Any) -> Any:

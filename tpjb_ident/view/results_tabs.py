@@ -11,25 +11,24 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.predictions import ModelSettings, predict_points, prediction_frame
+from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
-from tpjb_ident.report.comparison_page import measured_table
-from tpjb_ident.report.drawing.picture import VARIANT_LABEL
+from tpjb_ident.report.comparison_page import deviations_table, measured_table
 from tpjb_ident.report.drawing.series import DIRECT, longest_series
 from tpjb_ident.report.figure import panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
-from tpjb_ident.report.page import Section, Table, render_section
+from tpjb_ident.report.page import Section, render_section
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients
+from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
-from tpjb_ident.report.plots.windows import window_weights
-from tpjb_ident.rounding import counted, percent
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY, coefficient_column
+from tpjb_ident.rounding import counted
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.view.records_tab import follow
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.view.server import Session
 
 #: Frequencies of the curves [Hz].
@@ -46,31 +45,14 @@ def verdict_tab(session: Session) -> Any:
     points = identification.points
     facts = tested_facts(campaign, session.bearing, points)
     notes = [f"{name}: {value}" for name, value in facts.items()]
-    notes.append(flags_line([("", p.quality) for p in points], len(points)))
+    notes.append(flags_line([p.quality for p in points], len(points)))
     values = values_table(points)
     tables = [] if values is None else [values]
     if session.bearing is not None and points:
-        tables.append(_deviation_table(_compared(session, [p.point for p in points], identification.to_frame())))
+        tables.append(deviations_table(_compared(session, [p.point for p in points], identification.to_frame())))
     bad = sum(bool(untrusted(p.quality)) for p in points)
     title = f"{counted(len(points), 'operating point')}, {f'{bad} NOT to be trusted' if bad else 'all to be trusted'}"
     return _text("verdict", render_section(Section(title, notes, tables=tables)))
-
-
-def _deviation_table(table: pd.DataFrame) -> Table:
-    """Predicted / measured - 1 of every pivot model: median and largest."""
-    rows = []
-    for pivots, group in table.groupby("pivots", sort=False):
-        cells = []
-        for name in DIRECT:
-            column = coefficient_column(name)
-            off = (group[f"{column}_predicted"] / group[column] - 1.0).dropna().to_numpy(float)
-            if not len(off):
-                cells.append("–")
-                continue
-            worst = float(off[np.argmax(np.abs(off))])
-            cells.append(f"{percent(float(np.median(off)))} ({percent(worst)})")
-        rows.append([VARIANT_LABEL.get(str(pivots), str(pivots)), *cells])
-    return Table("Predicted / measured - 1: median (largest)", ["", *DIRECT], rows)
 
 
 def points_tab(identification: Identification) -> Any:
@@ -78,15 +60,22 @@ def points_tab(identification: Identification) -> Any:
     from bokeh.layouts import column
     from bokeh.models import Select
 
-    points = {_label(p): p for p in identification.points}
+    points = {}
+    for p in identification.points:
+        place = f"{amount(p.point.static_load, 'load')} at {p.point.static_load_direction_deg:g} deg"
+        points[f"{place}, {p.point.speed_words}, excitation {p.point.excitation_hz:g} Hz"] = p
     choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
     windows = _text("windows")
 
     def update() -> None:
-        windows.text = _windows_html(points[choice.value])
+        p = points[choice.value]
+        flags = ", ".join(str(condition) for condition in p.quality) or "none"
+        title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
+        windows.text = render_section(
+            Section("Windows", panels=[panel("window-weights", title, window_weights(p), "")])
+        )
 
-    choice.on_change("value", lambda attr, old, new: update())
-    update()
+    follow(update, choice)
     return column(choice, windows, _text("coefficients", _points_html(identification)), sizing_mode="stretch_width")
 
 
@@ -97,21 +86,6 @@ def _text(name: str, html: str = "") -> Any:
     # the page is inverted as a whole; sections of the report know dark screens themselves
     back = "@media (prefers-color-scheme: dark) { :host { filter: invert(1) hue-rotate(180deg); } }"
     return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide, back])
-
-
-def _label(p: PointResult) -> str:
-    """Name of a point that no other point has."""
-    point = p.point
-    return (
-        f"{amount(point.static_load, 'load')} at {point.static_load_direction_deg:g} deg, {point.speed_words}, "
-        f"excitation {point.excitation_hz:g} Hz"
-    )
-
-
-def _windows_html(p: PointResult) -> str:
-    flags = ", ".join(str(condition) for condition in p.quality) or "none"
-    title = f"Robust weight of {p.n_windows} windows; flags: {flags}"
-    return render_section(Section("Windows", panels=[panel("window-weights", title, window_weights(p), "")]))
 
 
 def _points_html(identification: Identification) -> str:
@@ -139,9 +113,11 @@ def model_tab(session: Session) -> Any:
     def update() -> None:
         curves.text = html(round(load.value * size("load"), 3))
 
-    load.on_change("value_throttled", lambda attr, old, new: update())  # when a moving slider is let go
-    update()
-    return column(load, curves, _text("residuals", _residuals_html(session)), sizing_mode="stretch_width")
+    follow(update, load, event="value_throttled")  # when a moving slider is let go
+    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
+    residuals = panel("residual-map", "Residuals of all points", residual_map(table), "")
+    html_of_all = render_section(Section("All points", panels=[residuals]))
+    return column(load, curves, _text("residuals", html_of_all), sizing_mode="stretch_width")
 
 
 def _curves_html(session: Session, load: float) -> str:
@@ -162,24 +138,16 @@ def _curves_html(session: Session, load: float) -> str:
     return render_section(Section("Prediction and measurement", [note], panels))
 
 
-def _residuals_html(session: Session) -> str:
-    identification = session.identification
-    assert identification is not None
-    table = _compared(session, [p.point for p in identification.points], identification.to_frame())
-    figure = residual_map(table)
-    return render_section(Section("All points", panels=[panel("residual-map", "Residuals of all points", figure, "")]))
-
-
 def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.DataFrame) -> pd.DataFrame:
     """Predictions with every pivot model, and what was measured at the same points; columns as in comparison.csv."""
     import pandas as pd
 
-    keys = list(POINT_KEY)
-    frames = []
+    keys, predicted_columns = list(POINT_KEY), [f"{name}_predicted" for name in COEFFICIENT_COLUMNS]
+    rows = []
     for name, pivots in session.pivots.items():
-        predictions = predict_points(session.bearing, points, ModelSettings(pivots))
-        table = prediction_frame(predictions, mesh_error=False)[[*keys, *COEFFICIENT_COLUMNS]]
-        frames.append(table.rename(columns={c: f"{c}_predicted" for c in COEFFICIENT_COLUMNS}).assign(pivots=name))
+        for prediction in predict_points(session.bearing, points, ModelSettings(pivots)):
+            values = dict(zip(predicted_columns, prediction.values, strict=True))
+            rows.append({"pivots": name, **point_columns(prediction.point), **values})
     columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
-    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.concat(frames), measured))
+    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.DataFrame(rows), measured))
     return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)

@@ -176,6 +176,8 @@ def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
     from bokeh.layouts import column
     from bokeh.models import ColumnDataSource, DataTable, Select, TableColumn
 
+    from tpjb_ident.view.records_tab import follow
+
     pick = Select(title="table", options=list(tables), value=next(iter(tables)), name="table", width=320)
     source = ColumnDataSource({})
     grid = DataTable(source=source, height=560, sizing_mode="stretch_width", autosize_mode="none", reorderable=False,
@@ -183,13 +185,9 @@ def _tables_tab(tables: Mapping[str, pd.DataFrame]) -> Any:
 
     def update() -> None:
         frame = tables[pick.value].head(_MOST_ROWS)
-        source.data = {c: [_cell(v) for v in frame[c]] for c in frame}
+        shown = frame.map(lambda value: f"{value:.6g}" if isinstance(value, float) else printable(value))
+        source.data = {c: list(shown[c]) for c in frame}
         grid.columns = [TableColumn(field=c, title=printable(c), width=7 * max(20, len(str(c)))) for c in frame]
 
-    pick.on_change("value", lambda attr, old, new: update())
-    update()
+    follow(update, pick)
     return column(pick, grid, sizing_mode="stretch_width")
-
-
-def _cell(value: Any) -> Any:
-    return f"{value:.6g}" if isinstance(value, float) else printable(value)

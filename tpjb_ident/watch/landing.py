@@ -5,26 +5,21 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign, run_in_file
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError
 from rigdata.run import Run
+from rigdata.survey.spectrum import amplitude_spectrum, strongest
 from rigdata.vector import directions
 
-
-@dataclass(frozen=True)
-class FileState:
-    """What tells whether a file is still the one that was read."""
-
-    size: int
-    changed: int
-    node: int
+#: What tells whether a file is still the one that was read: size, time of its last change [ns], node.
+FileState = tuple[int, int, int]
 
 
 def file_state(path: Path) -> FileState | None:
@@ -33,17 +28,14 @@ def file_state(path: Path) -> FileState | None:
         status = path.stat()
     except OSError:
         return None
-    return FileState(status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
+    return (status.st_size, status.st_mtime_ns, status.st_ino) if path.is_file() else None
 
 
 class NewFiles:
     """Follows files until they are stable."""
 
     def __init__(
-        self,
-        settle: float,
-        clock: Callable[[], float] = time.time,
-        steady: Callable[[], float] = time.monotonic,
+        self, settle: float, clock: Callable[[], float] = time.time, steady: Callable[[], float] = time.monotonic
     ) -> None:
         self._settle, self._clock, self._steady = settle, clock, steady
         self._since: dict[Path, tuple[FileState, float]] = {}
@@ -58,15 +50,16 @@ class NewFiles:
         now = self._steady()
         for path in paths:
             state = file_state(path)
+            before = self._since.pop(path, None)
             if state is None:
-                self._since.pop(path, None)
                 continue
-            before = self._since.get(path)
+            size, changed, _ = state
             if before is None or before[0] != state:
                 # a file that was finished before we first looked need not be waited for
-                age = self._clock() - 1e-9 * state.changed if before is None else 0.0
-                self._since[path] = (state, now - max(0.0, age))
-            if state.size > 0 and now - self._since[path][1] >= self._settle:
+                age = self._clock() - 1e-9 * changed if before is None else 0.0
+                before = state, now - max(0.0, age)
+            self._since[path] = before
+            if size > 0 and now - before[1] >= self._settle:
                 stable[path] = state
             else:
                 written.append(path)
@@ -77,7 +70,7 @@ class NewFiles:
 _AGAIN = re.compile(r"[-_. (]*(?:r|rep|repeat|again|copy|wdh|bis|v|no|nr)?[-_. ]*\d{0,4}[a-d]?\)?", re.IGNORECASE)
 #: How near the record must be to a planned set point: load vector and frequency as shares, direction [rad].
 _NEAR_LOAD, _NEAR_LINE, _NEAR_DIRECTION = 0.1, 0.01, math.radians(10.0)
-#: The planned line must hold this share of the oscillationing of the force.
+#: The planned line must hold this share of the oscillation of the force.
 _DRIVEN = 0.5
 
 
@@ -93,26 +86,24 @@ class Unplanned:
 
 def place_record(campaign: Campaign, path: Path, done: frozenset[str]) -> Unplanned:
     """Find the planned run that a record is, or repeats."""
-    file = path.relative_to(campaign.path).as_posix()
-    named = [run for run in campaign.runs if _named_like(path.stem, run.id)]
-    if named:
-        planned: Run | None = max(named, key=lambda run: len(run.id))
-        evidence = "its name"
-    else:
+    file, stem = path.relative_to(campaign.path).as_posix(), path.stem
+    named = [
+        run
+        for run in campaign.runs
+        if stem.lower().startswith(run.id.lower()) and _AGAIN.fullmatch(stem[len(run.id) :])
+    ]
+    planned, evidence = max(named, key=lambda run: len(run.id), default=None), "its name"
+    if planned is None:
         try:
             planned, evidence = _by_content(campaign, path, file), "load and line"
         except RigDataError as error:
             return Unplanned(file, None, "", f"cannot be read ({error.problems[0].what})")
     if planned is None:
         return Unplanned(file, None, "", "no planned run has its load, frequency and direction")
-    run_id = file if any(run.id == path.stem for run in campaign.runs) else path.stem
+    run_id = file if any(run.id == stem for run in campaign.runs) else stem
     relation = "repeats" if planned.id in done else "is"
     text = f"{relation} {planned.id} by {evidence}"
     return Unplanned(file, run_in_file(planned, path, file, run_id), planned.id, text)
-
-
-def _named_like(stem: str, run_id: str) -> bool:
-    return stem.lower().startswith(run_id.lower()) and bool(_AGAIN.fullmatch(stem[len(run_id) :]))
 
 
 def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
@@ -120,8 +111,7 @@ def _by_content(campaign: Campaign, path: Path, file: str) -> Run | None:
     candidates = [run for run in campaign.runs if run.kind in ("dynamic", "locus")]
     if not candidates:
         return None
-    trial = run_in_file(candidates[0], path, file, path.stem)
-    record = trial.vector("force")
+    record = run_in_file(candidates[0], path, file, path.stem).vector("force")
     force = record.values[np.isfinite(record.values).all(axis=1)]
     if len(force) < 16:
         return None
@@ -141,28 +131,13 @@ def _fits(run: Run, force: FloatArray, rate: float) -> bool:
     size = float(np.sqrt((oscillation**2).sum(axis=1).mean()))
     if run.kind != "dynamic":
         return size < 0.02 * point.static_load
-    phasor = _line(oscillation, point.excitation_hz, rate)
-    if np.linalg.norm(phasor) < _DRIVEN * size * math.sqrt(2.0):
+    along = np.linalg.svd(oscillation, full_matrices=False)[2][0]
+    lines = strongest(*amplitude_spectrum(oscillation @ along, rate), 1)
+    if not lines or abs(lines[0].frequency / point.excitation_hz - 1.0) > _NEAR_LINE:
+        return False
+    if lines[0].amplitude < _DRIVEN * size * math.sqrt(2.0):
         return False
     if run.excitation_direction is None:
         return True
-    along = np.linalg.svd(np.stack([phasor.real, phasor.imag]))[2][0]
     away = math.atan2(along[1], along[0]) - run.excitation_direction
     return abs((away + math.pi / 2) % math.pi - math.pi / 2) < _NEAR_DIRECTION
-
-
-def _line(values: FloatArray, frequency: float, rate: float) -> ComplexArray:
-    """Phasor of every column at the strongest bin near a frequency [Hz]."""
-    time = np.arange(len(values)) / rate
-    window = np.hanning(len(values))[:, None]
-    phasors = []
-    for trial in frequency * (1.0 + _NEAR_LINE * np.linspace(-1.0, 1.0, 9)):
-        carrier = np.exp(-2j * math.pi * trial * time)[:, None]
-        phasors.append(2.0 * (values * window * carrier).sum(axis=0) / window.sum())
-    return max(phasors, key=lambda p: float(np.linalg.norm(p)))
-
-
-def unplanned_problems(unplanned: Sequence[Unplanned]) -> list[Problem]:
-    """What to do with records that nothing was found for."""
-    cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
-    return [Problem("warning", record.file, "", record.why, cure) for record in unplanned if record.run is None]

@@ -15,12 +15,12 @@ from rigdata.run import Run
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.dynamic.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
 _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
-_GRAVITY = ("error", "warning", "note")
 #: A finding in so many runs at least, and in this share of those of their kinds, is not the runs' fault.
 _COMMON_RUNS, _COMMON_SHARE = 3, 1 / 3
 
@@ -60,7 +60,7 @@ def judge_states(
     of_run: dict[str, list[Finding]] = {}
     for observation in observations:
         findings = [finding for finding in observation.report.found if id(finding) not in shared]
-        of_run[observation.run.id] = sorted(findings, key=lambda f: _GRAVITY.index(f.problem.severity))
+        of_run[observation.run.id] = sorted(findings, key=lambda f: SEVERITIES.index(f.problem.severity))
     states = []
     for run in runs:
         findings = of_run.get(run.id, [])
@@ -84,19 +84,18 @@ def _forces_repeat(finding: Finding) -> bool:
 
 def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
     """Findings that a third of the runs of their kinds have alike; notes are nobody's trouble."""
-    groups: dict[str, list[Finding]] = {}
-    kinds: dict[str, set[str]] = {}
+    groups: dict[str, list[tuple[Finding, str]]] = {}
     for observation in observations:
         for finding in observation.report.found:
             if finding.problem.severity != "note":
-                groups.setdefault(finding.key, []).append(finding)
-                kinds.setdefault(finding.key, set()).add(observation.run.kind)
+                groups.setdefault(finding.key, []).append((finding, observation.run.kind))
     common = []
-    for key, group in groups.items():
-        affected = {finding.problem.run for finding in group}
-        comparable = sum(observation.run.kind in kinds[key] for observation in observations)
+    for group in groups.values():
+        affected = {finding.problem.run for finding, _ in group}
+        kinds = {kind for _, kind in group}
+        comparable = sum(observation.run.kind in kinds for observation in observations)
         if len(affected) >= _COMMON_RUNS and len(affected) >= _COMMON_SHARE * comparable:
-            common.append(group)
+            common.append([finding for finding, _ in group])
     return common
 
 
@@ -140,10 +139,15 @@ def next_steps(
     """Everything to do, most urgent first."""
     stop, stopped = _stop(states)
     at = _current_run(states)
+    repairs = []
+    for group in common:
+        problem, runs = group[0].problem, tuple(dict.fromkeys(str(f.problem.run) for f in group))
+        text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
+        repairs.append(Step("mend", text, runs))
     return [
         *stop,
         *_repeats([s for s in states if s.run.id not in stopped], at),
-        *(_repair(group) for group in common),
+        *repairs,
         *_more(states, points, within),
         *_next(states, at),
     ]
@@ -151,12 +155,8 @@ def next_steps(
 
 def _current_run(states: Sequence[RunStatus]) -> Run | None:
     """The running test that landed last: what the rig stands at."""
-    last: RunStatus | None = None
-    for status in states:
-        turning = status.run.kind in _TURNING
-        if status.landed and turning and (last is None or status.landed >= last.landed):
-            last = status
-    return last.run if last else None
+    turning = [status for status in reversed(states) if status.landed and status.run.kind in _TURNING]
+    return max(turning, key=lambda status: status.landed).run if turning else None
 
 
 def _set_up(run: Run) -> tuple[float, float, float]:
@@ -222,7 +222,8 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
 
 
 def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
-    now, later = [], []
+    now: list[Step] = []
+    later: list[Step] = []
     for status in states:
         problem = status.first
         if status.state != "repeat" or problem is None:
@@ -235,18 +236,8 @@ def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
         elif same_set_up:
             when = "before you change the load"
         step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
-        if same_set_up or run.kind not in _TURNING:
-            now.append(step)
-        else:
-            later.append(step)
+        (now if same_set_up or run.kind not in _TURNING else later).append(step)
     return now + later
-
-
-def _repair(group: Sequence[Finding]) -> Step:
-    problem = group[0].problem
-    runs = tuple(dict.fromkeys(str(f.problem.run) for f in group))
-    text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
-    return Step("mend", text, runs)
 
 
 def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import datetime
-import time
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -29,13 +30,11 @@ from tpjb_ident.identification.identify import identify
 from tpjb_ident.pivot import PivotSettings, fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.watch.landing import FileState, NewFiles, Unplanned, file_state, place_record, unplanned_problems
+from tpjb_ident.watch.landing import FileState, NewFiles, Unplanned, file_state, place_record
 from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks
 
-#: A whole identification that took longer [s] is made of the points with news alone.
-_PATIENCE = 30.0
-#: What a record or a campaign that is not complete yet may raise.
-_REFUSALS = (RigError, TpjbError, np.linalg.LinAlgError)
+#: Share of the usual length below which a record was cut off.
+_WHOLE = 0.8
 
 
 @dataclass(frozen=True)
@@ -51,75 +50,6 @@ class Measured:
     def points(self) -> tuple[PointResult, ...]:
         """Operating points with an estimate."""
         return () if self.identification is None else self.identification.points
-
-
-@dataclass
-class Measuring:
-    """Makes results of the runs so far, and only what has news."""
-
-    settings: IdentifySettings
-    pad_angles: tuple[float, ...] = ()
-    store: RunStore | None = None
-    _took: float = 0.0
-    _observed: dict[str, frozenset[tuple[str, object]]] = field(default_factory=dict)
-    _last: Measured = field(default_factory=Measured)
-
-    def update(self, campaign: Campaign, marks: dict[str, object]) -> Measured:
-        """Results of a campaign of the runs that count; `marks` by run change with its record."""
-        refusals: list[str] = []
-        last = self._last
-        identification, curves, polygon = self._identify(campaign, marks, refusals), last.curves, last.polygon
-        if self.pad_angles and self._news(campaign, "dry_pivot", marks):
-            curves = ()
-            if campaign.of_kind("dry_pivot"):
-                try:
-                    curves = fit_pivots(campaign, self.pad_angles, PivotSettings(on_refusal="skip"))
-                except _REFUSALS as error:
-                    refusals.append(f"pivots: {error}")
-        if self.pad_angles and self._news(campaign, "clearance", marks):
-            polygon = None
-            if campaign.of_kind("clearance"):
-                try:
-                    polygon = measure_clearance(campaign, self.pad_angles)
-                except _REFUSALS as error:
-                    refusals.append(f"clearance: {error}")
-        self._last = Measured(identification, curves, polygon, tuple(refusals))
-        return self._last
-
-    def _news(self, campaign: Campaign, kind: str, marks: dict[str, object]) -> set[str]:
-        """Ids of runs of a kind that came, changed or went since the last time."""
-        current = frozenset((run.id, marks.get(run.id)) for run in campaign.of_kind(kind))
-        before = self._observed.get(kind, frozenset())
-        self._observed[kind] = current
-        return {run_id for run_id, _ in current ^ before}
-
-    def _identify(self, campaign: Campaign, marks: dict[str, object], refusals: list[str]) -> Identification | None:
-        """Coefficients of all points, or of those with news where all would take too long."""
-        news, last = self._news(campaign, "dynamic", marks), self._last.identification
-        points = {run.point for run in campaign.of_kind("dynamic")}
-        if not points or not news:
-            return last if points else None
-        selected = campaign
-        if self._took > _PATIENCE and last is not None:
-            changed = {run.point for run in campaign.of_kind("dynamic") if run.id in news}
-            runs = [run for run in campaign.runs if run.point in changed or run.kind != "dynamic"]
-            selected = replace(campaign, runs=tuple(runs))
-        began = time.monotonic()
-        try:
-            identification = identify(selected, self.settings, store=self.store)
-        except _REFUSALS as error:
-            refusals.append(f"identification: {error}")
-            return last
-        if selected is campaign or last is None:
-            self._took = time.monotonic() - began
-            return identification
-        # the new points in the place of the old ones of the same set point
-        joined = {p.point: p for p in (*last.points, *identification.points) if p.point in points}
-        return replace(identification, points=tuple(joined[point] for point in sorted(joined)))
-
-
-#: Share of the usual length below which a record was cut off.
-_WHOLE = 0.8
 
 
 @dataclass(frozen=True)
@@ -142,7 +72,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True)
-class _Observed:
+class _Record:
     """A record as it was read; `mark` changes when its file or its description does."""
 
     mark: object
@@ -154,16 +84,18 @@ class _Observed:
 
 @dataclass
 class Watcher:
-    """Follows one campaign folder."""
+    """Follows one campaign folder; what it made of files is made anew when they change."""
 
     folder: Path
     files: NewFiles
-    measuring: Measuring
+    settings: IdentifySettings
+    pad_angles: tuple[float, ...] = ()
+    store: RunStore | None = None
     within: float | None = None
     _campaign: Campaign | None = None
     _manifest: FileState | None = None
-    _observed: dict[str, _Observed] = field(default_factory=dict)
-    _placed: dict[Path, tuple[FileState, Unplanned]] = field(default_factory=dict)
+    _records: dict[str, _Record] = field(default_factory=dict)
+    _made: dict[object, tuple[object, Any]] = field(default_factory=dict)
     _last: tuple[object, ...] = ()
 
     def look(self) -> Snapshot | None:
@@ -180,12 +112,22 @@ class Watcher:
         if state == self._last:
             return None
         done = frozenset(run.id for run in campaign.runs if planned[run.file] in stable)
-        placed = self._place(campaign, unlisted, stable, done)
+        placed = []
+        for path in filter(stable.__contains__, unlisted):
+            mark = stable[path], self._manifest
+            make = functools.partial(place_record, campaign, path, done)
+            placed.append(self._unless_changed(path, mark, make))
         runs = [*campaign.runs, *(record.run for record in placed if record.run is not None)]
         new = self._observe(runs, stable)
         # a record that changed while it was read is looked at again: the next look must not take this one for it
         self._last = state if all(file_state(p) == s for p, s in stable.items()) else ()
         return self._snapshot(campaign, runs, placed, problems, {p.resolve() for p in written}, new)
+
+    def _unless_changed(self, key: object, mark: object, make: Callable[[], Any]) -> Any:
+        """What was made last time, unless its mark is another one now."""
+        if key not in self._made or self._made[key][0] != mark:
+            self._made[key] = mark, make()
+        return self._made[key][1]
 
     def _is_within(self, path: Path, problems: list[Problem]) -> bool:
         """Whether a record is in the folder: a link that leads out of it may appear at any time, and is not opened."""
@@ -207,8 +149,7 @@ class Watcher:
 
     def _opened(self) -> tuple[Campaign, list[Problem]]:
         """The campaign by its manifest; by the last one that could be read while the manifest is being edited."""
-        path = self.folder / MANIFEST_NAME
-        state = file_state(path)
+        state = file_state(self.folder / MANIFEST_NAME)
         if self._campaign is not None and state == self._manifest:
             return self._campaign, []
         try:
@@ -219,41 +160,26 @@ class Watcher:
             what = "cannot be read as it is; the watch goes on with the last one that could be"
             problem = Problem("warning", MANIFEST_NAME, "", what, "Finish editing it")
             return self._campaign, [problem, *error.problems]
-        self._placed.clear()
         return self._campaign, []
-
-    def _place(
-        self, campaign: Campaign, unlisted: list[Path], stable: dict[Path, FileState], done: frozenset[str]
-    ) -> list[Unplanned]:
-        placed = []
-        for path in unlisted:
-            state = stable.get(path)
-            if state is None:
-                continue
-            if path not in self._placed or self._placed[path][0] != state:
-                self._placed[path] = (state, place_record(campaign, path, done))
-            placed.append(self._placed[path][1])
-        return placed
 
     def _observe(self, runs: list[Run], stable: dict[Path, FileState]) -> list[str]:
         """Read what is new; forget what is gone. Ids of the runs with news."""
         new = []
-        observed: dict[str, _Observed] = {}
+        records: dict[str, _Record] = {}
         for run in runs:
             path = self.folder / run.file
             state = stable.get(path)
             if state is None:
                 continue
             mark = (state, run.kind, run.point, run.excitation_direction, run.pad, run.branch, repr(run.channels))
-            before = self._observed.get(run.id)
-            if before is not None and before.mark == mark:
-                observed[run.id] = before
-                continue
-            record = _Observed(mark, observe(run), _iso(state), _digest(path), seconds(run))
-            if file_state(path) == state and self._is_within(path, []):
-                observed[run.id] = record
+            record = self._records.get(run.id)
+            if record is None or record.mark != mark:
+                record = _read(run, path, mark)
+                if file_state(path) != state or not self._is_within(path, []):
+                    continue
                 new.append(run.id)
-        self._observed = observed
+            records[run.id] = record
+        self._records = records
         return new
 
     def _snapshot(
@@ -265,53 +191,77 @@ class Watcher:
         written: set[Path],
         new: list[str],
     ) -> Snapshot:
-        landed = tuple(run for run in runs if run.id in self._observed)
-        records = [self._observed[run.id] for run in landed]
+        landed = tuple(run for run in runs if run.id in self._records)
+        records = [self._records[run.id] for run in landed]
         observations, _ = judged(replace(campaign, runs=landed), [record.observation for record in records])
         _name_cut_records(observations, [record.seconds for record in records])
-        when = {run.id: record.landed for run, record in zip(landed, records, strict=True)}
-        planned = frozenset(run.id for run in campaign.runs)
         open_runs = frozenset(run.id for run in runs if (self.folder / run.file).resolve() in written)
         done = {record.like for record in placed if record.run is not None}
-        listed = [run for run in runs if run.id in self._observed or run.id in open_runs or run.id not in done]
-        states, common = judge_states(listed, observations, when, planned, open_runs)
-        good = tuple(status.run for status in states if status.counts)
-        marks = {run_id: record.mark for run_id, record in self._observed.items()}
-        measured = self.measuring.update(replace(campaign, runs=good), marks)
-        steps = next_steps(states, common, measured.points, self.within)
-        lacks = plan_lacks(runs, len(self.measuring.pad_angles))
+        states, common = judge_states(
+            [run for run in runs if run.id in self._records or run.id in open_runs or run.id not in done],
+            observations,
+            {run.id: record.landed for run, record in zip(landed, records, strict=True)},
+            frozenset(run.id for run in campaign.runs),
+            open_runs,
+        )
+        measured = self._measured(replace(campaign, runs=tuple(status.run for status in states if status.counts)))
+        cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
+        unknown = [Problem("warning", record.file, "", record.why, cure) for record in placed if record.run is None]
         return Snapshot(
             campaign=campaign,
             states=tuple(states),
-            steps=tuple(steps),
-            lacks=tuple(lacks),
+            steps=tuple(next_steps(states, common, measured.points, self.within)),
+            lacks=tuple(plan_lacks(runs, len(self.pad_angles))),
             measured=measured,
-            problems=(*problems, *campaign.notes, *unplanned_problems(placed)),
+            problems=(*problems, *campaign.notes, *unknown),
             new=tuple(new),
             hashes={run.file: record.digest for run, record in zip(landed, records, strict=True)},
             placed=tuple(placed),
         )
 
+    def _measured(self, good: Campaign) -> Measured:
+        """Results of the runs that count, each made anew where its runs have news."""
+        results: dict[str, Any] = {}
+        refusals: list[str] = []
+        for kind, name, measure in (
+            ("dynamic", "identification", lambda: identify(good, self.settings, store=self.store)),
+            ("dry_pivot", "pivots", lambda: fit_pivots(good, self.pad_angles, PivotSettings(on_refusal="skip"))),
+            ("clearance", "clearance", lambda: measure_clearance(good, self.pad_angles)),
+        ):
+            runs = good.of_kind(kind)
+            if not runs or not (self.pad_angles or kind == "dynamic"):
+                continue
+            mark = frozenset((run.id, self._records[run.id].mark) for run in runs)
+            former = self._made.get(name, (None, (None, "")))[1][0]
+            result, refusal = self._unless_changed(
+                name, mark, functools.partial(_unless_refused, name, measure, former)
+            )
+            results[kind] = result
+            refusals += [refusal] if refusal else []
+        curves = results.get("dry_pivot") or ()
+        return Measured(results.get("dynamic"), curves, results.get("clearance"), tuple(refusals))
 
-def _iso(state: FileState) -> str:
-    """Time of the last change, in ISO form, of this place."""
-    changed = datetime.datetime.fromtimestamp(1e-9 * state.changed, datetime.UTC)
-    return changed.astimezone().isoformat(timespec="milliseconds")
 
-
-def _digest(path: Path) -> str:
+def _unless_refused(name: str, measure: Callable[[], Any], former: Any) -> tuple[Any, str]:
+    """A result; of records that are not complete yet what they gave before, and why."""
     try:
-        return sha256(path)
+        return measure(), ""
+    except (RigError, TpjbError, np.linalg.LinAlgError) as error:
+        return former, f"{name}: {error}"
+
+
+def _read(run: Run, path: Path, mark: tuple[Any, ...]) -> _Record:
+    """Read a record: what it shows, when it landed, in ISO form of this place, its SHA-256 and its length [s]."""
+    changed = datetime.datetime.fromtimestamp(1e-9 * mark[0][1], datetime.UTC)
+    try:
+        digest = sha256(path)
     except OSError:  # gone or locked again: its state tells
-        return "missing"
-
-
-def seconds(run: Run) -> float:
-    """Length of a record [s]; 0 where it cannot be told."""
+        digest = "missing"
     try:
-        return run.length / run.sample_rate
+        seconds = run.length / run.sample_rate
     except RigDataError:
-        return 0.0
+        seconds = 0.0
+    return _Record(mark, observe(run), changed.astimezone().isoformat(timespec="milliseconds"), digest, seconds)
 
 
 def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[float]) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tpjb_ident.cli.common.command import Command, campaign_place, command
-from tpjb_ident.cli.common.options import DEMO, CampaignPath
+from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
+from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.rounding import counted
 
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 KINDS = ("dynamic", "locus", "clearance", "dry_pivot")
 #: From as many problems of one sort on they are counted, not listed.
 ALIKE = 4
-SEVERITIES = ("error", "warning", "note")
 
 
 def span(*values: float) -> str:
@@ -38,7 +39,7 @@ RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {freque
 
 
 @command(f"tpjb check {DEMO}", f"tpjb check {DEMO} --json > findings.json")
-def check(c: Command, campaign: CampaignPath) -> None:
+def check(c: Command, campaign: Path) -> None:
     """Report every problem of a campaign, not just the first.
 
     Reads all records. Writes check.json. Exit code 2 if there is an error that makes a run unusable.
@@ -69,7 +70,6 @@ def check(c: Command, campaign: CampaignPath) -> None:
         c.print(line)
     if source is not None:
         _show_coverage(c, source)
-    c.print(f"Results: {c.target}")
     if any("open (??)" in p.what for p in problems):
         c.next("init", path if path.is_dir() else path.parent, "--update")
     else:

@@ -2,48 +2,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, refuse_impossible
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    BearingOption,
-    Coefficients,
-    EffectsFile,
-    MaybeCampaign,
-    Method,
-    Norm,
-    ReadingError,
-    Thermal,
-    named,
-    refuse_unknown,
-)
-from tpjb_ident.columns import Column, amount, words
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, refuse_impossible
+from tpjb_ident.cli.options import DEMO, named, refuse_unknown
+from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import percent
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
-    from tpjb_ident.compare.comparison import CompareSettings, Comparison
-    from tpjb_ident.compare.difference import Difference, Side
-
-Other = Annotated[
-    Path | None, typer.Argument(metavar="[OTHER]", help="A second campaign, or a folder of results: what changed.")
-]
-Pivots = Annotated[
-    str, typer.Option("--pivots", help='Pivot models to compare: some of "rigid, kirk, kirk-secant, measured".')
-]
-
-
-Predictions = Annotated[
-    list[Path] | None,
-    typer.Option("--prediction", metavar="TABLE.csv", help="Another program's K and C as well; may be repeated."),
-]
+    from tpjb_ident.compare.comparison import Comparison
+    from tpjb_ident.compare.difference import Side
+    from tpjb_ident.compare.predictions import Progress
 
 
 @command(
@@ -54,17 +30,17 @@ Predictions = Annotated[
 )
 def compare(
     c: Command,
-    campaign: MaybeCampaign = None,
-    other: Other = None,
-    bearing: BearingOption = None,
-    pivots: Pivots = "rigid, kirk, measured",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    coefficients: Coefficients = None,
-    reading_error: ReadingError = None,
-    method: Method = "mm-eiv",
-    norm: Norm = None,
-    prediction: Predictions = None,
+    campaign: Path | None = None,
+    other: Path | None = None,
+    bearing: Path | None = None,
+    pivots: str = "rigid, kirk, measured",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    coefficients: Path | None = None,
+    reading_error: str | None = None,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    prediction: list[Path] | None = None,
 ) -> None:
     """Compare prediction and measurement, or two campaigns, with a report.
 
@@ -79,73 +55,60 @@ def compare(
         return
     c.options["pivots"] = variants = _variants(pivots)
     model = model_settings(c, "kirk", thermal, effects)
-    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, comparison_frame, model_side
+    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import counts_from_measured
-    from tpjb_ident.compare.tables import read_predictions, with_predictions
+    from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
     settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     tables = read_predictions([c.file(path) for path in prediction or ()])
     source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
     refuse_impossible(settings.effects, effects, drawing)
-    typed = str(campaign or f"--coefficients {coefficients}")
-    with c.results() as folder:
-        if coefficients is not None:
-            from tpjb_ident.report.comparison_page import write_report
+    with c.results():
+        job = background_job(model_side, source, drawing, settings) if coefficients is None else nullcontext()
+        with job as ahead, c.progress("comparing") as show:
+            import tpjb_ident.report.comparison_page  # noqa: F401  (loaded while the model is at work)
 
-            result = with_predictions(_compared_table(c, coefficients, drawing, settings, reading_error), tables)
-            c.table("comparison", comparison_frame(result))
-            following = next_command(result, typed, bearing)
-            write_report(folder, result, named(c.options), c.inputs, following)
-        else:
-            with background_job(model_side, source, drawing, settings) as ahead, c.progress("comparing") as show:
-                from tpjb_ident.report.comparison_page import write_report  # loaded while the model is at work
-
+            if coefficients is None:
                 settings = replace(settings, identify=identify_settings(c, source, method, norm))
-                result = with_predictions(compare_campaign(source, drawing, settings, show, ahead), tables)
-                following = next_command(result, typed, bearing)
-                show("writing tables", 0, 2)
-                write_comparison(c, result)
-                show("drawing figures", 1, 2)
-                write_report(folder, result, named(c.options), c.inputs, following)
+                result = compare_campaign(source, drawing, settings, show, ahead)
+            else:
+                share = parse_share(reading_error, "--reading-error")
+                result = compare_table(coefficients, drawing, settings, share, show)
+            result = with_predictions(result, tables)
+            following = next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
+            write_comparison(c, result, show, following)
     show_comparison(c, result, following)
-    c.print(f"Report: {c.target / 'report.html'}")
     refuse_comparison(result)
-
-
-def _compared_table(
-    c: Command, path: Path, drawing: Bearing, settings: CompareSettings, reading_error: str | None
-) -> Comparison:
-    """Predictions held against a table of coefficients."""
-    from tpjb_ident.compare.tables import compare_table
-
-    share = parse_share(reading_error, "--reading-error")
-    with c.progress("comparing") as show:
-        return compare_table(path, drawing, settings, share, show)
 
 
 def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, method: str, norm: str | None) -> None:
     """Hold two campaigns against each other."""
-    from tpjb_ident.compare.difference import difference_of
+    from tpjb_ident.compare.difference import difference_of, difference_sentences
 
     with c.results() as folder:
-        a, b = (_side(c, path, bearing, method, norm) for path in paths)
-        difference = difference_of(a, b)
+        difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
         from tpjb_ident.report.difference_page import write_difference_report
 
-        for name in ("points", "pivots", "clearance"):
-            frame = getattr(difference, name)
-            if len(frame):
-                c.table("difference" if name == "points" else f"{name.rstrip('s')}_difference", frame)
-        following = f"tpjb diagnose {paths[1]}" if b.campaign is not None else f"tpjb view {c.target}"
+        for name, frame in difference.tables.items():
+            c.table(name, frame)
+        on_records = difference.b.campaign is not None
+        following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
         write_difference_report(folder, difference, named(c.options), c.inputs, following)
-    _show_difference(c, difference)
-    c.print(f"Report: {c.target / 'report.html'}")
-    c.next(following)
+    rows = []
+    for row in difference.points.to_dict("records"):
+        judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}
+        changed = ", ".join(name for name, verdict in judged.items() if verdict == "yes")
+        counts = Counter(judged.values())
+        row_counts = [str(counts[verdict]) for verdict in ("yes", "no", "cannot tell")]
+        rows.append([row["static_load_N"], row["excitation_Hz"], *row_counts, changed])
+    columns = ["load {load}", "exc. {frequency}", "changed", "same", "cannot tell", *words("which")]
+    title = f"{difference.a.name} and {difference.b.name}"
+    with c.conclusion(difference_sentences(difference), following):
+        c.show(title, columns, rows, file="difference.csv")
     if difference.points.empty:
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
-    bad = difference.untrusted_points()
-    if bad:
+    if bad := difference.untrusted_points():
         raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
 
 
@@ -157,32 +120,11 @@ def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str |
         c.file(path / "coefficients.csv")
         return recorded_side(path)
     from tpjb_ident.compare.static_tests import measure_static
-    from tpjb_ident.identification.identify import identify
 
     campaign = c.open(path)
-    settings = identify_settings(c, campaign, method, norm)
-    with c.progress(f"identifying {campaign.id}") as show:
-        identification = identify(campaign, settings, show)
+    identification = identified(c, campaign, method, norm)
     drawing = c.bearing_of(campaign, bearing) if bearing is not None or campaign.bearing_text else None
     return measured_side(campaign, identification, None if drawing is None else measure_static(campaign, drawing))
-
-
-def _show_difference(c: Command, difference: Difference) -> None:
-    """Print what changed: sentences, and how many coefficients of every point."""
-    from tpjb_ident.compare.difference import difference_sentences
-
-    first, *more = difference_sentences(difference)
-    c.print(first)
-    rows = []
-    for row in difference.points.to_dict("records"):
-        judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}
-        changed = [name for name, verdict in judged.items() if verdict == "yes"]
-        cells = [str(list(judged.values()).count(verdict)) for verdict in ("yes", "no", "cannot tell")]
-        rows.append([row["static_load_N"], row["excitation_Hz"], *cells, ", ".join(changed)])
-    columns = [Column("load {load}"), Column("exc. {frequency}"), "changed", "same", "cannot tell", *words("which")]
-    c.show(f"{difference.a.name} and {difference.b.name}", columns, rows, file="difference.csv")
-    for line in more:
-        c.print(line)
 
 
 def _variants(text: str) -> tuple[str, ...]:
@@ -196,14 +138,17 @@ def _variants(text: str) -> tuple[str, ...]:
     return names
 
 
-def write_comparison(c: Command, result: Comparison) -> None:
-    """Write every table and pivots.toml."""
-    from tpjb_ident.compare.comparison import comparison_frame, locus_frame
+def write_comparison(c: Command, result: Comparison, show: Progress, following: str, note: str = "") -> None:
+    """Write every table, pivots.toml and the report."""
+    from tpjb_ident.compare.comparison import locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
+    from tpjb_ident.report.comparison_page import write_report
 
-    write_identification(c, result.identification)
-    c.table("comparison", comparison_frame(result))
+    show("writing tables", 0, 2)
+    if result.has_records:
+        write_identification(c, result.identification)
+    c.table("comparison", result.table)
     if result.curves:
         c.table("pivot_curves", pivot_table(result.curves, formula=printed_formula(result.bearing)))
         write_pivots(c.folder / "pivots.toml", result.curves, result.campaign.id)
@@ -212,33 +157,26 @@ def write_comparison(c: Command, result: Comparison) -> None:
     if result.locus is not None:
         c.table("locus", result.locus.to_frame())
         c.table("locus_comparison", locus_frame(result))
+    show("drawing figures", 1, 2)
+    write_report(c.folder, result, named(c.options), c.inputs, following, note)
 
 
 def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
-    """Print what to conclude, the command that comes next, and the median deviations with what belongs to them."""
-    from tpjb_ident.compare.comparison import comparison_frame
-    from tpjb_ident.compare.summary import deviations, summary_sentences
-    from tpjb_ident.rounding import percent
+    """Print what to conclude, the command that comes next, and how far each pivot model is off."""
+    from tpjb_ident.compare.summary import agreements, summary_sentences
 
-    frame = comparison_frame(result)
-    medians = {variant.name: [variant.name] for variant in result.variants}
-    for deviation in deviations(result, frame):
-        medians[deviation.pivots].append(percent(deviation.median))
-    conclusion, *more = summary_sentences(result, frame)
-    c.print(conclusion)
-    if following:
-        c.next(following)
-    columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy"]
-    c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, list(medians.values()))
-    for line in more:
-        c.print(line)
+    rows = [[a.pivots, *(percent(d.median) for d in a.deviations), a.inside] for a in agreements(result.table)]
+    columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy", "inside"]
+    with c.conclusion(summary_sentences(result), following):
+        c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
 
 
 def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
     """Command that comes next: a diagnosis where the model is off, an export where it is not."""
-    from tpjb_ident.compare.summary import deviations, worth_a_diagnosis
+    from tpjb_ident.compare.summary import agreements, closest
 
-    if worth_a_diagnosis(deviations(result)):
+    best = closest(agreements(result.table))
+    if best is not None and best.is_off:
         if result.bearing is None:
             return ""
         return f"tpjb diagnose {source}" + (f" --bearing {bearing}" if bearing else "")
@@ -247,9 +185,7 @@ def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
 
 def refuse_comparison(result: Comparison) -> None:
     """End with exit code 3 if a point is not to be trusted, on either side."""
-    from tpjb_ident.compare.coefficient_table import TableSource
-
-    if not isinstance(result.campaign, TableSource):
+    if result.has_records:
         refuse_untrusted(result.identification)
     bad = []
     for variant in result.variants:

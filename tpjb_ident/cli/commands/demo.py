@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import named
 from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
@@ -34,12 +33,11 @@ def demo(c: Command) -> None:
 
     path = _sample("demo.h5")
     c.options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
-    with c.results() as folder:
+    with c.results():
         campaign = c.open(path)
         bearing = c.bearing_of(campaign)
         with background_job(model_side, campaign, bearing, CompareSettings()) as model, c.progress("demo") as show:
             from tpjb_ident.check.campaign import check_campaign  # loaded while the model is at work
-            from tpjb_ident.report.comparison_page import write_report
 
             show("reading and checking every record", 0, 1)
             summary = check_summary(c, campaign.id, check_campaign(path), campaign)
@@ -47,13 +45,10 @@ def demo(c: Command) -> None:
             result = compare_campaign(campaign, bearing, progress=show, model=model)
             measured = result.variant("measured").points
             c.table("prediction", prediction_frame([p for p in measured if isinstance(p, PointPrediction)]))
-            show("writing tables", 0, 2)
-            write_comparison(c, result)
-            show("drawing figures", 1, 2)
             truth = json.loads(_sample("demo.truth.json").read_text(encoding="utf-8"))
             error = 100 * _largest_error(result, truth)
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
-            write_report(folder, result, named(c.options), c.inputs, _NEXT, note)
+            write_comparison(c, result, show, _NEXT, note)
     counts = summary["counts"]
     show_comparison(c, result)
     c.print(
@@ -61,7 +56,6 @@ def demo(c: Command) -> None:
         f"{counted(counts['warning'], 'warning')}."
     )
     c.print(note)
-    c.print(f"Report: {(c.target / 'report.html').resolve()}")
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     c.next("view", c.target)
     refuse_comparison(result)

@@ -5,24 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.common.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    BearingOption,
-    Coefficients,
-    EffectsFile,
-    MaybeCampaign,
-    ReadingError,
-    Thermal,
-    WorkerCount,
-    named,
-)
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import refuse_untrusted, write_identification
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
+from tpjb_ident.cli.options import DEMO, named
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
@@ -32,34 +20,21 @@ if TYPE_CHECKING:
     from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
 
-Pivots = Annotated[str, typer.Option("--pivots", help="Where to start from: kirk, rigid, measured or a pivots.toml.")]
-ModelTolerance = Annotated[
-    float | None,
-    typer.Option("--model-tolerance", help="What the model is trusted to, share of the direct coefficients [1.5 %]."),
-]
-ToleranceOptions = Annotated[
-    list[str] | None,
-    typer.Option("--tolerance", metavar="NAME=VALUE", help="How well something is known: viscosity=4%; repeatable."),
-]
-Library = Annotated[
-    Path | None, typer.Option("--library", metavar="FILE.py", help="Effects of your own; the file's code is run.")
-]
-
 
 @command(f"tpjb diagnose {DEMO}", f"tpjb diagnose {DEMO} --pivots measured --out found")
 def diagnose(
     c: Command,
-    campaign: MaybeCampaign = None,
-    bearing: BearingOption = None,
-    pivots: Pivots = "kirk",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    model_tolerance: ModelTolerance = None,
-    tolerance: ToleranceOptions = None,
-    coefficients: Coefficients = None,
-    reading_error: ReadingError = None,
-    library: Library = None,
-    workers: WorkerCount = None,
+    campaign: Path | None = None,
+    bearing: Path | None = None,
+    pivots: str = "kirk",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    model_tolerance: float | None = None,
+    tolerance: list[str] | None = None,
+    coefficients: Path | None = None,
+    reading_error: str | None = None,
+    library: Path | None = None,
+    workers: int | None = None,
 ) -> None:
     """Name what the model lacks where it and the rig disagree.
 
@@ -81,29 +56,27 @@ def diagnose(
     source, drawing = open_source(c, campaign, coefficients, bearing)
     refuse_impossible(model.effects, effects, drawing)
     with c.results() as folder:
-        if coefficients is not None:
-            error = parse_share(reading_error, "--reading-error")
-            with c.progress("diagnosing") as show:
-                result = diagnose_table(coefficients, drawing, baseline, settings, error, show)
-        else:
-            from tpjb_ident.compare.static_tests import measure_static
-            from tpjb_ident.runtime.executors import background_job, cores, forks
+        from tpjb_ident.compare.static_tests import measure_static
+        from tpjb_ident.runtime.executors import background_job, cores, forks
 
-            # in a copy of this process, while it identifies
-            is_quicker = workers != 1 and cores() > 1 and forks()
-            job = background_job(measure_static, source, drawing) if is_quicker else nullcontext()
-            with job as ahead, c.progress("diagnosing") as show:
+        is_quicker = coefficients is None and workers != 1 and cores() > 1 and forks()  # in a copy of this process
+        job = background_job(measure_static, source, drawing) if is_quicker else nullcontext()
+        with job as ahead, c.progress("diagnosing") as show:
+            if coefficients is None:
                 result = diagnose_campaign(source, drawing, baseline, settings, show, ahead)
+            else:
+                error = parse_share(reading_error, "--reading-error")
+                result = diagnose_table(coefficients, drawing, baseline, settings, error, show)
         if result.identification is not None:
             write_identification(c, result.identification)
-        _write_verdict(folder, baseline, result.diagnosis.verdict)
+        verdict = result.diagnosis.verdict
+        _write_verdict(folder, baseline, verdict)
         from tpjb_ident.report.diagnosis_page import next_command, write_diagnosis_report
 
-        typed = campaign or f"--coefficients {coefficients}"
-        following = next_command(str(typed), str(bearing or ""), result.diagnosis.verdict, str(c.target))
+        typed = str(campaign or f"--coefficients {coefficients}")
+        following = next_command(typed, str(bearing or ""), verdict, str(c.target))
         write_diagnosis_report(folder, source, result, named(c.options), c.inputs, following)
     _show_verdict(c, source.id, result, following)
-    c.print(f"Report: {c.target / 'report.html'}")
     if result.identification is not None:
         refuse_untrusted(result.identification)
 
@@ -126,11 +99,11 @@ def _settings(model_tolerance: float | None, tolerances: Sequence[str], workers:
 
 
 def _write_verdict(folder: Path, baseline: Baseline, verdict: Verdict) -> None:
-    before, measured = baseline.effects, baseline.from_measured
+    before = baseline.effects, baseline.from_measured
     write_text(folder / "diagnosis.json", verdict.to_json())
-    write_text(folder / "updated.effects.toml", verdict.effects_toml(before, measured))
+    write_text(folder / "updated.effects.toml", verdict.effects_toml(*before))
     if verdict.behaves_like:
-        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(before, measured))
+        write_text(folder / "with-terms.effects.toml", verdict.terms_toml(*before))
 
 
 def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: str) -> None:
@@ -140,11 +113,7 @@ def _show_verdict(c: Command, name: str, result: CampaignDiagnosis, following: s
 
     verdict = result.diagnosis.verdict
     deviations = median_deviations(before_and_after(result.diagnosis, result.identification))
-    conclusion, *more = verdict_sentences(name, verdict, deviations)
-    c.print(conclusion)
-    c.next(following)
-    for line in more:
-        c.print(line)
-    if verdict.effects:
-        columns = [*words("effect", "parameter"), "value"]
-        c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict))
+    with c.conclusion(verdict_sentences(name, verdict, deviations), following):
+        if verdict.effects:
+            columns = [*words("effect", "parameter"), "value"]
+            c.show("Effects, with 95 % intervals", columns, parameter_rows(verdict))

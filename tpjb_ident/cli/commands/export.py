@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import identify_settings
-from tpjb_ident.cli.common.options import DEMO, Method, Norm, one_of
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import identified
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
 from tpjb_ident.rounding import counted
@@ -20,15 +18,6 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from tpjb_ident.exports.formats import Chosen
 
-Source = Annotated[
-    Path,
-    typer.Argument(metavar="CAMPAIGN|DIR|BEARING.toml", help="A campaign (identified first), results, or a bearing."),
-]
-Force = Annotated[
-    bool, typer.Option("--force", help="Also write points that are not to be trusted, marked; exit code 3 stays.")
-]
-Ross = Annotated[int | None, typer.Option(metavar="2|3", help="Version of ROSS; default: the installed one, else 3.")]
-
 
 @command(
     "tpjb export tpjb-identify-out --to ross",
@@ -38,12 +27,12 @@ Ross = Annotated[int | None, typer.Option(metavar="2|3", help="Version of ROSS; 
 )
 def export(
     c: Command,
-    source: Source,
-    to: Annotated[str, typer.Option("--to", help=f"{', '.join(FORMATS)}.", autocompletion=one_of(*FORMATS))],
-    method: Method = "mm-eiv",
-    norm: Norm = None,
-    force: Force = False,
-    ross: Ross = None,
+    source: Path,
+    to: str,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    force: bool = False,
+    ross: int | None = None,
 ) -> None:
     """Write coefficients as other programs read them.
 
@@ -59,8 +48,7 @@ def export(
     with c.results(f"export {to}") as folder:
         written = write_export(frame, to, folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
-    c.print(str(written))
-    c.print(f"Results: {c.target}: {', '.join(written.files[:4])}{' ..' * (len(written.files) > 4)}")
+    c.print(f"{written}: {', '.join(written.files[:4])}{' ..' * (len(written.files) > 4)}")
     c.next("verify", c.target)
     if FORMATS[to]:
         c.note(FORMATS[to])
@@ -89,9 +77,5 @@ def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tu
     path = result_table(source)
     if path is not None:
         return read_table(c.file(path, refuses_changed=True)), path.parent.resolve().name
-    from tpjb_ident.identification.identify import identify as run_identification
-
     campaign = c.open(source)
-    settings = identify_settings(c, campaign, method, norm)
-    with c.progress("identifying") as show:
-        return run_identification(campaign, settings, show).to_frame(), campaign.id
+    return identified(c, campaign, method, norm).to_frame(), campaign.id

@@ -6,35 +6,22 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.identification import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import (
     identify_settings,
     refuse_untrusted,
     show_identification,
     write_identification,
 )
-from tpjb_ident.cli.common.inputs import parse_amount, parse_values
-from tpjb_ident.cli.common.options import (
-    DEMO,
-    CampaignPath,
-    Delays,
-    Lines,
-    Method,
-    Norm,
-    Scheduler,
-    WorkerCount,
-    refuse_unknown,
-)
+from tpjb_ident.cli.inputs import parse_amount, parse_values
+from tpjb_ident.cli.options import DEMO, refuse_unknown
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rigdata.campaign import Campaign
     from tpjb_ident.dynamic.plain import PlainSettings
     from tpjb_ident.dynamic.runs.run_store import RunStore
@@ -43,36 +30,23 @@ if TYPE_CHECKING:
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
 WORTH_PROCESSES, WORTH_COPIES, MOST_COPIES = 100 * 2**20, 12, 4
-PlainWay = Annotated[
-    bool, typer.Option("--plain", help="Also write plain.csv: Eq. (15) by statsmodels' RLM, nothing corrected.")
-]
-KeepR = Annotated[bool, typer.Option("--keep-r", help="Write the R matrices of Eq. (15) too: r_matrices.h5.")]
-Window = Annotated[str, typer.Option("--window", metavar="TIME", help="Window length of --plain and --keep-r.")]
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
-#: What worker processes need, imported once for all of them.
-PRELOAD = (
-    "tpjb_ident.dynamic.runs.run_jobs",
-    "rigdata.readers.hdf5.reader",
-    "rigdata.readers.file_reader",
-    "rigdata.readers.text.csv",
-    "h5py",
-)
 
 
 @command(f"tpjb identify {DEMO}", f"tpjb identify {DEMO} --method rlm --norm tukey --out rlm")
 def identify(
     c: Command,
-    campaign: CampaignPath,
-    method: Method = "mm-eiv",
-    norm: Norm = None,
-    lines: Lines = None,
-    delay: Delays = None,
-    workers: WorkerCount = None,
-    scheduler: Scheduler = None,
-    plain: PlainWay = False,
-    keep_r: KeepR = False,
-    window: Window = "0.5 s",
+    campaign: Path,
+    method: str = "mm-eiv",
+    norm: str | None = None,
+    lines: str | None = None,
+    delay: list[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    plain: bool = False,
+    keep_r: bool = False,
+    window: str = "0.5 s",
 ) -> None:
     """Identify stiffness and damping with 95 % intervals.
 
@@ -90,7 +64,7 @@ def identify(
     count, start = _worker_count(source, workers, scheduler)
     with c.results() as folder:
         with (
-            open_workers(count, scheduler, PRELOAD, start) as team,
+            open_workers(count, scheduler, start) as team,
             _finished_runs(c.target) as store,
             c.progress("identifying") as show,
         ):
@@ -110,7 +84,6 @@ def identify(
         c.next("compare", campaign)
     elif result.points:
         c.next("export", c.target, "--to", "ross")
-    c.print(f"Results: {c.target}")
     refuse_untrusted(result)
 
 

@@ -8,12 +8,10 @@ import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 import model
-from tpjb_ident.cli.common.command import Command, command
+from tpjb_ident.cli.command import Command, command
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.tables import write_text
@@ -27,21 +25,10 @@ MANIFEST = "campaign.toml"
 BEARING, DRAFT = "bearing.toml", "bearing_draft.toml"
 #: Records that are listed; the manifest has all of them.
 MOST_RECORDS = 20
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the records of a logger.")]
-Bearing = Annotated[
-    str | None, typer.Option("--bearing", metavar="NAME", help="Bearing file in that folder [default: looked for].")
-]
-Update = Annotated[
-    bool, typer.Option("--update", help="Carry on a campaign.toml that was edited: new records, guesses made anew.")
-]
 
 
-@command(
-    "tpjb init exports",
-    "tpjb init exports --bearing rocker.toml",
-    out_help="Folder for the draft [default: beside the records].",
-)
-def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = False) -> None:
+@command("tpjb init exports", "tpjb init exports --bearing rocker.toml")
+def init(c: Command, folder: Path, bearing: str | None = None, update: bool = False) -> None:
     """Draft the campaign.toml of a folder of exports.
 
     And its bearing.toml, where there is none. Channels, units, axes, rates and runs are read from the files or
@@ -52,7 +39,8 @@ def init(c: Command, folder: Folder, bearing: Bearing = None, update: Update = F
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")
     c.target = c.out or folder
-    text = _update(c, folder, bearing) if update else _draft(c, folder, bearing)
+    bearing = bearing or _bearing_file(folder)
+    text = (_update if update else _draft)(c, folder, bearing)
     if _open_summary(text):
         c.next("init", folder, "--update")
     else:
@@ -71,21 +59,17 @@ def _draft(c: Command, folder: Path, bearing: str | None) -> str:
         )
     exports, problems = _read_exports(c, folder, ())
     name = re.sub(r"[^\w.+=@-]+", "-", folder.resolve().name) or "campaign"
-    bearing = bearing or _bearing_file(folder)
     guesses = survey(exports, pivots=_pivot_angles(folder, bearing))
     text = draft_manifest(guesses, name, bearing or BEARING)
     c.target.mkdir(parents=True, exist_ok=True)
-    write_text(manifest, text)
-    c.wrote(MANIFEST)
+    _write(c, MANIFEST, text)
     c.print(_verdict(manifest, guesses, text))
     _show_survey(c, guesses, folder.name)
     for problem in problems:
         c.warn(f"left out: {problem}")
-    draft = c.target / BEARING
-    if bearing is None and not draft.exists():
-        write_text(draft, _bearing_draft(guesses))
-        c.wrote(BEARING)
-        c.print(f"{draft}: to be filled in from drawing and data sheet; `identify` needs none.")
+    if bearing is None and not (c.target / BEARING).exists():
+        _write(c, BEARING, _bearing_draft(guesses))
+        c.print(f"{c.target / BEARING}: to be filled in from drawing and data sheet; `identify` needs none.")
     return text
 
 
@@ -97,21 +81,23 @@ def _update(c: Command, folder: Path, bearing: str | None) -> str:
         raise BadInputError(f"{manifest}: is not there, so there is nothing to carry on. Leave --update out.")
     before = manifest.read_text("utf-8-sig")
     exports, problems = _read_exports(c, folder, column_names(before))
-    pivots = _pivot_angles(folder, bearing or _bearing_file(folder))
-    text, changes = updated_manifest(before, exports, pivots)
-    same = text.split() == before.split()
-    remainder = _open_summary(text) or "no place is open"
-    count = "nothing to change" if same else f"{len(changes)} changes, the former one is {manifest.name}.bak"
-    if not same:
+    text, changes = updated_manifest(before, exports, _pivot_angles(folder, bearing))
+    count = "nothing to change"
+    if text.split() != before.split():
+        count = f"{len(changes)} changes, the former one is {manifest.name}.bak"
         write_text(manifest.with_suffix(".toml.bak"), before)
-        write_text(manifest, text)
-        c.wrote(MANIFEST)
-    c.print(f"{manifest}: {count}; {remainder}.")
+        _write(c, MANIFEST, text)
+    c.print(f"{manifest}: {count}; {_open_summary(text) or 'no place is open'}.")
     for problem in problems:
         c.warn(f"left out: {problem}")
     for change in changes:
         c.print(change)
     return text
+
+
+def _write(c: Command, name: str, text: str) -> None:
+    write_text(c.target / name, text)
+    c.wrote(name)
 
 
 def _verdict(manifest: Path, guesses: Survey, text: str) -> str:

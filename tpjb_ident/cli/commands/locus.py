@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
-from tpjb_ident.columns import UNITS, Column, words
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
+    from rigdata.arrays import FloatArray
     from rigdata.campaign import Campaign
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
 
 
 @command(f"tpjb locus {DEMO}")
-def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> None:
+def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Measure the shaft centre locus and the clearance polygon by pad.
 
     Writes locus and clearance (.csv, .parquet) and a figure; positions count from the centre of the polygon. With
@@ -31,10 +32,9 @@ def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
     import numpy as np
 
     from tpjb_ident.compare.static_tests import measure_static
-    from tpjb_ident.report.figure import save_panels
     from tpjb_ident.report.panels import position_panels
 
-    with c.results() as folder:
+    with c.results():
         with c.progress("measuring positions"):
             static = measure_static(source, drawing)
             polygons, refused = _other_polygons(source, drawing, static)
@@ -43,15 +43,13 @@ def locus(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
         _write_tables(c, static, polygons)
         angles = np.array([pad.pivot_angle for pad in drawing.pads])
         clearances = np.array([pad.assembled_clearance for pad in drawing.pads])
-        panels = position_panels(static.clearance, (angles, clearances), static.locus, {}, polygons)
-        save_panels(panels, folder / "figures")
+        c.draw(position_panels(static.clearance, (angles, clearances), static.locus, {}, polygons))
     parts = [f"the {name} is measured" for name in ("clearance", "locus") if getattr(static, name) is not None]
     c.print(f"{source.id}: {' and '.join(parts)}.")
-    _show(c, static, drawing, source.id, refused)
+    _show(c, static, clearances, source.id, refused)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for polygon in polygons:
         c.print(str(polygon))
-    c.print(f"Results: {c.target}")
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."
@@ -101,24 +99,14 @@ def _write_tables(c: Command, static: StaticTests, polygons: tuple[ClearancePoly
         c.table("clearance_pairs", pairs_frame(static.clearance, polygons))
 
 
-def _show(c: Command, static: StaticTests, bearing: Bearing, name: str, refused: list[str]) -> None:
+def _show(c: Command, static: StaticTests, drawn: FloatArray, name: str, refused: list[str]) -> None:
     """Print the clearance per pad and the drawing's, the locus, and what is wrong with either."""
-    import numpy as np
+    from tpjb_ident.report.comparison_page import clearance_table
 
     polygon = static.clearance
     if polygon is not None:
-        rows = []
         # a table's reader has no other place that says how far the probes' gains are known
-        half = 1.96 * np.hypot(polygon.clearance_se, polygon.clearance * polygon.relative_calibration)
-        for k, pad in enumerate(bearing.pads):
-            measured = (polygon.clearance[k], half[k], polygon.clearance_pushed[k])
-            rows.append([f"#{k + 1}", pad.assembled_clearance, *measured])
-        columns = [*words("pad"), Column("drawing", ".4g", quantity="length")]
-        columns += [
-            Column(title, form, quantity="length")
-            for title, form in (("measured", ".4g"), ("± (95 %)", ".2g"), ("pushed", ".4g"))
-        ]
-        c.show(f"{name}: clearance, {UNITS['length'][0]}", columns, rows)
+        c.show_table(clearance_table(polygon, drawn, calibrated=True), name)
     printed: tuple[str, ...] = ()
     if static.locus is not None:
         c.print(f"locus: {static.locus}")

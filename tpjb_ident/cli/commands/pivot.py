@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.options import DEMO, BearingOption, CampaignPath
-from tpjb_ident.columns import Column, words
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
 
 if TYPE_CHECKING:
-    from tpjb_ident.pivot import PivotCurve
+    pass
 
 #: Conditions of the campaign rather than of one pad.
 ABOUT_ALL = ("runs-refused",)
 
 
 @command(f"tpjb pivot {DEMO}")
-def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> None:
+def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """Fit the pivot stiffness curves to the dry tests.
 
     Writes pivot_curves and pivot_pads (.csv, .parquet), pivots.toml, which `tpjb predict --pivots` reads, and figures.
@@ -27,7 +26,7 @@ def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.compare.static_tests import bearing_problems
     from tpjb_ident.pivot import PivotSettings, fit_pivots, pads_table, pivot_table, write_pivots
-    from tpjb_ident.report.figure import save_panels
+    from tpjb_ident.report.comparison_page import pivot_stiffness_table
     from tpjb_ident.report.panels import pivot_panels
 
     source = c.open(campaign)
@@ -40,12 +39,12 @@ def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
         c.table("pivot_pads", pads_table(curves))
         write_pivots(folder / "pivots.toml", curves, source.id)
         with c.progress("drawing figures"):
-            save_panels(pivot_panels(curves, formula), folder / "figures")
+            c.draw(pivot_panels(curves, formula))
     tested = {run.pad for run in source.of_kind("dry_pivot")}
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
-    _show_curves(c, curves, source.id, formula)
+    full = min((curve.valid_to for curve in curves), default=0.0)  # that all pads were tested at
+    c.show_table(pivot_stiffness_table(curves, formula, (0.5 * full, full)), source.id)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
-    c.print(f"Results: {c.target}")
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
     conditions = [(curve.pad, condition) for curve in curves for condition in curve.status]
@@ -59,23 +58,3 @@ def pivot(c: Command, campaign: CampaignPath, bearing: BearingOption = None) -> 
     bad += [f"pad {pad}: has no curve, its records were refused" for pad in sorted(without)]
     if bad:
         raise NotTrustedError("; ".join(bad))
-
-
-def _show_curves(c: Command, curves: Sequence[PivotCurve], name: str, formula: Callable | None) -> None:
-    """Print the tangent stiffness of every pad at half and at full measured load, and the share of Kirk's formula."""
-    rows = []
-    for curve in curves:
-        cells: list[Any] = [f"#{curve.pad}"]
-        for load in (0.5 * curve.valid_to, curve.valid_to):
-            stiffness = float(curve.stiffness(load))
-            low, high = (float(v) for v in curve.stiffness_band(load))
-            cells += [load, stiffness, (low, high)]
-        if formula is not None:  # at full load
-            percent = 0.01 * formula(curve.pad, curve.valid_to)[1]
-            cells.append(f"{stiffness / percent:.0f} ({low / percent:.0f}..{high / percent:.0f})")
-        rows.append([*cells, curve.law.name])
-    pad, law = words("pad", "law")
-    band = Column("95 %", "{:.0f}..{:.0f}".format, quantity="stiffness")
-    at_load = [Column("load {load}", ".2f"), Column("{stiffness}", ".0f"), band]
-    kirk = ["of Kirk, %"] if formula is not None else []
-    c.show(f"{name}: tangent stiffness of the pivots", [pad, *2 * at_load, *kirk, law], rows)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import operating_points, pivot_choice, rotation_choice
-from tpjb_ident.cli.common.options import ROCKER, BearingPath, LoadDirections, Loads, PivotChoice, Rotation, Speeds
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import operating_points, pivot_choice, rotation_choice
+from tpjb_ident.cli.options import ROCKER
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed
 from tpjb_ident.runtime.tables import write_text
@@ -28,18 +27,18 @@ if TYPE_CHECKING:
 )
 def plan(
     c: Command,
-    bearing: BearingPath,
-    pivots: PivotChoice = "kirk",
-    load: Loads = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
-    load_direction: LoadDirections = "-90 deg",
-    speed: Speeds = "22 Hz",
-    rotation: Rotation = None,
-    excitation: Annotated[str, typer.Option(help="Excitation frequencies, each at every load.")] = "10, 25, 40 Hz",
-    locus: Annotated[int, typer.Option(min=0, max=360, help="Load directions of the shaft locus; 0: none.")] = 20,
-    dry: Annotated[bool, typer.Option(help="Dry load-deflection tests on all pads.")] = True,
-    push: Annotated[float, typer.Option(min=0.0, help="Push load of the clearance sweep [N]; 0: none.")] = 200.0,
-    temperatures: Annotated[bool, typer.Option(help="A temperature sensor in every pad.")] = True,
-    data_sets: Annotated[bool, typer.Option("--data-sets", help="Also: what parts of it could tell, A to E.")] = False,
+    bearing: Path,
+    pivots: str = "kirk",
+    load: str = "2.5, 3.75, 5, 6.25, 7.5, 8.75 kN",
+    load_direction: str = "-90 deg",
+    speed: str = "22 Hz",
+    rotation: str | None = None,
+    excitation: str = "10, 25, 40 Hz",
+    locus: int = 20,
+    dry: bool = True,
+    push: float = 200.0,
+    temperatures: bool = True,
+    data_sets: bool = False,
 ) -> None:
     """Tell which effects a planned campaign could see.
 
@@ -55,7 +54,7 @@ def plan(
     from model.setup import Setup
     from tpjb_ident.diagnosis.from_python import planned_layout
     from tpjb_ident.diagnosis.plan import plan as plan_campaign
-    from tpjb_ident.report.panels import save_isolability
+    from tpjb_ident.report.panels import isolability_panels
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
@@ -71,10 +70,9 @@ def plan(
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())
-        save_isolability(folder, plans)
+        c.draw(isolability_panels(plans))
         write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
     _show(c, result)
-    c.print(f"Results: {c.target}")
     c.next("simulate", bearing)
 
 

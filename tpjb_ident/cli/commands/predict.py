@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import (
     model_settings,
     operating_points,
     parse_value,
@@ -17,18 +16,7 @@ from tpjb_ident.cli.common.inputs import (
     refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.common.options import (
-    ROCKER,
-    BearingPath,
-    EffectsFile,
-    LoadDirections,
-    Loads,
-    PivotChoice,
-    Rotation,
-    Speeds,
-    Thermal,
-    refuse_unknown,
-)
+from tpjb_ident.cli.options import PHYSICS, ROCKER, refuse_unknown
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -42,25 +30,6 @@ if TYPE_CHECKING:
     from rigdata.operating_point import OperatingPoint
     from tpjb_ident.compare.predictions import ModelSettings, Progress
 
-#: Name on the command line: what it does.
-PHYSICS = {
-    "conduction": "pads conduct the film's heat away",
-    "journal": "the journal passes heat from hot films to cold ones",
-    "growth": "clearances follow the temperatures of journal, housing and pads",
-    "jfo": "mass-conserving cavitation",
-    "perturbed-heat": "in the dynamics the films' temperature and viscosity follow the motion",
-    "perturbed-bending": "in the dynamics pads that deform (tehd, thd) bend with the motion",
-    "axial-tilt": "pads on spheres follow a shaft that leans (effect misalignment)",
-    "turbulence": "films turn turbulent above a local Reynolds number of 500 to 1,000 (Ng and Pan)",
-}
-Physics = Annotated[
-    str | None,
-    typer.Option("--physics", metavar="NAMES", help=f'Beyond the paper\'s model: some of "{", ".join(PHYSICS)}".'),
-]
-HousingTemperature = Annotated[
-    str | None,
-    typer.Option(help='With growth: mean temperature of the housing, "48 degC" [default: the oil supply\'s].'),
-]
 #: Points that take less time than pandas to load.
 FEW = 20
 #: Rows of the printed table, and its columns by those of prediction.csv.
@@ -85,19 +54,17 @@ COLUMNS: dict[str, Column | str] = {
 )
 def predict(
     c: Command,
-    bearing: BearingPath,
-    load: Loads = "5 kN",
-    load_direction: LoadDirections = "-90 deg",
-    speed: Speeds = "22 Hz",
-    rotation: Rotation = None,
-    excitation: Annotated[
-        str | None, typer.Option(help='Excitation frequencies: "10..50:10 Hz" [default: synchronous].')
-    ] = None,
-    pivots: PivotChoice = "kirk",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    physics: Physics = None,
-    housing_temperature: HousingTemperature = None,
+    bearing: Path,
+    load: str = "5 kN",
+    load_direction: str = "-90 deg",
+    speed: str = "22 Hz",
+    rotation: str | None = None,
+    excitation: str | None = None,
+    pivots: str = "kirk",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    physics: str | None = None,
+    housing_temperature: str | None = None,
 ) -> None:
     """Predict coefficients, shaft position and pad data.
 
@@ -127,7 +94,6 @@ def predict(
     c.show(drawing.name, list(COLUMNS.values()), frame.head(MOST_ROWS)[list(COLUMNS)].itertuples(index=False))
     if len(frame) > MOST_ROWS:
         c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")
-    c.print(f"Results: {c.target}")
     if bad:
         raise NotTrustedError(
             f"{bad} of {len(frame)} points did not converge; their status says why, their values are NaN."
@@ -157,9 +123,9 @@ def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], setti
 def _rows(
     bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings, show: Progress | None = None
 ) -> list[dict[str, Any]]:
-    from tpjb_ident.compare.predictions import predict_points, prediction_rows
+    from tpjb_ident.compare.predictions import predict_points, prediction_row
 
-    return prediction_rows(predict_points(bearing, points, settings, show))
+    return [prediction_row(prediction) for prediction in predict_points(bearing, points, settings, show)]
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:

@@ -5,20 +5,16 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
+from tpjb_ident.cli.command import COMMANDS, Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
-from tpjb_ident.cli.common.command import COMMANDS, Command, command
 from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of
 
-Record = Annotated[Path, typer.Argument(metavar="RUN.json", help="run.json of an output folder, or that folder.")]
-Tolerance = Annotated[
-    float, typer.Option(min=0.0, help="Difference that is rounding: relative, or of half an interval's width.")
-]
 #: Commands whose results hang on their options and inputs alone.
 _REPEATABLE = (
     "check", "identify", "pivot", "locus", "predict", "compare", "diagnose", "plan", "simulate", "demo", "export",
@@ -31,7 +27,7 @@ _WORDS = {"same": "the same bytes", "numbers": "the same but for rounding", "dif
 
 
 @command("tpjb rerun tpjb-identify-out/run.json", "tpjb rerun tpjb-compare-out --out again")
-def rerun(c: Command, record: Record, tolerance: Tolerance = 1e-6) -> None:
+def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
     """Compute the same again and say what differs.
 
     With the options and inputs that run.json names, into a temporary folder: tables and documents are compared number

@@ -6,18 +6,16 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from rigdata.units import ZERO_CELSIUS
-from tpjb_ident.cli.common.command import HDF5, Command, campaign_place, command
-from tpjb_ident.cli.common.options import DEMO
+from tpjb_ident.cli.command import HDF5, Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, words
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.presentation import UNITS
 from tpjb_ident.rounding import counted
 from tpjb_ident.runtime.provenance import sha256
-from tpjb_ident.us_table import UNITS
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -27,11 +25,6 @@ if TYPE_CHECKING:
 
 #: Runs that are listed.
 MOST_RUNS = 200
-Source = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A campaign, or one record file (CSV, TDMS, UFF, MAT, ..).")
-]
-RunId = Annotated[str | None, typer.Option("--run", metavar="ID", help="One run of a campaign, channel by channel.")]
-Picture = Annotated[bool, typer.Option("--picture", help="Draw channels and spectra to a PNG and an SVG in --out.")]
 BARS = " ▁▂▃▄▅▆▇█"
 #: What is this far below the highest bar is blank.
 DECADES = 3.0
@@ -42,7 +35,7 @@ DECADES = 3.0
     f"tpjb show {DEMO} --run d-05000-25-01 --picture",
     "tpjb show exports/run1.csv",
 )
-def show(c: Command, source: Source, run: RunId = None, picture: Picture = False) -> None:
+def show(c: Command, source: Path, run: str | None = None, picture: bool = False) -> None:
     """Show channels, statistics and spectra of a file.
 
     Of a campaign the list of its runs, or one of them with --run. With --picture or --out also writes channels.csv and
@@ -83,13 +76,12 @@ def show(c: Command, source: Source, run: RunId = None, picture: Picture = False
 
     c.options = {"source": source, "shown": title}
     c.inputs = {source.name: sha256(source)} if source.is_file() else {}
-    with c.results() as folder:
+    with c.results():
         c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
         if picture:
-            from tpjb_ident.report.panels import write_quick_look
+            from tpjb_ident.report.panels import quick_look
 
-            write_quick_look(folder, title, displayed, looks)
-    c.print(f"Results: {c.target}")
+            c.draw([quick_look(title, displayed, looks)])
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rigdata.near_names import nearest_name
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import (
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.inputs import (
     model_settings,
     operating_points,
     pivot_choice,
     refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.common.options import (
-    ROCKER,
-    BearingPath,
-    EffectsFile,
-    PivotChoice,
-    Rotation,
-    Speeds,
-    Thermal,
-    refuse_unknown,
-)
+from tpjb_ident.cli.options import ROCKER, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -41,28 +31,21 @@ FAULT_KEYS = ("run", "channel", "value", "start", "length", "other")
 )
 def simulate(
     c: Command,
-    bearing: BearingPath,
-    pivots: PivotChoice = "kirk",
-    thermal: Thermal = "adiabatic",
-    effects: EffectsFile = None,
-    plan: Annotated[str, typer.Option(help="paper (92 runs, as in the reference paper) or short (34 runs).")] = "paper",
-    load: Annotated[str | None, typer.Option(help="Loads of the dynamic runs, instead of the plan's.")] = None,
-    excitation: Annotated[
-        str | None, typer.Option(help="Excitation frequencies, each at every --load [default: 25 Hz].")
-    ] = None,
-    speed: Speeds = "22 Hz",
-    rotation: Rotation = None,
-    repeats: Annotated[int, typer.Option(min=1, max=100, help="Records per point and direction.")] = 1,
-    noise: Annotated[
-        float, typer.Option(min=0.0, max=1000.0, help="Channel noise: 1 as on a real rig, 0 no disturbance at all.")
-    ] = 1.0,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help='A defect: "KIND run=PATTERN channel=NAME value=.. start=.. length=..". Repeatable.'),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Same seed, same campaign, to the last bit.")] = 0,
-    name: Annotated[str, typer.Option(help="Id of the campaign.")] = "virtual",
-    layout: Annotated[str, typer.Option("--format", help="hdf5, csv, csv-german, csv-tabbed or csv-bare.")] = "hdf5",
+    bearing: Path,
+    pivots: str = "kirk",
+    thermal: str = "adiabatic",
+    effects: Path | None = None,
+    plan: str = "paper",
+    load: str | None = None,
+    excitation: str | None = None,
+    speed: str = "22 Hz",
+    rotation: str | None = None,
+    repeats: int = 1,
+    noise: float = 1.0,
+    fault: list[str] | None = None,
+    seed: int = 0,
+    name: str = "virtual",
+    layout: str = "hdf5",
 ) -> None:
     """Write a whole campaign of a virtual rig.
 
@@ -95,8 +78,7 @@ def simulate(
         with c.progress("simulating") as show:
             truth = write_campaign(folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
         truth.write(folder / "truth.json")
-    c.print(f"{name}: {len(rig.runs())} runs, seed {seed}")
-    c.print(f"Results: {c.target / file}, the truth in {c.target / 'truth.json'}")
+    c.print(f"{name}: {len(rig.runs())} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
     c.next("check", c.target / file)
 
 

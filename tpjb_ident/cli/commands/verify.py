@@ -4,27 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, campaign_place, command, refuse_special
+from tpjb_ident.cli.command import Command, campaign_place, command, refuse_special
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of
 from tpjb_ident.runtime.provenance import sha256, versions
 
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Output folder of tpjb commands, with its run.json.")]
-Inputs = Annotated[
-    list[Path] | None,
-    typer.Option("--input", metavar="PATH", help="Campaign or file the results came from, if moved; repeatable."),
-]
 #: What may have become of a file since its SHA-256 was recorded.
 STATES = {"same": "is the same", "differs": "is not what it was", "missing": "is missing"}
 
 
 @command("tpjb verify tpjb-identify-out", "tpjb verify tpjb-identify-out --input campaigns/rocker-A")
-def verify(c: Command, results: Folder, given: Inputs = None) -> None:
+def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
     """Check a result folder against its SHA-256 record.
 
     Exit code 0 if all are the same bytes as when the command ended, 3 if a result or an input differs or a result is

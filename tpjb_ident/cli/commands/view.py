@@ -5,14 +5,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, campaign_place, command
-from tpjb_ident.cli.common.interrupts import heard
-from tpjb_ident.cli.common.options import DEMO, BearingOption
+from tpjb_ident.cli.command import Command, campaign_place, command
+from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.runtime.interrupts import heard
 from tpjb_ident.runtime.output_folder import former_runs
 from tpjb_ident.schema import TABLES
 
@@ -21,20 +19,15 @@ if TYPE_CHECKING:
     from rigdata.campaign import Campaign
     from tpjb_ident.view.server import Session
 
-Source = Annotated[Path, typer.Argument(metavar="CAMPAIGN|DIR", help="A campaign, or an output folder of tpjb.")]
-Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0: any free one.")]
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in your browser.")]
-Seconds = Annotated[float | None, typer.Option(min=0.1, help="Stop after this time [default: at Ctrl-C].")]
 
-
-@command(f"tpjb view {DEMO}", "tpjb view tpjb-compare-out", out_help="Not used: looking writes nothing.")
+@command(f"tpjb view {DEMO}", "tpjb view tpjb-compare-out")
 def view(
     c: Command,
-    source: Source,
-    bearing: BearingOption = None,
-    port: Port = 0,
-    browser: Browser = True,
-    seconds: Seconds = None,
+    source: Path,
+    bearing: Path | None = None,
+    port: int = 0,
+    browser: bool = True,
+    seconds: float | None = None,
 ) -> None:
     """Open a local page with records, points and model.
 
@@ -75,7 +68,7 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
     campaign = c.open(source)
     session = Session(name=campaign.id, campaign=campaign)
     if campaign.of_kind("dynamic"):
-        from tpjb_ident.cli.common.identification import identify_settings
+        from tpjb_ident.cli.identification import identify_settings
         from tpjb_ident.identification.identify import identify
 
         settings = identify_settings(c, campaign, "mm-eiv", None)

@@ -4,52 +4,34 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from tpjb_ident.cli.common.command import Command, command
-from tpjb_ident.cli.common.inputs import parse_amount
-from tpjb_ident.cli.common.interrupts import heard
-from tpjb_ident.cli.common.options import BearingOption
-from tpjb_ident.columns import Column, place_of, symbol
+from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.commands.identify import KEPT
+from tpjb_ident.cli.inputs import parse_amount
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
+from tpjb_ident.runtime.interrupts import heard
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
-    from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
-#: Folder in the output folder in which phasors of finished runs stay, for the next start.
-KEPT = ".tpjb-finished-runs"
 #: Steps that forbid to go on as planned.
 URGENT = ("stop", "repeat")
 #: More records than this at once are counted, not listed.
 MOST_LINES = 12
-Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Campaign folder, with campaign.toml: the plan.")]
-Once = Annotated[bool, typer.Option("--once", help="Look once and end: exit code 3 if a run must be repeated.")]
-Every = Annotated[str, typer.Option("--every", metavar="TIME", help="How often to look.")]
-Settle = Annotated[
-    str, typer.Option("--settle", metavar="TIME", help="A file that has not changed for so long is written.")
-]
-Within = Annotated[
-    str | None,
-    typer.Option(
-        "--within", metavar="SHARE", help='Interval that you want, such as "3 %": says how many records more.'
-    ),
-]
 
 
 @command("tpjb watch records", 'tpjb watch records --once --within "3 %"')
 def watch(
     c: Command,
-    folder: Folder,
-    bearing: BearingOption = None,
-    once: Once = False,
-    every: Every = "2 s",
-    settle: Settle = "5 s",
-    within: Within = None,
+    folder: Path,
+    bearing: Path | None = None,
+    once: bool = False,
+    every: str = "2 s",
+    settle: str = "5 s",
+    within: str | None = None,
 ) -> None:
     """Check, identify and place each record of a campaign as it lands.
 
@@ -86,7 +68,6 @@ def watch(
         heard()
         c.print("Stopped. The same command goes on from here.")
         return
-    c.print(f"Results: {c.target}")
     urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
@@ -108,7 +89,7 @@ def _open_watcher(
     from tpjb_ident.dynamic.runs.run_store import RunStore
     from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.watch.landing import NewFiles
-    from tpjb_ident.watch.watcher import Measuring, Watcher
+    from tpjb_ident.watch.watcher import Watcher
 
     campaign = c.open(folder)
     angles: tuple[float, ...] = ()
@@ -124,7 +105,7 @@ def _open_watcher(
             angles = tuple(pad.pivot_angle for pad in drawing.pads)
             clearance = min(pad.assembled_clearance for pad in drawing.pads)
     settings = IdentifySettings(clearance=clearance, keep_weights=False)
-    return Watcher(folder, NewFiles(settle), Measuring(settings, angles, RunStore(c.target / KEPT)), within), drawing
+    return Watcher(folder, NewFiles(settle), settings, angles, RunStore(c.target / KEPT), within), drawing
 
 
 def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refresh: int) -> None:
@@ -162,26 +143,20 @@ def _state_document(snapshot: Snapshot) -> dict[str, Any]:
 
 def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
     """Print how the campaign stands, what landed, and every step that was not printed before; what is printed now."""
-    landed, repeat, look = (
-        sum(bool(s.landed) for s in snapshot.states),
-        snapshot.count("repeat"),
-        snapshot.count("look"),
-    )
+    from tpjb_ident.report.watch_page import coverage_table, points_table, records_table
+
+    name, landed = snapshot.campaign.id, sum(bool(s.landed) for s in snapshot.states)
     c.print(
-        f"{snapshot.campaign.id}: {landed} of {len(snapshot.states)} runs landed, {repeat} to be repeated, "
-        f"{look} to look at."
+        f"{name}: {landed} of {len(snapshot.states)} runs landed, {snapshot.count('repeat')} to be repeated, "
+        f"{snapshot.count('look')} to look at."
     )
     if len(snapshot.new) > MOST_LINES:
-        from tpjb_ident.report.watch_page import coverage_table
-
-        coverage = coverage_table(snapshot)
-        title = f"{snapshot.campaign.id}: {len(snapshot.new)} records have landed"
-        c.show(title, [Column(name, words=not name) for name in coverage.columns], coverage.rows)
-    else:
-        status = {s.run.id: s for s in snapshot.states}
-        latest = {p.point: run for p in snapshot.measured.points for run in snapshot.new if run in p.runs}
-        for run in snapshot.new:
-            c.print(_landed_line(status[run], snapshot, run in latest.values()))
+        c.show_table(coverage_table(snapshot), f"{name}, {len(snapshot.new)} records have landed")
+    elif snapshot.new:
+        c.show_table(records_table(snapshot, snapshot.new), name)
+        points = [p for p in snapshot.measured.points if set(p.runs) & set(snapshot.new)]
+        if points:
+            c.show_table(points_table(points), name)
     steps = [step.text for step in snapshot.steps]
     problems = [str(problem) for problem in snapshot.problems]
     lines = [*steps, *snapshot.lacks, *problems, *snapshot.measured.refusals]
@@ -189,26 +164,6 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         if line not in printed:
             c.print(line)
     return set(lines)
-
-
-def _landed_line(status: RunStatus, snapshot: Snapshot, with_result: bool) -> str:
-    """Time, run, verdict, and what its point is by now."""
-    line = f"{status.landed[11:19]} {status.run.id}: {status.state}"
-    for unnamed in snapshot.placed:
-        if unnamed.run is not None and unnamed.run.id == status.run.id and unnamed.why:
-            line += f" ({unnamed.why})"
-            break
-    point = next((p for p in snapshot.measured.points if status.run.id in p.runs), None)
-    if point is None or not with_result:
-        return line
-    from tpjb_ident.watch.next_steps import lacking
-
-    records = counted(point.n_records, "record")
-    line += f"; {place_of(point.point.static_load, point.point.excitation_hz)}, {records}: "
-    if reason := lacking(point):
-        return line + reason
-    cells = point.stiffness.cells()
-    return f"{line}kxx {cells[0]}, kyy {cells[3]} {symbol('stiffness')}"
 
 
 def _amount(text: str, dimension: str, option: str, example: str) -> float:

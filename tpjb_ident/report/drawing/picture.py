@@ -31,15 +31,17 @@ LIGHT = {
     "grey": "#7a828b",
 }
 INK, RULE, PAPER, BLUE, RED, GREY = (LIGHT[name] for name in ("ink", "rule", "paper", "blue", "red", "grey"))
+#: Lines that are told apart without colour.
+DASHED, SHORT_DASHED, DOTTED, DASH_DOTTED = (0, (5, 2)), (0, (4, 2)), (0, (1, 1.5)), (0, (3, 1, 1, 1))
 #: Colour, line and marker.
 Style = tuple[str, Any, str]
 #: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
 VARIANT_STYLE: dict[str, Style] = {
-    "rigid": ("grey", (0, (1, 1.5)), "s"),
-    "kirk": ("orange", (0, (5, 2)), "^"),
-    "kirk-secant": ("purple", (0, (3, 1, 1, 1)), "v"),
+    "rigid": ("grey", DOTTED, "s"),
+    "kirk": ("orange", DASHED, "^"),
+    "kirk-secant": ("purple", DASH_DOTTED, "v"),
     "measured": ("blue", "-", "D"),
-    "model before": ("orange", (0, (5, 2)), "^"),
+    "model before": ("orange", DASHED, "^"),
     "with the effects found": ("blue", "-", "D"),
 }
 VARIANT_LABEL = {
@@ -58,9 +60,9 @@ _TABLE_STYLE: tuple[Style, ...] = (
 )
 _PAD_STYLE: tuple[Style, ...] = (
     ("blue", "-", "o"),
-    ("red", (0, (5, 2)), "s"),
-    ("green", (0, (3, 1, 1, 1)), "^"),
-    ("purple", (0, (1, 1.5)), "D"),
+    ("red", DASHED, "s"),
+    ("green", DASH_DOTTED, "^"),
+    ("purple", DOTTED, "D"),
     ("orange", (0, (8, 2, 1, 2)), "v"),
 )
 #: Blue through paper to orange: signs that nobody confuses.
@@ -143,7 +145,8 @@ class _Millions(ScalarFormatter):
 
 def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
     """Empty axes at a box in inches, in the house look."""
-    axes = figure.add_axes(_fractions(figure, box))
+    width, height = figure.get_size_inches()
+    axes = figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
     axes.patch.set_alpha(0.0)
     axes.yaxis.set_major_formatter(_Millions())
     axes.ticklabel_format(style="plain", useOffset=False)
@@ -154,11 +157,6 @@ def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
         spine.set_color(RULE)
         spine.set_visible(side in ("left", "bottom"))
     return axes
-
-
-def _fractions(figure: Figure, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    width, height = figure.get_size_inches()
-    return box[0] / width, box[1] / height, box[2] / width, box[3] / height
 
 
 def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
@@ -202,9 +200,10 @@ def add_legend(
     centre = (0.5 - box.x0) / box.width if across else 0.5
     heading = 1.4 * _LINE if axes.get_title() else 0.0
     shrink(axes, top=_LINE * math.ceil(len(drawn) / columns) + 0.03)
+    height = axes.get_position().height * _size(axes)[1]
     legend = axes.legend(
         handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
-        bbox_to_anchor=(centre, 1.0 + heading / _height(axes)), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
+        bbox_to_anchor=(centre, 1.0 + heading / height), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
         labelcolor=INK,
     )  # fmt: skip
     return legend
@@ -215,11 +214,6 @@ def _size(axes: Axes) -> tuple[float, float]:
     figure = axes.get_figure(root=True)
     width, height = figure.get_size_inches()  # type: ignore[union-attr]
     return float(width), float(height)
-
-
-def _height(axes: Axes) -> float:
-    """Of a panel, inches."""
-    return float(axes.get_position().height * _size(axes)[1])
 
 
 def _columns(names: Sequence[str], room: float) -> int:

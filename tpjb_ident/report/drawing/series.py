@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,6 @@ from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.dynamic.results.point_result import PointResult
 
 #: Column that a series runs over, its quantity and its name.
@@ -39,11 +38,9 @@ def axis_of(over: str) -> tuple[str, float, str]:
     return column, size(quantity), f"{name}, {symbol(quantity)}"
 
 
-def as_table(source: Identification | pd.DataFrame) -> pd.DataFrame:
-    """Table of coefficients of whatever was given."""
-    from tpjb_ident.dynamic.results.identification import Identification
-
-    return source.to_frame() if isinstance(source, Identification) else source
+def as_table(source: Any) -> pd.DataFrame:
+    """Table of coefficients of a result, or the table that was given."""
+    return source if isinstance(source, pd.DataFrame) else source.to_dataframe()
 
 
 def longest_series(table: pd.DataFrame, axis: str) -> pd.DataFrame | None:

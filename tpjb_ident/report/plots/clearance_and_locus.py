@@ -14,10 +14,13 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
+    DASHED,
+    DOTTED,
     FONT_SIZE,
     GREY,
     INK,
     LIGHT,
+    SHORT_DASHED,
     VARIANT_LABEL,
     VARIANT_STYLE,
     add_legend,
@@ -31,8 +34,8 @@ if TYPE_CHECKING:
 _POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
     ("ink", "-"),
     ("red", (0, (6, 2, 1, 2))),
-    ("green", (0, (4, 2))),
-    ("purple", (0, (1, 1.5))),
+    ("green", SHORT_DASHED),
+    ("purple", DOTTED),
 )
 
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
@@ -71,8 +74,10 @@ def clearance_and_locus(
         raise ValueError("nothing to draw: give polygons, a locus, predicted positions or a drawing")
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title, width=4.6, height=4.8)
     if drawing is not None:
-        axes.plot(*(per("length") * _closed(_ordered_corners(*drawing))).T, color=GREY, linewidth=1.0,
-                  linestyle=(0, (5, 2)), label="clearance, drawing")  # fmt: skip
+        angles, clearances = (np.asarray(values) for values in drawing)
+        order = np.argsort(angles % (2 * np.pi))  # its pads stand in any order
+        axes.plot(*(per("length") * _closed(corners(angles[order], clearances[order]))).T, color=GREY, linewidth=1.0,
+                  linestyle=DASHED, label="clearance, drawing")  # fmt: skip
     for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
         _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
     if named:
@@ -125,12 +130,6 @@ def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
     if len(places):
         axes.plot(*(per("length") * places).T, linestyle="none", marker="o", markersize=4.0, color=INK,
                   label="locus, measured")  # fmt: skip
-
-
-def _ordered_corners(angles: FloatArray, clearances: FloatArray) -> FloatArray:
-    """Corners (n, 2) [m] of a drawing's polygon, its pads in any order."""
-    order = np.argsort(np.asarray(angles) % (2 * np.pi))
-    return corners(np.asarray(angles)[order], np.asarray(clearances)[order])
 
 
 def _closed(points: FloatArray) -> FloatArray:

@@ -13,8 +13,11 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.report.drawing.picture import (
+    DASH_DOTTED,
+    DOTTED,
     INK,
     LIGHT,
+    SHORT_DASHED,
     VARIANT_LABEL,
     Style,
     add_legend,
@@ -70,7 +73,7 @@ def coefficient(
     """
     if name not in COEFFICIENTS:
         raise ValueError(f"name must be one of {', '.join(COEFFICIENTS)}; got {name!r}")
-    series = longest_series(_comparison_table(comparison), over)
+    series = longest_series(as_table(comparison), over)
     if series is None:
         raise ValueError(f"the campaign has no two points that differ in {over} alone")
     kind = KINDS[name[0]]
@@ -110,16 +113,6 @@ def _draw_deviations(axes: Axes, rows: pd.DataFrame, style: Style, key: str, ove
     return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
 
 
-def _comparison_table(comparison: Comparison | pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
-    if isinstance(comparison, pd.DataFrame):
-        return comparison
-    from tpjb_ident.compare.comparison import comparison_frame
-
-    return comparison_frame(comparison)
-
-
 def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, style: Style, over: str) -> None:
     column, size, _ = axis_of(over)
     variant, (colour, dashes, marker) = str(rows["pivots"].iloc[0]), style
@@ -138,10 +131,10 @@ _BEARING_COLOURS = ("blue", "red", "green", "purple")
 
 #: Marker, line and fill of the entry: full lines for the loaded direction.
 _ENTRY_STYLE: dict[str, tuple[str, Any, str | None]] = {
-    "xx": ("s", (0, (4, 2)), "paper"),
+    "xx": ("s", SHORT_DASHED, "paper"),
     "yy": ("o", "-", None),
-    "xy": ("<", (0, (1, 1.5)), "paper"),
-    "yx": (">", (0, (3, 1, 1, 1)), "paper"),
+    "xy": ("<", DOTTED, "paper"),
+    "yx": (">", DASH_DOTTED, "paper"),
 }
 
 
@@ -251,7 +244,7 @@ def frf(
 
 def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     label(axes, "frequency, Hz", "multiple coherence")
-    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", (0, (4, 2)))):
+    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", SHORT_DASHED)):
         axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
                   linewidth=1.2, label=f"force along {axis}")  # fmt: skip
     axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)

@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
+    DASHED,
+    DOTTED,
     FONT_SIZE,
     GREY,
     INK,
@@ -98,7 +100,7 @@ def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
     measured = ~curve.is_extrapolated(load)
     axes.fill_betweenx(load * per("load"), low, high, color=colour, alpha=0.25, linewidth=0)
     deflection = per("length") * curve.deflection(load)
-    axes.plot(deflection, load * per("load"), color=colour, linestyle=(0, (1, 1.5)), linewidth=1.2)
+    axes.plot(deflection, load * per("load"), color=colour, linestyle=DOTTED, linewidth=1.2)
     axes.plot(np.where(measured, deflection, np.nan), load * per("load"), color=colour, linewidth=1.5)
     if curve.law.contact:
         coming = load <= max(curve.onset_load, load[0])
@@ -210,7 +212,7 @@ def pivot_stiffness(
     if formula is not None:
         printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
         axes.plot(grid * per("load"), printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
-        axes.plot(grid * per("load"), printed[:, 0], color=INK, linewidth=1.3, linestyle=(0, (5, 2)),
+        axes.plot(grid * per("load"), printed[:, 0], color=INK, linewidth=1.3, linestyle=DASHED,
                   label="Kirk, printed")  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(0.0, float(grid[-1]) * per("load"))

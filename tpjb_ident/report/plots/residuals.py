@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike
 
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import symbol
-from tpjb_ident.compare.comparison import Comparison, comparison_frame
 from tpjb_ident.compare.effect_words import label_in_words
 from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
 from tpjb_ident.report.drawing.picture import (
     CHARACTER,
+    DASH_DOTTED,
     DIVERGING,
+    DOTTED,
     FONT_SIZE,
     INK,
     LEFT,
@@ -30,6 +31,7 @@ from tpjb_ident.report.drawing.picture import (
     RED,
     RULE,
     SEQUENTIAL,
+    SHORT_DASHED,
     VARIANT_LABEL,
     add_colour_bar,
     add_legend,
@@ -38,10 +40,11 @@ from tpjb_ident.report.drawing.picture import (
     new_pictures,
     shrink,
 )
-from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, axis_of, longest_series, set_point_ticks
+from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, as_table, axis_of, longest_series, set_point_ticks
 from tpjb_ident.schema import POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
+    from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.diagnosis.diagnose import Diagnosis
     from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.diagnosis.verdict.verdict import Verdict
@@ -59,11 +62,10 @@ def residual_frame(source: Diagnosis | Comparison | pd.DataFrame) -> pd.DataFram
     source : Diagnosis, Comparison or DataFrame
         Or a table of comparison.csv.
     """
-    if isinstance(source, pd.DataFrame):
-        return source if {"model", "entry", "z"} <= set(source.columns) else _of_comparison(source)
-    if isinstance(source, Comparison):
-        return _of_comparison(comparison_frame(source))
-    return _of_diagnosis(source)
+    if hasattr(source, "problem"):
+        return _of_diagnosis(source)  # type: ignore[arg-type]
+    table = as_table(source)
+    return table if {"model", "entry", "z"} <= set(table.columns) else _of_comparison(table)
 
 
 def _of_diagnosis(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -142,7 +144,8 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):
             strong = abs(norm(z) - 0.5) > 0.3
-            axes.text(j, i, _short(z), ha="center", va="center", fontsize=FONT_SIZE - 1.0,
+            text = f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
+            axes.text(j, i, text, ha="center", va="center", fontsize=FONT_SIZE - 1.0,
                       color="white" if strong else _ON_COLOUR)  # fmt: skip
     add_colour_bar(axes, image, "(measured - predicted) / sigma")
     bar = axes.figure.axes[-1]
@@ -151,13 +154,11 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
     bar.minorticks_off()
 
 
-def _short(z: float) -> str:
-    return f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
-
-
 _STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
 
-_DASHES: tuple[Any, ...] = ((0, (4, 2)), "-", (0, (1, 1.5)), (0, (3, 1, 1, 1)))
+#: Coefficients that are drawn of a diagnosis: those that disagree most.
+_WORST = 3
+_DASHES: tuple[Any, ...] = (SHORT_DASHED, "-", DOTTED, DASH_DOTTED)
 
 
 def residual_series(
@@ -192,7 +193,8 @@ def residual_series(
     if series is None:
         raise ValueError(f"there are no two points that differ in {over} alone")
     models = list(dict.fromkeys(frame["model"]))
-    chosen = list(entries or _worst(frame[frame["model"] == models[0]]))
+    squares = (frame["z"] ** 2).groupby(frame["entry"].where(frame["model"] == models[0])).sum()
+    chosen = list(entries or squares.sort_values(ascending=False).index[:_WORST])
     figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
     for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
@@ -207,11 +209,6 @@ def residual_series(
             )  # fmt: skip
     add_legend(axes)
     return figure
-
-
-def _worst(frame: pd.DataFrame, count: int = 3) -> list[str]:
-    size = (frame["z"] ** 2).groupby(frame["entry"]).sum()
-    return [str(name) for name in size.sort_values(ascending=False).index[:count]]
 
 
 def gap(
@@ -230,11 +227,17 @@ def gap(
         Or ``gap_by_observable`` of ``diagnosis.json``: ``{"kxx": {"heldout_before": 9.1, "heldout_after": 1.0}}``.
     title : str, optional
     """
-    gaps = _gaps(source)
+    # a diagnosis holds a verdict, whose own `verdict` is a word
+    verdict: Any = source if hasattr(source, "gap_by_observable") else getattr(source, "verdict", None)
+    gaps = source if isinstance(source, Mapping) else verdict.gap_by_observable
     if not gaps:
         raise ValueError("there is no gap by observable to draw")
     before, after = (np.array([gap_at(g, end) for g in gaps.values()]) for end in ("_before", "_after"))
-    words = [_row_label(name, g, b, a) for (name, g), b, a in zip(gaps.items(), before, after, strict=True)]
+    words = []
+    for (name, values), left, right in zip(gaps.items(), before, after, strict=True):
+        star = "" if any(key.startswith("heldout") for key in values) else "*"
+        worse = " (worse)" if right > max(1.05 * left, 1.0) else ""
+        words.append(f"{name.replace('_', ' ')}{star}{worse}")
     figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
@@ -251,19 +254,6 @@ def gap(
     handles = axes.get_legend_handles_labels()[0]
     add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
     return figure
-
-
-def _gaps(source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]]) -> Mapping[str, Mapping[str, float]]:
-    if isinstance(source, Mapping):
-        return source
-    # a diagnosis holds a verdict, whose own `verdict` is a word
-    return source.gap_by_observable if hasattr(source, "gap_by_observable") else source.verdict.gap_by_observable
-
-
-def _row_label(name: str, gaps: Mapping[str, float], before: float, after: float) -> str:
-    star = "" if any(k.startswith("heldout") for k in gaps) else "*"
-    worse = " (worse)" if after > max(1.05 * before, 1.0) else ""
-    return f"{name.replace('_', ' ')}{star}{worse}"
 
 
 _SQUARE = 0.3  # [inches]
@@ -299,10 +289,9 @@ def isolability(
     words = [label_in_words(name) for name in names]
     room = CHARACTER * max(len(word) for word in words)
     # the panel's own margins and the colour bar come on top of cells and names
-    figure, ((axes,),) = new_pictures(
-        1, 1, title=title, width=_SQUARE * k + room + 2.0, height=max(_SQUARE * k, _TALL) + room + 1.0
-    )
-    label(axes, "could pass for (framed: closer than 3)", "effect at work")
+    width, height = _SQUARE * k + room + 2.0, max(_SQUARE * k, _TALL) + room + 1.0
+    across, down = "could pass for (framed: closer than 3)", "effect at work"
+    figure, axes = new_picture(across, down, title=title, width=width, height=height)
     shrink(axes, left=room - 0.1, bottom=room - 0.1)
     image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE, aspect="auto", interpolation="nearest")
     axes.grid(False)

@@ -6,24 +6,27 @@ from typing import Annotated
 
 import typer
 
-from tpjb_ident.cli.commands.check import check
-from tpjb_ident.cli.commands.compare import compare
-from tpjb_ident.cli.commands.demo import demo
-from tpjb_ident.cli.commands.diagnose import diagnose
-from tpjb_ident.cli.commands.export import export
-from tpjb_ident.cli.commands.identify import identify
-from tpjb_ident.cli.commands.init import init
-from tpjb_ident.cli.commands.locus import locus
-from tpjb_ident.cli.commands.pivot import pivot
-from tpjb_ident.cli.commands.plan import plan
-from tpjb_ident.cli.commands.predict import predict
-from tpjb_ident.cli.commands.rerun import rerun
-from tpjb_ident.cli.commands.show import show
-from tpjb_ident.cli.commands.simulate import simulate
-from tpjb_ident.cli.commands.verify import verify
-from tpjb_ident.cli.commands.view import view
-from tpjb_ident.cli.commands.watch import watch
-from tpjb_ident.cli.common.options import GroupedHelp
+from tpjb_ident.cli.command import COMMANDS
+from tpjb_ident.cli.commands import (
+    check,
+    compare,
+    demo,
+    diagnose,
+    export,
+    identify,
+    init,
+    locus,
+    pivot,
+    plan,
+    predict,
+    rerun,
+    show,
+    simulate,
+    verify,
+    view,
+    watch,
+)  # fmt: skip
+from tpjb_ident.cli.options import GroupedHelp
 
 #: What is written outside --out.
 _CACHES = (
@@ -58,10 +61,11 @@ def _common(
     pass
 
 
-_COMMANDS = (
+_IN_ORDER = (
     init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
     watch, verify, rerun,
 )  # fmt: skip
-for command in _COMMANDS:
-    lines = "\n".join(f"  {example}" for example in command.examples)  # type: ignore[attr-defined]
-    app.command(command.__name__, cls=GroupedHelp, epilog=f"\b\nExamples:\n{lines}")(command)
+for module in _IN_ORDER:
+    name = module.__name__.rpartition(".")[2]
+    lines = "\n".join(f"  {example}" for example in COMMANDS[name].examples)  # type: ignore[attr-defined]
+    app.command(name, cls=GroupedHelp, epilog=f"\b\nExamples:\n{lines}")(COMMANDS[name])

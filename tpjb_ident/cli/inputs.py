@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.units import LONGEST, UnitError, parse_quantity
-from tpjb_ident.cli.common.command import Command
-from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.options import THERMAL, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -56,8 +56,15 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
     values: list[float] = []
     unit = ""
     for item in reversed(items):
-        several, unit = _item(item, unit, dimension, option)
-        values[:0] = several
+        start, dots, end = item.partition("..")
+        where = f"{option}: the range {item.strip()!r}"
+        if dots and ":" not in end:
+            raise BadInputError(f'{where} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".')
+        quantities: list[float] = []
+        for part in reversed([start, *end.split(":", 1)] if dots else [item]):
+            quantity, unit = _quantity(part, unit, dimension, option)
+            quantities.insert(0, quantity)
+        values[:0] = _range(quantities, where) if dots else quantities
         if len(values) > MAX_VALUES:
             raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
     return tuple(values)
@@ -79,24 +86,8 @@ def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
         raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
 
 
-def _item(item: str, unit: str, dimension: str, option: str) -> tuple[list[float], str]:
-    """Return the values of one list item and its leftmost unit, for the item before it."""
-    if ".." not in item:
-        value, unit = _quantity(item, unit, dimension, option)
-        return [value], unit
-    head, colon, step_text = item.partition(":")
-    start_text, _, stop_text = head.partition("..")
-    if not colon:
-        raise BadInputError(
-            f'{option}: the range {item.strip()!r} has no step. Write from..to:step, for instance "2.5..8.75:1.25 kN".'
-        )
-    step, unit = _quantity(step_text, unit, dimension, option)
-    stop, unit = _quantity(stop_text, unit, dimension, option)
-    start, unit = _quantity(start_text, unit, dimension, option)
-    return _range(start, stop, step, f"{option}: the range {item.strip()!r}"), unit
-
-
-def _range(start: float, stop: float, step: float, where: str) -> list[float]:
+def _range(quantities: Sequence[float], where: str) -> list[float]:
+    start, stop, step = quantities
     if step == 0 or (stop - start) * step < 0:
         raise BadInputError(
             f"{where} never reaches its end. Give a step that leads from the first to the second value."
@@ -122,7 +113,6 @@ def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float,
 
 
 _PIVOTS = ("rigid", "kirk", "kirk-secant")
-_THERMAL = ("isothermal", "adiabatic", "tehd", "thd")
 
 
 def operating_points(
@@ -171,7 +161,7 @@ def pivot_choice(c: Command, text: str) -> str | float | Path:
 
 def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects: Path | None) -> ModelSettings:
     """Build `ModelSettings` from options."""
-    refuse_unknown(thermal, _THERMAL, "--thermal")
+    refuse_unknown(thermal, THERMAL, "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings
 
     if effects is None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tpjb_ident.cli.common.command import Command
-from tpjb_ident.cli.common.options import refuse_unknown
+from tpjb_ident.cli.command import Command
+from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.columns import UNITS, Column, amount, size, symbol, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -53,6 +53,7 @@ _MODEL_TABLE = [_LOAD, _MODEL, *(_COEFFICIENTS[i] for i in _DIRECT), *_MASSES, _
 
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
     """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check."""
+    from tpjb_ident.arguments import least_clearance
     from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
     from tpjb_ident.dynamic.settings import IdentifySettings
 
@@ -64,19 +65,16 @@ def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | N
     if not campaign.of_kind("dynamic"):
         raise BadInputError(f"campaign {campaign.id}: has no dynamic runs; there is nothing to identify.")
     estimator = f"rlm:{norm or 'huber'}" if method == "rlm" else method
-    return IdentifySettings(method=estimator, clearance=_clearance(c, campaign))
+    return IdentifySettings(method=estimator, clearance=least_clearance(campaign, c.warn))
 
 
-def _clearance(c: Command, campaign: Campaign) -> float | None:
-    """Smallest assembled clearance [m], None if the campaign carries no bearing that can be read."""
-    from model.bearing import BearingError
-    from tpjb_ident.arguments import least_clearance
+def identified(c: Command, campaign: Campaign, method: str, norm: str | None) -> Identification:
+    """Identify a campaign."""
+    from tpjb_ident.identification.identify import identify
 
-    try:
-        return least_clearance(campaign)
-    except BearingError as error:  # coefficients need no bearing
-        c.warn(f"{error} Until then the amplitude is not held against the clearance.")
-        return None
+    settings = identify_settings(c, campaign, method, norm)
+    with c.progress(f"identifying {campaign.id}") as show:
+        return identify(campaign, settings, show)
 
 
 def write_identification(c: Command, result: Identification) -> None:

@@ -6,16 +6,20 @@ A signal is delivered again until the error that it raises is being handled or t
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 #: s between two looks at what became of a signal
 _PAUSE = 0.1
-#: the signal that nobody has heard yet
+#: the signal that nobody has heard yet, and the number of the last one that came
 _open: object | None = None
+_signalled = 0
 
 
 def listen() -> None:
@@ -39,6 +43,17 @@ def stop_listening() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+def leave_if_signalled(code: Any) -> None:
+    """End at once if a signal came: libraries that it caught while they were loaded may fail at the very end."""
+    if _signalled:
+        stop_listening()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        # a library that it caught may have lost its number
+        os._exit(128 + _signalled if code in (130, 143) else code)
+
+
 def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
     """The interrupt that an error was made of, if any."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
@@ -47,7 +62,8 @@ def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
 
 
 def _interrupt(number: int, frame: Any) -> None:
-    global _open
+    global _open, _signalled
+    _signalled = number
     if _open is None:
         _open = object()
         _thread.start_new_thread(_deliver_again, (number, _open))  # threading's own locks may be held here
@@ -72,3 +88,22 @@ def _without_interrupts(lost: Any) -> None:
     """Print what Python drops, as of a destructor, but not an interrupt, which comes again."""
     if not issubclass(lost.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(lost)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Hear Ctrl-C and SIGTERM only when the block has ended: a process begun and not yet noted would never be ended.
+
+    The end of this one would wait for it, and it for somebody who takes its answer.
+    """
+    held: list[int] = []
+    # other threads are not interrupted
+    kinds = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}
+    try:
+        yield
+    finally:
+        for kind, handler in former.items():
+            signal.signal(kind, handler or signal.SIG_DFL)
+        for number in held[:1]:  # also where the block failed: the signal may have ended the workers that it calls
+            signal.raise_signal(number)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import shlex
 import shutil
+import sys
 import textwrap
 import time
+import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +16,10 @@ from tpjb_ident.columns import Column
 from tpjb_ident.runtime.tables import printable, readable
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from tpjb_ident.report.page import Table
 
-
-#: Seconds between two lines about progress where there is no terminal.
-LINE_EVERY = 30.0
+#: Seconds between two lines about progress where there is no terminal, and between two states of the one line on it.
+LINE_EVERY, _STATE_EVERY = 30.0, 0.1
 #: Columns of a log file or a pipe.
 _LOG_WIDTH = 80
 #: Rows of a table that are printed where a file has them all.
@@ -27,8 +28,6 @@ MOST_ROWS = 40
 _FORETELLS = 0.02
 #: Columns between two columns of a table.
 _SPACE = 2
-#: A column of words is not made narrower than this; what needs less room than it has is printed below the row instead.
-_NARROWEST = 14
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
@@ -48,7 +47,7 @@ class Terminal:
         """Print one line; text from outside is shown as it is, less its control characters."""
         self.lines.append(printable(text))
         if not self._silent:
-            _console().print(_fitted(text), markup=False)
+            print(_fitted(text), flush=True)
 
     def next(self, *words: object) -> None:
         """Note the command that comes next, by its words after `tpjb` or as typed; it is the last line of all."""
@@ -62,29 +61,29 @@ class Terminal:
         line = f"Next: {printable(self.following)}"
         self.lines.append(line)
         if not self._silent:
-            _console().print(line, markup=False)
+            print(line, flush=True)
 
     def error(self, kind: str, text: str) -> None:
         """Print a message to stderr, its lines kept."""
-        lines = "\n".join(printable(line) for line in text.splitlines())
-        self.messages.append({"kind": kind, "text": lines})
-        _print_message(kind, lines)
+        self._say(kind, "\n".join(printable(line) for line in text.splitlines()), True)
 
     def warn(self, text: str) -> None:
         """Print a warning to stderr."""
-        self.messages.append({"kind": "warning", "text": printable(text)})
-        _print_message("warning", printable(text))
+        self._say("warning", printable(text), True)
 
     def note(self, text: str) -> None:
         """Print a remark to stderr; not of a quiet command."""
-        self.messages.append({"kind": "note", "text": printable(text)})
-        if not self._silent:
-            _print_message("note", printable(text))
+        self._say("note", printable(text), not self._silent)
 
     def doing(self, text: str) -> None:
         """Print to stderr what the command is at."""
         if not self._silent:
             _print_message("doing", printable(text))
+
+    def _say(self, kind: str, text: str, aloud: bool) -> None:
+        self.messages.append({"kind": kind, "text": text})
+        if aloud:
+            _print_message(kind, text)
 
     def show(
         self,
@@ -108,40 +107,44 @@ class Terminal:
         words = [i for i, column in enumerate(columns) if column.words]
         shown_headings = [readable(heading) for heading in headings]
         title, lines = _titled_table(printable(title), shown_headings, shown, words)
-        for line in ("", title, *lines, ""):
-            _console().print(line, markup=False)
-        if len(head) < len(texts):
-            _console().print(f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}", markup=False)
+        more = [f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}"] if len(head) < len(texts) else []
+        print("\n".join(["", title, *lines, "", *more]), flush=True)
+
+    def show_table(self, table: Table, name: str = "") -> None:
+        """Print a table of a page; `name` says what it is of."""
+        columns = [Column(title, words=i in table.text_columns) for i, title in enumerate(table.columns)]
+        self.show(": ".join(filter(None, (name, table.caption))), columns, table.rows)
+
+    @contextlib.contextmanager
+    def conclusion(self, sentences: Sequence[str], following: str) -> Iterator[None]:
+        """Print the answer, what the block shows, and all else; the command that comes next is noted."""
+        answer, *more = sentences
+        self.print(answer)
+        if following:
+            self.next(following)
+        yield
+        for line in more:
+            self.print(line)
 
     @contextlib.contextmanager
     def progress(self, activity: str) -> Iterator[Progress]:
-        """Show a bar with the remaining time on a terminal while the block runs; elsewhere a line now and then."""
-        console = _console(stderr=True)
-        if self._silent or not console.is_terminal:
+        """Show how far the block is and the time left: on a terminal in one line, elsewhere in one now and then."""
+        if not self._silent and sys.stderr.isatty():
+            yield ProgressLines(activity, _overwrite, _STATE_EVERY).show
+            _overwrite("")
+        else:
             self.doing(activity)
             yield ProgressLines(activity, self.doing).show
-            return
-        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-        from rich.progress import Progress as Bar
-
-        text = TextColumn("{task.description}", markup=False)
-        columns = (text, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-        with Bar(*columns, TextColumn("left"), console=console, transient=True, speed_estimate_period=120.0) as bar:
-            task = bar.add_task(activity, total=1.0)
-
-            def show(step: str, done: int, total: int) -> None:
-                # a step that cannot be counted pulses; a full bar would stop the clock
-                share, whole = (min(done / total, 0.999), 1.0) if total > 1 else (0.0, None)
-                bar.update(task, total=whole, completed=share, description=f"{activity}: {printable(step)}")
-
-            yield show
 
 
 class ProgressLines:
-    """Progress for a log file: a line with the remaining time every half minute, none for what is quickly done."""
+    """Progress for a log file: a line with the remaining time every half minute, none for what is quickly done.
 
-    def __init__(self, activity: str, report: Callable[[str], None]) -> None:
-        self._activity, self._report = activity, report
+    With a time of its own between two lines, every step is reported as it comes.
+    """
+
+    def __init__(self, activity: str, report: Callable[[str], None], every: float | None = None) -> None:
+        self._activity, self._report, self._every = activity, report, every
         self._step, self._first = 0, 0
         self._began = self._last = time.monotonic()
 
@@ -152,14 +155,23 @@ class ProgressLines:
         if done <= self._step or done == 1:
             self._began, self._first = now, done
         self._step = done
-        if now - self._last < LINE_EVERY or not 0 < done < total:
+        is_counted = 0 < done < total
+        every = LINE_EVERY if self._every is None else self._every
+        if now - self._last < every or not (is_counted or self._every):
             return
         self._last = now
         remaining = ""
         counted = done - self._first
         if counted > 0 and done >= _FORETELLS * total:
             remaining = f", about {_duration((now - self._began) * (total - done) / counted)} left"
-        self._report(f"{self._activity}: {done} of {total}{remaining} ({text})")
+        count = f"{done} of {total}{remaining} ({text})" if is_counted else text
+        self._report(f"{self._activity}: {count}")
+
+
+def _overwrite(text: str) -> None:
+    """Write over the last line of a terminal."""
+    room = _width() - 1
+    print(f"\r{printable(text)[:room]:{room}}", end="" if text else "\r", file=sys.stderr, flush=True)
 
 
 def _duration(seconds: float) -> str:
@@ -169,19 +181,10 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 120 else f"{minutes / 60:.1f} h"
 
 
-def _console(stderr: bool = False) -> Console:
-    from rich.console import Console
-
-    class PipeConsole(Console):
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError  # the command then ends well; rich would say 1
-
-    return PipeConsole(stderr=stderr, highlight=False, soft_wrap=True)
-
-
 def _print_message(kind: str, text: str) -> None:
-    style = "bold red" if kind == "bug" else None
-    _console(stderr=True).print(_fitted(f"tpjb: {kind}: {text}", stderr=True), markup=False, style=style)
+    if sys.stderr.isatty():
+        _overwrite("")  # the line of a progress
+    print(_fitted(f"tpjb: {kind}: {text}", sys.stderr.isatty()), file=sys.stderr, flush=True)
 
 
 def _width() -> int:
@@ -204,21 +207,17 @@ def _titled_table(title: str, headings: list[str], rows: list[list[str]], words:
         title += f"; {headings[constant]} {rows[0][constant].strip()}"
 
 
-def _fitted(text: str, stderr: bool = False) -> str:
+def _fitted(text: str, wraps: bool = True) -> str:
     """Lines with whole words, as wide as a table; messages in a log stay whole, for who searches them."""
     lines = [readable(line) for line in text.split("\n")]
-    if _console(stderr).is_terminal or not stderr:
+    if wraps:
         lines = [part for line in lines for part in wrapped(line, _width())]
     return "\n".join(lines)
 
 
 def cell_len(text: str) -> int:
     """Columns that a text takes on a terminal; wide letters take two."""
-    if text.isascii():
-        return len(text)
-    from rich.cells import cell_len as measured  # only where it is needed: help shall be instant
-
-    return measured(text)
+    return len(text) + sum(unicodedata.east_asian_width(letter) in ("W", "F") for letter in text)
 
 
 def wrapped(text: str, width: int) -> list[str]:
@@ -229,7 +228,7 @@ def wrapped(text: str, width: int) -> list[str]:
 def table_lines(
     columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int, whole: bool = False
 ) -> list[str]:
-    """Lay out a table: numbers are never broken, words wrap, what has no room is printed below its row.
+    """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers.
 
     Numbers of a `whole` one stay in their row, however wide it is.
     """
@@ -238,50 +237,35 @@ def table_lines(
     if _total(sizes) > width:  # headings break at spaces first
         longest = [max((cell_len(word) for word in column.split()), default=0) for column in columns]
         sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
-    below = _narrow(sizes, words, width, words if whole else range(len(sizes)))
-    beside = [i for i in range(len(columns)) if i not in below]
-    layout = [(i, sizes[i], i in words) for i in beside]
-    lines = _row_lines(columns, layout, bottom=True)
+    beside = list(range(len(columns)))
+    movable = [i for i in beside[1:] if i in words or not whole]
+    while movable and _total([sizes[i] for i in beside]) > width:
+        last = max([i for i in movable if i in words] or movable)
+        movable.remove(last)
+        beside.remove(last)
+    headings = [textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False) for i in beside]
+    height = max(map(len, headings))
+    layout = [(sizes[i], i in words) for i in beside]
+    head = zip(*([""] * (height - len(heading)) + heading for heading in headings), strict=True)
+    lines = [_row_line(texts, layout) for texts in head]
     lines.append("-" * min(width, _total([sizes[i] for i in beside])))
     for row in rows:
-        lines += _row_lines(row, layout)
-        texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below if row[i].strip(" -")]
+        lines.append(_row_line([row[i] for i in beside], layout))
+        below = [i for i in range(len(columns)) if i not in beside and row[i].strip(" -")]
+        texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below]
         if texts:
             lines += [f"    {line}" for line in wrapped("; ".join(texts), width - 4)]
     return lines
-
-
-def _narrow(sizes: list[int], words: Collection[int], width: int, movable: Iterable[int]) -> list[int]:
-    """Make columns of words narrower until the table fits; what still has no room is to be printed below its row."""
-    below: list[int] = []
-    while True:
-        over = _total([size for i, size in enumerate(sizes) if i not in below]) - width
-        candidates = [i for i in movable if i > 0 and i not in below]
-        wide = [i for i in words if i not in below and sizes[i] > _NARROWEST]
-        if over > 0 and wide:
-            widest = max(wide, key=lambda i: sizes[i])
-            sizes[widest] = max(_NARROWEST, sizes[widest] - over)
-        elif over > 0 and candidates:
-            below.append(max([i for i in candidates if i in words] or candidates))
-        else:
-            return sorted(below)
 
 
 def _total(sizes: Sequence[int]) -> int:
     return sum(sizes) + _SPACE * (len(sizes) - 1)
 
 
-def _row_lines(row: Sequence[str], layout: Sequence[tuple[int, int, bool]], bottom: bool = False) -> list[str]:
-    """Lines of one row, of (column, its size, whether it holds words) each; headings end at the bottom of theirs."""
-    blocks = []
-    for column, size, is_text in layout:
-        parts = [row[column]]
-        if cell_len(row[column]) > size:
-            parts = textwrap.wrap(row[column], max(size, 1), break_on_hyphens=False) or [""]
-        pads = [" " * max(0, size - cell_len(part)) for part in parts]
-        blocks.append((size, [part + pad if is_text else pad + part for part, pad in zip(parts, pads, strict=True)]))
-    height = max((len(block) for _, block in blocks), default=1)
-    for size, block in blocks:
-        missing = [" " * size] * (height - len(block))
-        block[:] = [*missing, *block] if bottom else [*block, *missing]
-    return [(" " * _SPACE).join(cells).rstrip() for cells in zip(*(block for _, block in blocks), strict=True)]
+def _row_line(texts: Iterable[str], layout: Sequence[tuple[int, bool]]) -> str:
+    """One line of a table, of the size of each column and whether it holds words, which stand left."""
+    cells = []
+    for text, (size, is_text) in zip(texts, layout, strict=True):
+        pad = " " * (size - cell_len(text))
+        cells.append(text + pad if is_text else pad + text)
+    return (" " * _SPACE).join(cells).rstrip()

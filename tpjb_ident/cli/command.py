@@ -1,8 +1,8 @@
 """One object for one run of a command, and the decorator that makes a command of a function.
 
-A command is a function in a file of `tpjb_ident.cli.commands`, decorated with ``@command(..)`` and listed in
-`tpjb_ident.cli.app`. Its first argument is the `Command`: it opens what the user gave, takes tables, messages and the
-next command, and at the end writes run.json, prints the document of ``--json`` and turns errors into exit codes.
+A command is a function in a file of `tpjb_ident.cli.commands`, decorated with ``@command(..)`` and listed in its `app`.
+Its first argument is the `Command`: it opens what the user gave, takes tables, messages and the next command, and at
+the end writes run.json, prints the document of ``--json`` and turns errors into exit codes.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rigdata.problem import RigError
-from tpjb_ident.cli.common.interrupts import heard, interrupt_behind
-from tpjb_ident.cli.common.terminal import Terminal
+from tpjb_ident.cli.options import option
+from tpjb_ident.cli.terminal import Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
+from tpjb_ident.runtime.interrupts import heard, interrupt_behind
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
 from tpjb_ident.runtime.provenance import TABLE_SCHEMA, sha256, versions
 from tpjb_ident.runtime.tables import write_csv, write_table, write_text
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from model.bearing import Bearing
     from rigdata.campaign import Campaign
+    from tpjb_ident.report.figure import Panel
 
 _BUG, _BAD_INPUT, _NOT_TRUSTED, _INTERRUPTED, _TERMINATED = 1, 2, 3, 130, 143
 #: What numpy says of single operations is for programmers: run.json lists it, people are told by conditions.
@@ -46,6 +48,7 @@ _ARITHMETIC = re.compile(r"encountered in|empty slice|All-NaN|[Dd]egrees of free
 #: A result table of more rows is named in the document of ``--json``, not repeated in it.
 _MOST_ROWS = 5000
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
+REPORT = "report.html"
 #: Every command by its name, as its file is imported.
 COMMANDS: dict[str, Callable[..., None]] = {}
 #: Options that change how a command runs, not what it computes.
@@ -147,7 +150,7 @@ class Command(Terminal):
         """Write a table of the results as CSV and Parquet."""
         write_table(self.folder, name, frame)
         if in_us_units():
-            from tpjb_ident.us_table import us_table
+            from tpjb_ident.presentation import us_table
 
             write_csv(self.folder / f"{name}_us.csv", us_table(frame))
 
@@ -155,15 +158,25 @@ class Command(Terminal):
         """Write a JSON file of the results."""
         write_text(self.folder / name, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
+    def draw(self, panels: Sequence[Panel]) -> None:
+        """Write the figures of the results."""
+        from tpjb_ident.report.figure import save_panels
+
+        save_panels(panels, self.folder / "figures")
+
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""
         self._outputs = list(dict.fromkeys([*self._outputs, *names]))
 
     def run(self, function: Callable[..., None], options: Mapping[str, Any]) -> int:
-        """Run the command, and print the one that comes next, last of all."""
+        """Run the command, and print where its results are and, last of all, the command that comes next."""
         exit_code = self._ended(function, options)
         if exit_code in (0, _BAD_INPUT, _NOT_TRUSTED):
             with contextlib.suppress(BrokenPipeError):
+                if REPORT in self._outputs:
+                    self.print(f"Report: {self.target / REPORT}")
+                elif self._outputs:
+                    self.print(f"Results: {self.target}")
                 self.close()
         return exit_code
 
@@ -234,30 +247,20 @@ class Command(Terminal):
         }
 
 
-def command(
-    *examples: str, out_help: str = "Folder for the results [default: tpjb-COMMAND-out here]."
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Make a command of a function that takes a `Command` and then its options: --out, --json, --quiet come with it.
 
-    The examples are printed below its help.
+    The examples are printed below its help; what can be typed for each parameter is in `options`.
     """
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__name__
-        hints = typing.get_type_hints(function, include_extras=True) | {
-            "out": Annotated[Path | None, typer.Option("--out", metavar="DIR", help=out_help)],
-            "as_json": Annotated[
-                bool, typer.Option("--json", help="Print one JSON document with all results, for other programs.")
-            ],
-            "units": Annotated[str, typer.Option("--units", help="Units of what is printed and drawn: si or us.")],
-            "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")],
-        }
+        own = list(inspect.signature(function).parameters.values())[1:]
 
-        @functools.wraps(function)
         def run(
             out: Path | None = None, as_json: bool = False, units: str = "si", quiet: bool = False, **options: Any
         ) -> None:
-            recorded = {key: options[key] for key in own if key not in _UNRECORDED}
+            recorded = {p.name: options[p.name] for p in own if p.name not in _UNRECORDED}
             recorded |= {"units": units} if units != "si" else {}
             c = Command(name, recorded, out, as_json, quiet)
             exit_code = c.run(function, options)
@@ -266,15 +269,15 @@ def command(
             if exit_code:
                 raise typer.Exit(exit_code)
 
-        common = inspect.signature(run, follow_wrapped=False).parameters
-        _, *own = inspect.signature(function).parameters
+        hints = typing.get_type_hints(function) | typing.get_type_hints(run)
+        *common, _ = inspect.signature(run).parameters.values()
+        functools.update_wrapper(run, function)
         parameters = []
-        for parameter in (*inspect.signature(function).parameters.values(), *common.values()):
-            if parameter.name in hints and parameter.name != "c":
-                keyword = inspect.Parameter.KEYWORD_ONLY
-                parameters.append(parameter.replace(annotation=hints[parameter.name], kind=keyword))
+        for parameter in (*own, *common):
+            annotation: Any = Annotated[hints[parameter.name], option(name, parameter.name)]  # type: ignore
+            run.__annotations__[parameter.name] = annotation
+            parameters.append(parameter.replace(annotation=annotation, kind=inspect.Parameter.KEYWORD_ONLY))
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = hints
         run.examples = examples  # type: ignore[attr-defined]
         COMMANDS[name] = run
         return run

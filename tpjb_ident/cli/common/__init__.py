@@ -1,1 +1,0 @@
-"""What several commands share: options, inputs, the terminal, run.json, exit codes."""
