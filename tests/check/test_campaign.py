@@ -18,7 +18,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from rigdata.virtual_rig import Fault, Noise, Timing
+from rigdata.virtual_rig import Fault, Noise, Sensor, Timing
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
@@ -262,6 +262,27 @@ def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_
     (point,) = identify(campaign, IdentifySettings(methods=())).points
     reached = {"error": "records-contradicted", "warning": "records-doubtful"}.get(says or "")
     assert [c for c in point.quality if "from where the load pushes it" in c.detail] == ([reached] if reached else [])
+
+
+SPARE = (Sensor.probe("X1C", math.radians(90.0), 8.1), Sensor.probe("X1D", 0.0, 7.9))
+
+
+@pytest.mark.parametrize(
+    ("gain", "dead", "expected"),
+    [
+        (1.0, False, []),
+        (1.0, True, [("warning", "p-2-up", "is dead")]),
+        (1.1, False, [("error", None, "contradict one another"), ("warning", "c-1", "contradict one another")]),
+    ],
+)
+def test_spare_probes_that_contradict_the_others_are_told_of_dry_runs_and_sweep(campaign_of, gain, dead, expected):
+    rig = stiff_rig(4, plan=replace(TINY, dynamic=(), dry=PLAN.dry), pivot_stiffness=1e8)
+    spare = (SPARE[0].with_error(gain=gain), SPARE[1])
+    instruments = replace(rig.instruments, sensors=(*rig.instruments.sensors, *spare))
+    rig = replace(rig, instruments=instruments, faults=(Fault("dead", "p-2-up", "X1C"),) if dead else ())
+    found = [p for p in check_campaign(campaign_of(rig)) if p.severity != "note"]
+    assert [(p.severity, p.run) for p in found] == [told[:2] for told in expected], [str(p) for p in found]
+    assert all(says in p.what for p, (_, _, says) in zip(found, expected))
 
 
 def test_what_one_of_many_static_runs_shows_stays_its_own():

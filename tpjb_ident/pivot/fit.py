@@ -26,9 +26,7 @@ from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_l
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
     axial_channels,
-    displacement_direction,
     noise_about_curve,
-    noise_within_holds,
     read_dry_run,
     relative_calibration,
 )
@@ -43,7 +41,7 @@ from tpjb_ident.pivot.law_fit import (
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_of
+from tpjb_ident.pivot.refusals import refused_records, structure_of
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -189,10 +187,8 @@ def fit_pivots(
     settings = settings or PivotSettings()
     angles = np.asarray(pivot_angles, dtype=float)
     records, problems = _read(campaign, angles, settings)
-    noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
-    records = [replace(r, displacement_direction=displacement_direction(r.blocks, noise)) for r in records]
-    problems += check_spares(records) + check_placement(records) + check_pickup(records)
-    problems += check_directions(records, settings, angles)
+    records, contradicted, noise = refused_records(records, settings, angles)
+    problems += contradicted
     refused = {problem.run for problem in problems}
     pads: dict[int, list[DryRecord]] = {}
     for record in records:
@@ -217,7 +213,10 @@ def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tu
     problems: list[Problem] = []
     for run in runs:
         try:
-            records.append(read_dry_run(run, angles, settings))
+            if run.pad is None or not 1 <= run.pad <= len(angles):
+                what = f"run {run.id} names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
+                raise refuse(run.file, "pad", what, "Correct the manifest", run.id)
+            records.append(read_dry_run(run, float(angles[run.pad - 1]), settings))
         except RigDataError as error:
             problems += error.problems
     return records, problems
