@@ -25,7 +25,7 @@ from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, other_line, steady_level
 from tpjb_ident.check.response import definiteness, mirrored
-from tpjb_ident.check.signals import is_spare
+from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
@@ -80,6 +80,23 @@ def test_sines_do_not_look_clipped_and_clipped_ones_do(noise):
     assert seen(wave).clipped_share() == 0.0
     assert seen(np.clip(wave, -0.08, np.inf)).clipped_share() > 0.15
     assert seen(np.clip(wave, -np.inf, 0.095)).clipped_share() > 0.05
+
+
+@pytest.mark.parametrize(("kind", "named"), [("dry_pivot", False), ("dynamic", True)])
+def test_a_load_that_is_held_on_one_step_of_the_converter_is_not_clipped(kind, named):
+    """Ten holds of 200 readings with ramps of 40 between them; the last leaves its step for a reading now and then."""
+    knots = np.cumsum(np.tile([40, 200], 10))
+    steps = np.round(np.interp(np.arange(2400), np.r_[0, knots], np.r_[0, np.repeat(16.0 * np.arange(1, 11), 2)]))
+    steps[-150::30] -= 1.0
+    statistics, probe = seen(8.0 + 0.01 * steps), PROBES[0]
+    assert statistics.clipped_share() > 0.05
+    report = Reporter(replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), kind=kind))
+    check_signal(report, probe, statistics, False, PROBES)
+    assert any("clipped" in f.key for f in report.found) is named
+    # a slow wave that meets a limit stands nowhere else
+    wave = np.minimum(70.0 * np.sin(np.arange(2400) / 20.0), 60.0).round()
+    check_signal(report, replace(probe, name="B"), seen(wave), False, PROBES)
+    assert any(f.key == "clipped B" for f in report.found)
 
 
 def test_coarse_converters_repeat_readings_without_being_stuck():

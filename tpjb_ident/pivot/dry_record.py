@@ -192,11 +192,12 @@ def load_direction(blocks: Blocks) -> PadDirection:
     return _growth(vectors, size, np.eye(len(size)), len(size) / holds)
 
 
-def displacement_direction(blocks: Blocks, noise: NoiseModel) -> PadDirection:
+def displacement_direction(blocks: Blocks, noise: NoiseModel, quantisation: float = 0.0) -> PadDirection:
     """Direction in which the shaft moves as the load grows, relative to the pad; both components carry one noise."""
     vectors = np.column_stack([blocks.deflection, blocks.across])
     size = np.hypot(blocks.load, blocks.across_load)
-    return _growth(vectors, size, noise.covariance(blocks.time, blocks.duration), 1.0)
+    covariance = noise.covariance(blocks.time, blocks.duration) + quantisation**2 * np.eye(len(size))
+    return _growth(vectors, size, covariance, 1.0)
 
 
 def _growth(vectors: FloatArray, size: FloatArray, covariance: FloatArray, dependence: float) -> PadDirection:

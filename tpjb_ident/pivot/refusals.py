@@ -65,7 +65,8 @@ def refused_records(
 ) -> tuple[list[DryRecord], list[Problem], NoiseModel]:
     """Records with the directions of their displacements, why some are not what they claim to be, their noise."""
     noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
-    records = [replace(r, displacement_direction=displacement_direction(r.blocks, noise)) for r in records]
+    moved = [displacement_direction(record.blocks, noise, record.quantisation) for record in records]
+    records = [replace(record, displacement_direction=way) for record, way in zip(records, moved, strict=True)]
     problems = check_directions(records, settings, pad_angles) + check_pickup(records)
     return records, problems + check_placement(records) + check_spares(records, noise), noise
 
