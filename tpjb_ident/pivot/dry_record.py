@@ -76,6 +76,7 @@ class DryRecord:
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
+    creep: float = 0.0  #: share of the deflection that crept and was taken off
 
 
 def read_dry_run(run: Run, angle: float | None, settings: PivotSettings) -> DryRecord:

@@ -22,6 +22,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
@@ -75,14 +76,15 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSet
         covariance[part, part] += record.quantisation**2 * (one_hold | np.eye(len(blocks), dtype=bool))
         if len(records) > 1:
             covariance[part, part] += UNKNOWN_ZERO**2
-    both = len(np.unique(branch)) > 1
+    both, creep = len(np.unique(branch)) > 1, max(record.creep for record in records)
     return FitData(
         load=load,
         deflection=deflection - deflection[int(np.argmin(load))],
         branch=branch,
         whitener=np.linalg.inv(np.linalg.cholesky(covariance)),
         reference_load=REFERENCE_SHARE * float(np.max(load)),
-        friction=(0.0, 0.05) if both else (settings.friction_share, settings.friction_share_se),
+        # on one branch a share of the load and a share of the deflection that creeps are one error
+        friction=(0.0, 0.05) if both else (settings.friction_share, max(settings.friction_share_se, creep)),
     )
 
 
@@ -197,10 +199,13 @@ def fit_pivots(
     many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (settings.on_refusal == "raise" or not pads or (settings.on_refusal == "few" and many)):
         raise RigDataError(problems)
-    for number, pad_records in pads.items():
+    used = [record for pad_records in pads.values() for record in pad_records]
+    used, noise, creeps = without_creep(used, noise, settings.drift_rate)
+    for number in pads:
+        pad_records = [record for record in used if record.pad == number]
         pads[number] = [replace(record, good=~bad_blocks(record, noise, settings)) for record in pad_records]
     curves = _fit_pads([pads[number] for number in sorted(pads)], settings, str(structure_of(records, settings) or ""))
-    return tuple(replace(curve, status=(*curve.status, *refused_runs(problems))) for curve in curves)
+    return tuple(replace(curve, status=(*curve.status, *creeps, *refused_runs(problems))) for curve in curves)
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
