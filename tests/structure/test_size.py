@@ -18,17 +18,19 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (137.47, 16_463),
+    # what check says of held loads, and the spare channels' noise: more than what it no longer judges itself
+    "measurement": (137.75, 16_478),
     "model": (91.86, 12_029),
     "rigdata": (70.84, 9_480),
     "diagnosis": (39.0, 4_824),
     "cli": (29.4, 4_095),
     "report": (27.28, 3_482),
-    "pivot": (18.54, 2_542),
-    "clearance": (8.67, 1_149),
+    # creep of the deflection, and the refusals that check asks for too
+    "pivot": (20.17, 2_703),
+    "clearance": (8.72, 1_156),
     "compare": (13.34, 1_834),
     "watch": (6.44, 824),
-    "top level": (6.9, 1_290),
+    "top level": (6.91, 1_293),  # a condition more
     "runtime": (7.69, 1_171),
     "exports": (5.53, 852),
     "view": (4.96, 575),

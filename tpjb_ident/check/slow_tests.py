@@ -83,7 +83,8 @@ def _take(observation: Observation, problems: Sequence[Problem]) -> None:
 
 
 def _is_firm(record: DryRecord) -> bool:
-    return record.displacement_direction.se < _FIRM
+    """Whether the load goes toward the pad, and the shaft clearly somewhere."""
+    return record.displacement_direction.se < _FIRM and abs(record.load_direction.angle) < _LEAST_WRONG
 
 
 def _turned_alike(records: Sequence[DryRecord]) -> float | None:
@@ -105,7 +106,7 @@ def _say_refusal(observation: Observation, record: DryRecord, problem: Problem) 
         return
     channels = observation.of(quantity)
     wanted = record.angle + (0.0 if quantity == "force" else record.load_direction.angle)
-    readings = directions([c.axis for c in channels]) @ directions(record.angle + direction.angle)
+    readings = directions([c.axis or 0.0 for c in channels]) @ directions(record.angle + direction.angle)
     hint = guess_wiring(channels, readings, directions(wanted), within=_MENDED[quantity])
     if quantity == "displacement" and _is_firm(record):
         _say_of_probes(observation, ("signs", hint), problem.severity, problem.what + hint, problem.cure)
@@ -164,7 +165,7 @@ def _turns(observation: Observation, force: FloatArray, readings: FloatArray) ->
     load = force - force.mean(axis=0)
     design = np.column_stack([load / np.linalg.norm(load, axis=1, keepdims=True), np.ones(len(load))])
     answer = np.linalg.lstsq(design, readings, rcond=None)[0]
-    along = directions([channel.axis for channel in observation.of("displacement")])
+    along = directions([channel.axis or 0.0 for channel in observation.of("displacement")])
     turned = along[:, 0] * answer[1] - along[:, 1] * answer[0]
     return np.asarray(np.degrees(np.arctan2(turned, np.sum(along * answer[:2].T, axis=1))))
 

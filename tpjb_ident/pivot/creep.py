@@ -38,7 +38,8 @@ def without_creep(
     if not held:
         return list(records), noise, ()
     times = np.median([hold.duration for record in held for hold in record.holds]) * np.array(_TIMES)
-    less, condition = list(records), ()
+    less = list(records)
+    condition: tuple[Condition, ...] = ()
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
         sums = np.array([_held_to_light(record, noise, times) for record in held])
         information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
