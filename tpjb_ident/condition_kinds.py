@@ -90,6 +90,9 @@ WARNINGS = {
     "intervals hold random errors only for them. State `uncertainty` in the manifest.",
     "cells-against-set-points": "The load cells and the set points disagree alike in all runs: the gain of one or "
     "of the other is off.",
+    "deflection-creeps": "In all dry tests alike the deflection goes on within the holds as the load went: a liner, a "
+    "joint or a seal creeps. What the holds show of it was taken off; whether the next step ends it they do not show, "
+    "and the interval holds both. Step faster, or hold until it stands.",
     "directional-rejection": "Rejected windows gather in some excitation directions: that is how physics looks, "
     "not glitches. Look at these runs before relying on the point.",
     "excitation-not-stated": "The table does not say how fast the shaft was shaken: once a turn was supposed. "

@@ -18,14 +18,14 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from rigdata.virtual_rig import Fault, Noise
+from rigdata.virtual_rig import Fault, Noise, Sensor
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, other_line, steady_level
 from tpjb_ident.check.response import definiteness, mirrored
-from tpjb_ident.check.signals import is_spare
+from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
 from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
@@ -80,6 +80,23 @@ def test_sines_do_not_look_clipped_and_clipped_ones_do(noise):
     assert seen(wave).clipped_share() == 0.0
     assert seen(np.clip(wave, -0.08, np.inf)).clipped_share() > 0.15
     assert seen(np.clip(wave, -np.inf, 0.095)).clipped_share() > 0.05
+
+
+@pytest.mark.parametrize(("kind", "named"), [("dry_pivot", False), ("dynamic", True)])
+def test_a_load_that_is_held_on_one_step_of_the_converter_is_not_clipped(kind, named):
+    """Ten holds of 200 readings with ramps of 40 between them; the last leaves its step for a reading now and then."""
+    knots = np.cumsum(np.tile([40, 200], 10))
+    steps = np.round(np.interp(np.arange(2400), np.r_[0, knots], np.r_[0, np.repeat(16.0 * np.arange(1, 11), 2)]))
+    steps[-150::30] -= 1.0
+    statistics, probe = seen(8.0 + 0.01 * steps), PROBES[0]
+    assert statistics.clipped_share() > 0.05
+    report = Reporter(replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), kind=kind))
+    check_signal(report, probe, statistics, False, PROBES)
+    assert any("clipped" in f.key for f in report.found) is named
+    # a slow wave that meets a limit stands nowhere else
+    wave = np.minimum(70.0 * np.sin(np.arange(2400) / 20.0), 60.0).round()
+    check_signal(report, replace(probe, name="B"), seen(wave), False, PROBES)
+    assert any(f.key == "clipped B" for f in report.found)
 
 
 def test_coarse_converters_repeat_readings_without_being_stuck():
@@ -262,6 +279,27 @@ def test_probes_that_stand_elsewhere_than_stated_are_told_by_the_sweep_at_every_
     (point,) = identify(campaign, IdentifySettings(methods=())).points
     reached = {"error": "records-contradicted", "warning": "records-doubtful"}.get(says or "")
     assert [c for c in point.quality if "from where the load pushes it" in c.detail] == ([reached] if reached else [])
+
+
+SPARE = (Sensor.probe("X1C", math.radians(90.0), 8.1), Sensor.probe("X1D", 0.0, 7.9))
+
+
+@pytest.mark.parametrize(
+    ("gain", "dead", "expected"),
+    [
+        (1.0, False, []),
+        (1.0, True, [("warning", "p-2-up", "is dead")]),
+        (1.1, False, [("error", None, "contradict one another"), ("warning", "c-1", "contradict one another")]),
+    ],
+)
+def test_spare_probes_that_contradict_the_others_are_told_of_dry_runs_and_sweep(campaign_of, gain, dead, expected):
+    rig = stiff_rig(4, plan=replace(TINY, dynamic=(), dry=PLAN.dry), pivot_stiffness=1e8)
+    spare = (SPARE[0].with_error(gain=gain), SPARE[1])
+    instruments = replace(rig.instruments, sensors=(*rig.instruments.sensors, *spare))
+    rig = replace(rig, instruments=instruments, faults=(Fault("dead", "p-2-up", "X1C"),) if dead else ())
+    found = [p for p in check_campaign(campaign_of(rig)) if p.severity != "note"]
+    assert [(p.severity, p.run) for p in found] == [told[:2] for told in expected], [str(p) for p in found]
+    assert all(says in p.what for p, (_, _, says) in zip(found, expected))
 
 
 def test_what_one_of_many_static_runs_shows_stays_its_own():

@@ -13,7 +13,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError
 from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, record, vectors
 from tests.pivot.test_assemble import Run as FirstPad
-from tpjb_ident.phasors.slow_samples import _repeated, refuse_flat_channels
+from tpjb_ident.phasors.slow_samples import _repeated, live_run
 from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.refusals import check_placement
@@ -26,7 +26,7 @@ class Run(FirstPad):
 
     def __init__(self, pad, seed=1, points_at=None, slip=0.0, name=None, soft=1.0, down=False):
         super().__init__(n=10)
-        n, rng = 3200, np.random.default_rng([seed, pad])
+        n, rng = 3200, np.random.default_rng([seed, pad or 0])
         self.id, self.file, self.pad, self.sample_rate = name or f"dry-{pad}", f"dry-{pad}.csv", pad, 500.0
         self.time = np.arange(n) / 500.0
         levels = LEVELS[::-1] if down else LEVELS
@@ -101,7 +101,9 @@ def test_all_that_is_wrong_is_told_at_once():
     (nothing,) = refused()
     assert "has no runs of kind dry_pivot" in nothing.what
     (none,) = refused(Run(6, points_at=1), on_refusal="skip")
-    assert "names pad 6" in none.what
+    assert "names pad 6, the bearing has pads 1 to 5" in none.what
+    (none,) = refused(Run(None, points_at=1, name="nobody"), on_refusal="skip")
+    assert "names pad None" in none.what
 
 
 def test_records_that_are_refused_are_left_out_where_that_is_wished_and_named():
@@ -154,7 +156,7 @@ def test_one_coarse_channel_lets_its_quantity_stand_still():
     run = FirstPad()
     run.force = np.round(run.force / [4.0, 1e-9]) * [4.0, 1e-9]  # the horizontal cell repeats most readings
     run.force[1000:1700] = run.force[1000]
-    refuse_flat_channels(run)
+    live_run(run)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,10 +182,10 @@ def test_a_dead_probe_is_left_out_where_two_others_tell_the_plane(dead, left):
         channels[name] = channel("displacement", share * math.pi)
         channels[name].name = name
     values = {name: np.full(400, 1.2) if name in dead else rng.standard_normal(400) for name in channels}
-    assert set(refuse_flat_channels(Readings(channels, values)).channels) == left
+    assert set(live_run(Readings(channels, values)).channels) == left
     values["X1B"] = values["X1C"] = np.full(400, 1.2)  # then nothing else tells the plane
     with pytest.raises(RigDataError, match="stands still"):
-        refuse_flat_channels(Readings(channels, values))
+        live_run(Readings(channels, values))
 
 
 def test_channels_of_other_quantities_may_stand_still():
@@ -192,5 +194,5 @@ def test_channels_of_other_quantities_may_stand_still():
     asked = []
     original = run.record
     run.record = lambda name: asked.append(name) or original(name)
-    refuse_flat_channels(run)
+    live_run(run)
     assert sorted(asked) == sorted(CHANNELS)

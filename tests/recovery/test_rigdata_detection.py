@@ -88,7 +88,7 @@ ONE_RUN = {
         "",
         "very samples of run d-05000-25-02",
     ),
-    "wrong pad direction": (Fault("wrong_direction", "p-2-up", value=1.2), "error", "force", "the load rises toward"),
+    "wrong pad direction": (Fault("wrong_direction", "p-2-up", value=1.2), "error", "force", "but its force grows"),
     "probe inverted, dry": (Fault("inverted", "p-2-up", "X1A"), "error", "channels", "X1A had the wrong sign"),
     "probes swapped, dry": (Fault("swapped", "p-2-up", "X1A", other="X1B"), "error", "channels", "were swapped"),
     "probes swapped, sweep": (

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "estimate": {"rigdata"},
     "terms": {"rigdata", "estimate"},
     "phasors": {"rigdata"},
-    "check": {"rigdata", "phasors", "estimate", "terms"},
+    "check": {"rigdata", "phasors", "estimate", "terms", "pivot", "clearance"},  # what their own reading refuses
     "pivot": {"rigdata", "runtime", "phasors"},
     "clearance": {"rigdata", "runtime", "phasors", "pivot"},
     "dynamic": {"rigdata", "runtime", "phasors", "check", "estimate", "terms"},

@@ -19,7 +19,7 @@ from tpjb_ident.check.response import check_responses
 from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
-from tpjb_ident.check.slow_tests import check_dry, check_locus, check_shaft_follows, check_sweeps
+from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
 from tpjb_ident.conditions import Condition
 
 _ORDER = {"error": 0, "warning": 1, "note": 2}
@@ -81,11 +81,11 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     check_positions(observations)
     check_magnitudes(observations, campaign.housing_mass)
     check_excitation(of_kind["dynamic"], campaign.housing_mass)
+    _spread_doubts(observations)
     check_dry(of_kind["dry_pivot"])
     _spread_doubts(observations)
     check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
     check_rotation(of_kind["dynamic"])
-    check_shaft_follows(of_kind["dry_pivot"])
     check_sweeps(of_kind["clearance"])
     check_locus(of_kind["locus"])
     _check_duplicates(observations)

@@ -32,6 +32,8 @@ _FITTED = 2**16
 _DECIMATED = 4000
 #: Share of the set point by which an excitation may be off.
 OFF_SET_POINT = 0.02
+#: Key of the finding that a record was computed without noise.
+NO_NOISE = "no noise"
 #: Samples that tell the quantiles of a channel, and whether it has noise.
 _SPREAD = 8192
 
@@ -45,7 +47,7 @@ class Observation:
     lines: RecordLines | None = field(repr=False)
     spread: FloatArray = field(repr=False)  #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
     other_line: float
-    #: (n, m): thinned to a few thousand, SI; kept of dry and clearance runs only
+    #: (n, m): thinned to a few thousand, SI; kept of clearance runs only
     samples: FloatArray = field(repr=False)
     speed: float
     digest: str
@@ -94,7 +96,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     lines = _lines(run, live, used[:_FITTED], phasors, line) if time is not None and live else None
     noise_free = _is_noise_free(run, live, used, lines)
     if noise_free:
-        report.say("no noise", "note", "", "the readings show no noise", "Nothing, if the data are computed")
+        report.say(NO_NOISE, "note", "", "the readings show no noise", "Nothing, if the data are computed")
     alive = [c for name, c in readable.items() if not _is_dead(statistics[name])]
     for name, channel in readable.items():
         check_signal(report, channel, statistics[name], noise_free, alive)
@@ -110,7 +112,7 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         lines=lines,
         spread=_spread(used),
         other_line=other_line(phasors, astray),
-        samples=used[thin] if run.kind in {"dry_pivot", "clearance"} else np.empty((0, len(live))),
+        samples=used[thin] if run.kind == "clearance" else np.empty((0, len(live))),
         speed=_mean_speed(readable, first),
         digest=digest,
         report=report,

@@ -12,7 +12,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.phasors.slow_samples import is_spare, stands_still
+from tpjb_ident.phasors.slow_samples import converter_step, is_spare, stands_still
 
 #: Quantities without which a run of that kind says nothing.
 _NEEDED = {
@@ -26,6 +26,10 @@ _CELSIUS = 273.15
 #: Film and housing temperatures of a rig that is not on fire [K].
 _TEMPERATURES = (_CELSIUS - 50.0, _CELSIUS + 300.0)
 _MIN_CYCLES = 5.0
+#: Steps of the converter within which a channel's readings show no limit.
+_FEW_STEPS = 8
+#: Readings of a hold, and how many times longer it stands than what is beside it.
+_LEAST_HELD, _HELD_OVER_BESIDE = 20, 4
 
 
 def needed(run: Run, channel: Channel) -> bool:
@@ -53,13 +57,30 @@ def check_signal(
     if not noise_free:
         _stuck(report, channel, statistics, grave)
     clipped = statistics.clipped_share()
-    if clipped > 0:
+    if clipped > 0 and not (report.run.kind != "dynamic" and _held(statistics)):
         limits = f"{statistics.low:g} and {statistics.high:g} {channel.unit}"
         text = f"{clipped:.1%} of the samples sit flat at an extreme reading (limits {limits}): clipped"
         severity: Severity = grave if clipped > 0.05 else "warning"
         report.say(f"clipped {channel.name}", severity, place, text, "Widen the logger's range and repeat the run")
     if channel.quantity == "temperature":
         _temperature(report, channel, statistics)
+
+
+def _held(statistics: ChannelStatistics) -> bool:
+    """Whether readings stand still also where no limit is: a load that is held, or a channel of what does not move.
+
+    A hold stays on one step of the converter, or between two, much longer than just before and after it.
+    """
+    readings = np.concatenate(statistics.blocks)
+    steps = np.round((readings - statistics.low) / converter_step(readings)[0])
+    for pairs in (np.floor(steps / 2.0), np.floor((steps + 1.0) / 2.0)):
+        starts = np.r_[0, np.flatnonzero(np.diff(pairs)) + 1]
+        length, pair = np.diff(np.r_[starts, len(pairs)]), pairs[starts][1:-1]
+        beside = np.maximum(length[:-2], length[2:])
+        still = length[1:-1] > np.maximum(_HELD_OVER_BESIDE * beside, max(_LEAST_HELD, 0.002 * len(pairs)))
+        if np.any(still & (pair > 1) & (pair < pairs.max() - 1)):
+            return True
+    return bool(steps.max() < _FEW_STEPS)
 
 
 def _missing(report: Reporter, channel: Channel, statistics: ChannelStatistics, grave: Severity) -> None:

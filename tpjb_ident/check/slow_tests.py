@@ -1,30 +1,40 @@
-"""Check dry, clearance and locus runs: the shaft must go where it is pushed, toward the stated pad."""
+"""Check dry, clearance and locus runs: what their own fits refuse, and whether the shaft goes where it is pushed."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
-from rigdata.problem import Severity
+from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.vector import directions
-from tpjb_ident.check.observation import Observation
+from tpjb_ident.check.observation import NO_NOISE, Observation
 from tpjb_ident.check.response import definiteness, mirrored
-from tpjb_ident.check.set_points import ANGLE_ERROR, ANGLE_WARNING, angle_between, plane_of, plane_vector
+from tpjb_ident.check.set_points import angle_between, plane_of, plane_vector
 from tpjb_ident.check.wiring import guess_wiring, name_fault
+from tpjb_ident.clearance.sweep import sweep_samples
+from tpjb_ident.errors import BadInputError
+from tpjb_ident.phasors.slow_samples import live_run
+from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.dry_record import DryRecord, read_dry_run
+from tpjb_ident.pivot.refusals import refused_records
 
-#: Cosine of the angle between load and motion; rigs move sideways by up to a quarter of the way.
-_FOLLOWS = math.cos(math.radians(40.0))
 #: Angle [deg] by which the shaft lies aside of the load, beyond what friction does: warning, error.
 _TURNED = (12.0, 20.0)
 #: Standard errors of the mean angle over the dry runs beyond which it is one, and runs that tell it.
 _CLEAR, _MIN_RUNS = 4.0, 3
-#: A shaft that moves less than this [m] in a dry test may as well be a probe that drifts.
-_FIRM_MOVE = 1.5e-6
+#: Angle [deg] within which dry runs count as turned alike.
+_ALIKE = 12.0
+#: Angle [rad] beyond which a direction is that of a wrong channel, not of where the shaft stood.
+_LEAST_WRONG = math.radians(8.0)
+#: A direction of the shaft that is known no better [rad] may as well be that of a probe that drifts.
+_FIRM = math.radians(5.0)
+#: Angle [deg] within which mended channels point where they should; a shaft moves sideways as well.
+_MENDED = {"force": 8.0, "displacement": 20.0}
 #: A clearance polygon and a locus are far from round; 1 is round.
 _LEAST_DEFINITE = 0.02
 #: Loads within this angle [deg] go toward one pad.
@@ -35,112 +45,75 @@ _AT_PAD = 12.0
 _LEAST_PADS, _MOST_PADS = 3, 12
 #: Smaller over larger extent of a load that goes around.
 _GOES_AROUND = 0.3
-_Planes = tuple[FloatArray, FloatArray, FloatArray]
-
-
-def _planes(observation: Observation) -> _Planes | None:
-    """Force and displacement (n, 2), probes (n, m) of the thinned samples, rows without a value left out."""
-    probes, cells = observation.pick("displacement"), observation.pick("force")
-    if len(cells) < 2 or len(probes) < 2:
-        return None
-    force = observation.samples[:, cells] @ plane_of(observation.of("force")).T
-    shaft = observation.samples[:, probes] @ plane_of(observation.of("displacement")).T
-    rows = np.isfinite(np.hstack([force, shaft])).all(axis=1)
-    if np.count_nonzero(rows) < 20:
-        return None
-    return force[rows], shaft[rows], observation.samples[rows][:, probes]
-
-
-def _along(channels: Sequence[Channel]) -> FloatArray:
-    """Unit vectors (m, 2) of some channels."""
-    return directions(np.array([c.axis for c in channels]))
 
 
 def check_dry(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: a load that rises, its direction, pads told apart."""
-    pushed: list[tuple[Observation, float]] = []
+    """Dry pivot runs: what the fit of the pivots refuses, turned probes, contradicting numbers of pads."""
+    settings = PivotSettings()
+    read: list[tuple[Observation, DryRecord]] = []
     for observation in runs:
-        planes = _planes(observation)
-        if planes is None:
-            continue
-        push = _main_move(planes[0])
-        if push is None:
-            observation.report.say(
-                "no load", "error", "force", "the load does not rise", "Check the cells; repeat the run"
-            )
-            continue
-        shows = math.degrees(math.atan2(push[1], push[0]))
-        pushed.append((observation, shows))
-        if "static_load_direction" in observation.run.stated:
-            _check_push(observation, shows, push)
-    _check_labels([observation for observation, _ in pushed], [shows for _, shows in pushed])
-
-
-def check_shaft_follows(runs: Sequence[Observation]) -> None:
-    """Dry pivot runs: the shaft goes toward the pad, where the force can be trusted."""
-    followed: list[Observation] = []
-    angles: list[float] = []
-    for observation in runs:
-        planes = _planes(observation)
-        push = None if planes is None or "force" in observation.report.doubts else _main_move(planes[0])
-        if planes is None or push is None:
-            continue
-        aside = _check_follows(observation, planes, push)
-        if aside is not None:
-            followed.append(observation)
-            angles.append(aside)
-    if len(angles) < _MIN_RUNS:
+        run = observation.run
+        stated = run.point.static_load_direction if "static_load_direction" in run.stated else None
+        try:
+            read.append((observation, read_dry_run(run, stated, settings)))
+        except RigDataError as error:
+            _take(observation, error.problems)
+    angles = np.full(max((record.pad for _, record in read), default=0), np.nan)
+    for _, record in read:
+        angles[record.pad - 1] = record.angle
+    try:
+        records, problems, _ = refused_records([record for _, record in read], settings, angles)
+    except BadInputError:  # holds too short for the fit
         return
-    turn = float(np.mean(angles))
-    if abs(turn) > _CLEAR * float(np.std(angles, ddof=1)) / math.sqrt(len(angles)):
-        for observation in followed:
-            _judge_turns(observation, np.full(len(observation.pick("displacement")), turn))
+    turned = _turned_alike(records)
+    first = {problem.run: problem for problem in reversed(problems)}
+    for (observation, _), record in zip(read, records):
+        if turned is not None and _is_firm(record):
+            _judge_turns(observation, np.full(len(observation.pick("displacement")), turned))
+        elif record.run.id in first:
+            _say_refusal(observation, record, first[record.run.id])
+    shows = [math.degrees(math.remainder(r.angle + r.load_direction.angle, 2 * math.pi)) for r in records]
+    _check_labels([observation for observation, _ in read], shows)
 
 
-def _main_move(force: FloatArray) -> FloatArray | None:
-    """From the least to the greatest force, (2,) [N]; None where it hardly changes."""
-    size = np.linalg.norm(force, axis=1)
-    few = max(3, len(force) // 20)
-    order = np.argsort(size)
-    low, high = np.median(force[order[:few]], axis=0), np.median(force[order[-few:]], axis=0)
-    noise = float(np.median(np.abs(np.diff(size))))
-    move = high - low
-    return move if float(np.hypot(*move)) > max(10 * noise, 1e-9) else None
+def _take(observation: Observation, problems: Sequence[Problem]) -> None:
+    """Note what a reading refuses; not where as much is said already, nor that a computed record stands still."""
+    if not any(f.problem.severity == "error" or f.key == NO_NOISE for f in observation.report.found):
+        observation.report.take(problems)
 
 
-def _check_push(observation: Observation, shows: float, push: FloatArray) -> None:
-    point, channels = observation.run.point, observation.of("force")
-    off = angle_between(shows, point.static_load_direction_deg)
-    if off <= ANGLE_WARNING:
-        return
-    guess = guess_wiring(channels, _along(channels) @ push, directions(point.static_load_direction))
-    severity: Severity = "error" if off > ANGLE_ERROR else "warning"
-    if guess:
-        observation.report.doubts.add("force")
-    stated = f"static_load_direction of pad {observation.run.pad} is {point.static_load_direction_deg:g} deg"
-    text = f"the load rises toward {shows:.0f} deg, {stated}{guess}"
-    cure = "Check pad and static_load_direction of this run, and the cells' axes and cables"
-    observation.report.say(f"push direction{guess}", severity, "force", text, cure)
+def _is_firm(record: DryRecord) -> bool:
+    """Whether the load goes toward the pad, and the shaft clearly somewhere."""
+    return record.displacement_direction.se < _FIRM and abs(record.load_direction.angle) < _LEAST_WRONG
 
 
-def _check_follows(observation: Observation, planes: _Planes, push: FloatArray) -> float | None:
-    """The shaft must go toward the pad, mainly along the load; by how much it goes aside [deg], None where untold."""
-    unit = push / np.hypot(*push)
-    load = planes[0] @ unit
-    centred = load - load.mean()
-    slope = centred @ (planes[1] - planes[1].mean(axis=0)) / float(centred @ centred)
-    size = float(np.hypot(*slope))
-    if size * float(np.ptp(load)) < _FIRM_MOVE:
+def _turned_alike(records: Sequence[DryRecord]) -> float | None:
+    """Angle [deg] by which the shaft goes aside of the load in all dry runs; None where it does not, or not alike."""
+    aside = [math.degrees(r.displacement_direction.angle - r.load_direction.angle) for r in records if _is_firm(r)]
+    if len(aside) < _MIN_RUNS:
         return None
-    if float(slope @ unit) > _FOLLOWS * size:
-        return math.degrees(math.atan2(unit[0] * slope[1] - unit[1] * slope[0], float(slope @ unit)))
-    channels = observation.of("displacement")
-    guess = guess_wiring(channels, _along(channels) @ slope, unit, within=20.0)
-    goes, pushed = math.degrees(math.atan2(slope[1], slope[0])), math.degrees(math.atan2(unit[1], unit[0]))
-    text = f"the shaft goes toward {goes:.0f} deg while the load pushes toward {pushed:.0f} deg{guess}"
-    cure = "Check axis, polarity and cables of the probes"
-    _say_of_probes(observation, ("signs", guess), "error", text, cure)
-    return None
+    turn, spread = float(np.mean(aside)), float(np.std(aside, ddof=1))
+    clear = abs(turn) > max(_TURNED[0], _CLEAR * spread / math.sqrt(len(aside)))
+    return turn if clear and np.max(np.abs(np.array(aside) - turn)) < _ALIKE else None
+
+
+def _say_refusal(observation: Observation, record: DryRecord, problem: Problem) -> None:
+    """Say why the fit refuses a dry run; of wrong channels with the fault that explains them, where one does."""
+    quantity, report = problem.place.partition(" ")[0], observation.report
+    direction = record.load_direction if quantity == "force" else record.displacement_direction
+    if quantity not in _MENDED or abs(direction.angle) < _LEAST_WRONG:
+        report.say(problem.what, problem.severity, problem.place, problem.what, problem.cure)
+        return
+    channels = observation.of(quantity)
+    wanted = record.angle + (0.0 if quantity == "force" else record.load_direction.angle)
+    readings = directions([c.axis or 0.0 for c in channels]) @ directions(record.angle + direction.angle)
+    hint = guess_wiring(channels, readings, directions(wanted), within=_MENDED[quantity])
+    if quantity == "displacement" and _is_firm(record):
+        _say_of_probes(observation, ("signs", hint), problem.severity, problem.what + hint, problem.cure)
+        return
+    if hint:
+        report.doubts.add(quantity)
+    report.say(f"{problem.place}{hint}", problem.severity, problem.place, problem.what + hint, problem.cure)
 
 
 def _say_of_probes(observation: Observation, key: tuple[str, str], severity: Severity, text: str, cure: str) -> None:
@@ -151,17 +124,31 @@ def _say_of_probes(observation: Observation, key: tuple[str, str], severity: Sev
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
-    """Clearance runs: the shaft moves to the side to which the small load pushes it."""
+    """Clearance runs: the shaft moves to the side to which the small load pushes it; or else what the fit refuses."""
     for observation in runs:
-        planes = _planes(observation)
-        if planes is None:
+        before = len(observation.report.found)
+        _check_sweep(observation)
+        if len(observation.report.found) > before or "force" in observation.report.doubts:
             continue
-        gain = _gain(planes[0], planes[1])
-        if gain is None:
-            text = "the load does not sweep around all directions"
-            observation.report.say("sweep", "warning", "force", text, "A clearance run needs a rotating load")
-        elif _judge_gain(observation, gain):
-            _judge_turns(observation, _turns(observation.of("displacement"), planes))
+        try:
+            sweep_samples(live_run(observation.run))
+        except RigDataError as error:
+            _take(observation, [replace(problem, severity="warning") for problem in error.problems])
+
+
+def _check_sweep(observation: Observation) -> None:
+    """Judge the movement under a load that goes around."""
+    cells, probes = observation.pick("force"), observation.pick("displacement")
+    if len(cells) < 2 or len(probes) < 2:
+        return
+    samples = observation.samples[np.isfinite(observation.samples[:, [*cells, *probes]]).all(axis=1)]
+    if len(samples) < 20:
+        return
+    force = samples[:, cells] @ plane_of(observation.of("force")).T
+    shaft = samples[:, probes] @ plane_of(observation.of("displacement")).T
+    gain = _gain(force, shaft)
+    if gain is not None and _judge_gain(observation, gain):
+        _judge_turns(observation, _turns(observation, force, samples[:, probes]))
 
 
 def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:
@@ -173,12 +160,12 @@ def _gain(force: FloatArray, shaft: FloatArray) -> FloatArray | None:
     return np.asarray(np.linalg.lstsq(about, shaft - shaft.mean(axis=0), rcond=None)[0].T)
 
 
-def _turns(probes: Sequence[Channel], planes: _Planes) -> FloatArray:
-    """Angle of every probe's axis, as the load that goes around shows it, less the stated one (m,) [deg]."""
-    load = planes[0] - planes[0].mean(axis=0)
+def _turns(observation: Observation, force: FloatArray, readings: FloatArray) -> FloatArray:
+    """Angle of every probe's axis, as the load (n, 2) that goes around shows it, less the stated one (m,) [deg]."""
+    load = force - force.mean(axis=0)
     design = np.column_stack([load / np.linalg.norm(load, axis=1, keepdims=True), np.ones(len(load))])
-    answer = np.linalg.lstsq(design, planes[2], rcond=None)[0]
-    along = _along(probes)
+    answer = np.linalg.lstsq(design, readings, rcond=None)[0]
+    along = directions([channel.axis or 0.0 for channel in observation.of("displacement")])
     turned = along[:, 0] * answer[1] - along[:, 1] * answer[0]
     return np.asarray(np.degrees(np.arctan2(turned, np.sum(along * answer[:2].T, axis=1))))
 

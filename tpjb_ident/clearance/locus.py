@@ -17,7 +17,7 @@ from rigdata.vector import directions, zero_uncertainty
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import refused_runs, slow_samples
+from tpjb_ident.phasors.slow_samples import live_run, refused_runs, slow_samples
 from tpjb_ident.phasors.windows import line_design
 from tpjb_ident.presentation import Presented
 
@@ -205,7 +205,7 @@ def _from_down(direction: float) -> float:
 
 
 def _read(run: Run) -> _Record:
-    time, force, place, good, _ = slow_samples(run)
+    time, force, place, good, _ = slow_samples(live_run(run))
     if good.sum() < 50 or good.mean() < 0.5:
         what = f"locus run {run.id} has only {int(good.sum())} usable samples of {len(good)}"
         raise refuse(run.file, "record", what, "Repeat this direction", run.id)

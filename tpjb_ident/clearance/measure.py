@@ -16,6 +16,7 @@ from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, sentences
 from tpjb_ident.errors import ArgumentError
 from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.pivot.dry_record import axial_channels, relative_calibration
 from tpjb_ident.presentation import Presented
@@ -189,7 +190,7 @@ def measure_run(
     rule: CentreRule = "least-absolute",
 ) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
-    angles = np.asarray(pivot_angles, dtype=float)
+    angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
     contact = read_sweep(run, angles)
     reached = np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS
     if reached.sum() < 3:

@@ -49,16 +49,22 @@ class ContactIntervals:
         return replace(self, **columns)
 
 
-def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
-    """Read a run of kind ``clearance``; angles (n,) [rad] of the pads."""
+def sweep_samples(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Good samples of a sweep, which goes around and takes the shaft along: time (n,), load, position (n, 2)."""
     time, load, position, good, _ = slow_samples(run)
     if good.sum() < 200:
         raise _refused(run, f"has only {int(good.sum())} usable samples", "Repeat the sweep")
     slopes = spare_slopes(run, np.eye(2))
     for what in contradictions(run.channels, [slopes], {"force": [0.0], "displacement": [0.0]}):
         raise refuse(run.file, "channels", f"clearance run {run.id}: {what}", REMEDY, run.id)
-    load, position, time = load[good], position[good], time[good]
+    load, position = load[good], position[good]
     _check_turn(run, load, position)
+    return time[good], load, position
+
+
+def read_sweep(run: Run, angles: FloatArray) -> ContactIntervals:
+    """Read a live run of kind ``clearance``; angles (n,) [rad] of the pads."""
+    time, load, position = sweep_samples(run)
     # whole turns of a shaft that turns: its runout averages out
     turn = 2.0 * np.pi / run.point.shaft_speed if run.point.shaft_speed > 0.0 else _BLOCK
     return _average(time, load, position, angles, float(turn * max(round(_BLOCK / turn), 1)))

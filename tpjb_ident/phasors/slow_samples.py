@@ -45,9 +45,8 @@ _GAIN, _CURVED, _BY_CHANCE = 0.005, 1e-3, 1e-4
 def slow_samples(run: Run, longest: int = 60) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, float]:
     """Both vectors of a slow record at the times of the slower one, and which samples are good.
 
-    Gives time (n,) and force, displacement (n, 2), good (n,) and the rate [Hz].
+    Gives time (n,) and force, displacement (n, 2), good (n,) and the rate [Hz]; `run` is a `live_run`.
     """
-    run = refuse_flat_channels(run)
     force, displacement = run.vector("force"), run.vector("displacement")
     slower = force if len(force) < len(displacement) else displacement
     load, place = force.at(slower.time), displacement.at(slower.time)
@@ -147,7 +146,7 @@ def converter_step(x: FloatArray) -> tuple[float, float]:
     return (float(np.median(steps)), len(steps) / len(moves)) if len(steps) else (0.0, 0.0)
 
 
-def refuse_flat_channels(run: Run) -> Run:
+def live_run(run: Run) -> Run:
     """The run without channels that nobody misses; refused where one of force or displacement stands still for a while.
 
     A force or displacement that stops in the middle of a staircase looks like a very stiff or very soft pivot: nothing
@@ -232,7 +231,11 @@ def _chance(channels: Sequence[Channel], rows: FloatArray, noise: FloatArray) ->
     angle = np.array([channel.axis_uncertainty for channel in channels])
     moved = np.linalg.lstsq(axes, rows.T, rcond=None)[0]
     turned = (axes @ np.array([moved[1], -moved[0]])).T
-    effects = [np.hstack([null * (s * gain), null * (t * angle)]) for s, t in zip(rows, turned)]
-    design, residual = np.vstack(effects), (rows @ null.T).ravel()
-    covariance = design @ design.T + np.diag(np.repeat(noise**2, len(null)))
+    effects = [np.hstack([null * (s * gain), null * (t * angle)]) for s, t in zip((axes @ moved).T, turned)]
+    spread = np.repeat(noise, len(null))[:, None]
+    design, residual = np.vstack(effects) / spread, (rows @ null.T).ravel() / spread[:, 0]
+    best, _, rank, _ = np.linalg.lstsq(design, residual, rcond=None)
+    # what no gain or angle whatever explains is noise: of probes that drift more than they seem to
+    inexplicable = float(np.sum((residual - design @ best) ** 2)) / max(len(residual) - rank, 1)
+    covariance = design @ design.T + max(inexplicable, 1.0) * np.eye(len(residual))
     return float(special.chdtrc(len(residual), residual @ np.linalg.solve(covariance, residual)))

@@ -23,7 +23,7 @@ from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError, refuse
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise
-from tpjb_ident.phasors.slow_samples import converter_step, slow_samples, spare_slopes
+from tpjb_ident.phasors.slow_samples import converter_step, live_run, slow_samples, spare_slopes
 from tpjb_ident.pivot.blocks import Blocks, Hold, PivotSettings, Samples, cut_blocks, find_holds, pad_axes
 
 if TYPE_CHECKING:
@@ -76,14 +76,12 @@ class DryRecord:
     load_direction: PadDirection = field(default_factory=PadDirection)
     displacement_direction: PadDirection = field(default_factory=PadDirection)
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
+    creep: float = 0.0  #: share of the deflection that crept and was taken off
 
 
-def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> DryRecord:
-    """Read one dry run; `pad_angles` (n_pads,) [rad]."""
-    if run.pad is None or not 1 <= run.pad <= len(pad_angles):
-        what = f"names pad {run.pad}, the bearing has pads 1 to {len(pad_angles)}"
-        raise _refusal(run, "pad", what, "Correct the manifest")
-    angle = float(pad_angles[run.pad - 1])
+def read_dry_run(run: Run, angle: float | None, settings: PivotSettings) -> DryRecord:
+    """Read one dry run of a pad at an angle [rad]; where none is known it is that toward which the load rises."""
+    run = live_run(run)
     time, load, displacement, good, rate = slow_samples(run, settings.longest_glitch)
     good &= np.isfinite(time)
     lost = 1.0 - float(np.mean(good)) if len(good) else 1.0
@@ -95,10 +93,15 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     if np.any(np.diff(time[order]) <= 0.0):
         # a logger that repeats or shuffles time stamps: order is what averages need
         order = order[np.argsort(time[order], kind="stable")]
+    push = _push(load[order])
+    if push is None:
+        raise _refusal(run, "force", "has a load that does not rise", "Check the cells; repeat the run")
+    if angle is None:
+        angle = math.atan2(push[1], push[0])
     samples = Samples(time[order], load[order], displacement[order], angle)
-    if float(np.ptp(samples.along)) <= 0.0 or np.ptp(samples.displacement, axis=0).max() <= 0.0:
+    if np.ptp(samples.displacement, axis=0).max() <= 0.0:
         what = "does not move: a dead or disconnected channel"
-        raise _refusal(run, "force or displacement", what, "Check the channels of this run")
+        raise _refusal(run, "displacement", what, "Check the channels of this run")
     holds = find_holds(samples.time, samples.along)
     blocks = cut_blocks(samples, holds, settings.block)
     if len(blocks) < _FEWEST_BLOCKS:
@@ -107,7 +110,17 @@ def read_dry_run(run: Run, pad_angles: FloatArray, settings: PivotSettings) -> D
     good = np.ones(len(blocks), dtype=bool)
     step = _quantisation(samples.displacement)
     direction, slopes = load_direction(blocks), spare_slopes(run, pad_axes(angle)[:1], settings.longest_glitch)
-    return DryRecord(run, run.pad, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes)
+    return DryRecord(run, run.pad or 0, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes)
+
+
+def _push(load: FloatArray) -> FloatArray | None:
+    """From the least to the greatest of some loads (n, 2), (2,) [N]; None where the load hardly changes."""
+    size = np.linalg.norm(load, axis=1)
+    few = max(3, len(load) // 20)
+    order = np.argsort(size)
+    push = np.median(load[order[-few:]], axis=0) - np.median(load[order[:few]], axis=0)
+    noise = float(np.median(np.abs(np.diff(size))))
+    return push if float(np.hypot(*push)) > max(10 * noise, 1e-9) else None
 
 
 def _refusal(run: Run, place: str, what: str, cure: str) -> RigDataError:
@@ -180,11 +193,12 @@ def load_direction(blocks: Blocks) -> PadDirection:
     return _growth(vectors, size, np.eye(len(size)), len(size) / holds)
 
 
-def displacement_direction(blocks: Blocks, noise: NoiseModel) -> PadDirection:
+def displacement_direction(blocks: Blocks, noise: NoiseModel, quantisation: float = 0.0) -> PadDirection:
     """Direction in which the shaft moves as the load grows, relative to the pad; both components carry one noise."""
     vectors = np.column_stack([blocks.deflection, blocks.across])
     size = np.hypot(blocks.load, blocks.across_load)
-    return _growth(vectors, size, noise.covariance(blocks.time, blocks.duration), 1.0)
+    covariance = noise.covariance(blocks.time, blocks.duration) + quantisation**2 * np.eye(len(size))
+    return _growth(vectors, size, covariance, 1.0)
 
 
 def _growth(vectors: FloatArray, size: FloatArray, covariance: FloatArray, dependence: float) -> PadDirection:

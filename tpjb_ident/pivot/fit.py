@@ -22,13 +22,12 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import refused_runs
 from tpjb_ident.pivot.blocks import PivotSettings
+from tpjb_ident.pivot.creep import without_creep
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps, measure_loop
 from tpjb_ident.pivot.dry_record import (
     DryRecord,
     axial_channels,
-    displacement_direction,
     noise_about_curve,
-    noise_within_holds,
     read_dry_run,
     relative_calibration,
 )
@@ -43,7 +42,7 @@ from tpjb_ident.pivot.law_fit import (
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_directions, check_pickup, check_placement, check_spares, structure_of
+from tpjb_ident.pivot.refusals import refused_records, structure_of
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -77,14 +76,15 @@ def fit_data(records: Sequence[DryRecord], noise: NoiseModel, settings: PivotSet
         covariance[part, part] += record.quantisation**2 * (one_hold | np.eye(len(blocks), dtype=bool))
         if len(records) > 1:
             covariance[part, part] += UNKNOWN_ZERO**2
-    both = len(np.unique(branch)) > 1
+    both, creep = len(np.unique(branch)) > 1, max(record.creep for record in records)
     return FitData(
         load=load,
         deflection=deflection - deflection[int(np.argmin(load))],
         branch=branch,
         whitener=np.linalg.inv(np.linalg.cholesky(covariance)),
         reference_load=REFERENCE_SHARE * float(np.max(load)),
-        friction=(0.0, 0.05) if both else (settings.friction_share, settings.friction_share_se),
+        # on one branch a share of the load and a share of the deflection that creeps are one error
+        friction=(0.0, 0.05) if both else (settings.friction_share, max(settings.friction_share_se, creep)),
     )
 
 
@@ -189,10 +189,8 @@ def fit_pivots(
     settings = settings or PivotSettings()
     angles = np.asarray(pivot_angles, dtype=float)
     records, problems = _read(campaign, angles, settings)
-    noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
-    records = [replace(r, displacement_direction=displacement_direction(r.blocks, noise)) for r in records]
-    problems += check_spares(records) + check_placement(records) + check_pickup(records)
-    problems += check_directions(records, settings, angles)
+    records, contradicted, noise = refused_records(records, settings, angles)
+    problems += contradicted
     refused = {problem.run for problem in problems}
     pads: dict[int, list[DryRecord]] = {}
     for record in records:
@@ -201,10 +199,13 @@ def fit_pivots(
     many = 2 * len(refused) >= len(campaign.of_kind("dry_pivot"))
     if problems and (settings.on_refusal == "raise" or not pads or (settings.on_refusal == "few" and many)):
         raise RigDataError(problems)
-    for number, pad_records in pads.items():
+    used = [record for pad_records in pads.values() for record in pad_records]
+    used, noise, creeps = without_creep(used, noise, settings.drift_rate)
+    for number in pads:
+        pad_records = [record for record in used if record.pad == number]
         pads[number] = [replace(record, good=~bad_blocks(record, noise, settings)) for record in pad_records]
     curves = _fit_pads([pads[number] for number in sorted(pads)], settings, str(structure_of(records, settings) or ""))
-    return tuple(replace(curve, status=(*curve.status, *refused_runs(problems))) for curve in curves)
+    return tuple(replace(curve, status=(*curve.status, *creeps, *refused_runs(problems))) for curve in curves)
 
 
 def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tuple[list[DryRecord], list[Problem]]:
@@ -217,7 +218,10 @@ def _read(campaign: Campaign, angles: FloatArray, settings: PivotSettings) -> tu
     problems: list[Problem] = []
     for run in runs:
         try:
-            records.append(read_dry_run(run, angles, settings))
+            if run.pad is None or not 1 <= run.pad <= len(angles):
+                what = f"run {run.id} names pad {run.pad}, the bearing has pads 1 to {len(angles)}"
+                raise refuse(run.file, "pad", what, "Correct the manifest", run.id)
+            records.append(read_dry_run(run, float(angles[run.pad - 1]), settings))
         except RigDataError as error:
             problems += error.problems
     return records, problems

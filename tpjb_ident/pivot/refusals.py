@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.problem import Problem
+from rigdata.problem import Problem, Severity
 from tpjb_ident.phasors.bad_samples import robust_deviation
+from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import REMEDY, contradictions
 from tpjb_ident.pivot.blocks import PivotSettings, pad_axes
-from tpjb_ident.pivot.dry_record import DryRecord, PadDirection, PickupSignature, axial_channels
+from tpjb_ident.pivot.dry_record import (
+    DryRecord,
+    PadDirection,
+    PickupSignature,
+    axial_channels,
+    displacement_direction,
+    noise_within_holds,
+)
 
 _ASIDE = 0.12  # of the clearance: a pad that tilts freely brings the shaft to its pivot's line within some micrometres
 _ASIDE_SPREAD = 5.0  # robust standard deviations of the campaign's own runs, where they stand less orderly than that
+_FAR_ASIDE = 0.35  # of the clearance, from where it is no wrong number of degrees any more
+_FAR_OFF = math.radians(30.0)  # from where a pad leaves no doubt that it is another one's record
 _ALONG = 0.5  # of the clearance: pads may differ, but not by this much
-_CURE = "Check the run's pad number, the channels' axes, polarities and order, and the pad angles of the bearing file"
+_CURE = "Check the run's pad number, the channels' axes, polarities and order, pad angles or static_load_direction"
 #: Pads that must be there: two numbers are fitted.
 _FEWEST = 4
 #: Slack when the spring's own movement is compared with what was read, as a share of it.
@@ -49,8 +60,19 @@ class Structure:
         )
 
 
+def refused_records(
+    records: Sequence[DryRecord], settings: PivotSettings, pad_angles: FloatArray
+) -> tuple[list[DryRecord], list[Problem], NoiseModel]:
+    """Records with the directions of their displacements, why some are not what they claim to be, their noise."""
+    noise = noise_within_holds(records, settings.drift_rate) if records else NoiseModel(1.0, 1.0, 1.0)
+    moved = [displacement_direction(record.blocks, noise, record.quantisation) for record in records]
+    records = [replace(record, displacement_direction=way) for record, way in zip(records, moved, strict=True)]
+    problems = check_directions(records, settings, pad_angles) + check_pickup(records)
+    return records, problems + check_placement(records) + check_spares(records, noise), noise
+
+
 def check_directions(records: Sequence[DryRecord], settings: PivotSettings, pad_angles: FloatArray) -> list[Problem]:
-    """Records whose load or displacement points elsewhere than at their pad; `pad_angles` (n_pads,) [rad]."""
+    """Records whose load or displacement points elsewhere than at their pad; `pad_angles` (n_pads,) [rad] or NaN."""
     structure = structure_of(records, settings)
     problems = []
     for record in records:
@@ -66,7 +88,8 @@ def check_directions(records: Sequence[DryRecord], settings: PivotSettings, pad_
                     f"{quantity} grows {degrees:+.1f} deg {reading} that direction "
                     f"(limit {math.degrees(limit):g} deg): {_suspect(record, settings, pad_angles)}"
                 )
-                problems.append(_problem(record, f"{quantity} channels", what))
+                severity: Severity = "error" if abs(direction.angle) > _FAR_OFF else "warning"
+                problems.append(replace(_problem(record, f"{quantity} channels", what), severity=severity))
                 break
     return problems
 
@@ -83,7 +106,7 @@ def _suspect(record: DryRecord, settings: PivotSettings, pad_angles: FloatArray)
     together = abs(math.remainder(load - moved, 2 * math.pi)) < settings.displacement_angle_limit
     if load_elsewhere and together:
         distances = [abs(math.remainder(record.angle + load - angle, 2 * math.pi)) for angle in pad_angles]
-        nearest = int(np.argmin(distances))
+        nearest = int(np.argmin(np.nan_to_num(distances, nan=np.inf)))
         if distances[nearest] < settings.load_angle_limit:
             return f"wrong pad: load and displacement both point at pad {nearest + 1}"
         return f"wrong angle: load and displacement turn together by {math.degrees(load):+.0f} deg"
@@ -143,6 +166,18 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
     runs must lie around one centre, each toward its own pad, and none further to the side than a pad's flat
     is wide. Readings set to zero before each run tell no place: they lie no further apart than the pads give.
     """
+    problems = []
+    for _, alike in groupby(sorted(records, key=_probes), key=_probes):
+        problems += _misplaced(list(alike))
+    return problems
+
+
+def _probes(record: DryRecord) -> list[str]:
+    """Names of a run's probes: others have another zero."""
+    return sorted(name for name, c in axial_channels(record.run).items() if c.quantity == "displacement")
+
+
+def _misplaced(records: Sequence[DryRecord]) -> list[Problem]:
     if len({record.pad for record in records}) < 3:
         return []
     axes = np.array([pad_axes(record.angle) for record in records])
@@ -164,7 +199,9 @@ def check_placement(records: Sequence[DryRecord]) -> list[Problem]:
                 f"{1e6 * aside:+.0f} um beside it, while the other dry runs of this campaign say "
                 f"{1e6 * distance:.0f} um toward it: channels exchanged or wrong pad"
             )
-            problems.append(_problem(record, "displacement channels", what))
+            problem = _problem(record, "displacement channels", what)
+            near = abs(along - distance) < _ALONG * distance and abs(aside) < _FAR_ASIDE * distance
+            problems.append(replace(problem, severity="warning" if near else "error"))
     return problems
 
 
@@ -186,16 +223,27 @@ def _centre(starts: FloatArray, outward: FloatArray) -> tuple[FloatArray, float]
     return solution[:2], abs(float(solution[2]))
 
 
-def check_spares(records: Sequence[DryRecord]) -> list[Problem]:
-    """Whether channels of one plane that are more than two agree, over all runs; noise is that across the pads."""
-    noise = {
+def check_spares(records: Sequence[DryRecord], noise: NoiseModel) -> list[Problem]:
+    """Whether channels of one plane that are more than two agree, over all runs.
+
+    The noise of the cells' slopes is that across the pads, the probes' what their noise and drift make of a slope.
+    """
+    errors = {
         "force": [record.load_direction.se for record in records],
-        "displacement": [record.displacement_direction.se for record in records],
+        "displacement": [_slope_error(record, noise) for record in records],
     }
     problems = []
-    for what in contradictions(records[0].run.channels if records else {}, [r.slopes for r in records], noise):
+    for what in contradictions(records[0].run.channels if records else {}, [r.slopes for r in records], errors):
         problems += [_problem(record, "channels", what, REMEDY) for record in records]
     return problems
+
+
+def _slope_error(record: DryRecord, noise: NoiseModel) -> float:
+    """Standard error of the slope of a single probe over the deflection, by least squares without any weight."""
+    moved = record.blocks.deflection - record.blocks.deflection.mean()
+    variance = moved @ noise.covariance(record.blocks.time, record.blocks.duration) @ moved
+    # a component of more than two probes has less noise than each
+    return math.sqrt(variance * max(len(_probes(record)) / 2.0, 1.0)) / max(float(moved @ moved), 1e-300)
 
 
 def check_pickup(records: Sequence[DryRecord]) -> list[Problem]:

@@ -1,0 +1,55 @@
+"""Creep within the holds of dry tests: named and taken off where all runs show it, and drift is not taken for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.pivot.test_assemble import LEVELS, record
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.pivot.blocks import Blocks, Hold
+from tpjb_ident.pivot.creep import without_creep
+
+NOISE = NoiseModel(white=1e-17, flicker=1e-17, drift=1e-9)
+#: Blocks of a hold, and its length [s].
+PER, LONG = 10, 20.0
+
+
+def campaign(creep=0.0, drift=0.0, pads=5):
+    """Staircases with holds of twenty seconds; deflections creep anew in every hold, probes drift either way."""
+    made = []
+    for pad in range(1, pads + 1):
+        rng, one = np.random.default_rng(pad), record(pad)
+        time = (np.arange(len(LEVELS) * PER) + 0.5) * LONG / PER
+        load = np.repeat(LEVELS, PER)
+        deflection = 4e-9 * load * (1.0 + creep * -np.expm1(-(time % LONG) / 30.0))
+        deflection += drift * rng.choice([-1.0, 1.0]) * time
+        n, zeros = len(time), np.zeros(len(time))
+        duration = np.full(n, LONG / PER)
+        deflection += np.linalg.cholesky(NOISE.covariance(time, duration)) @ rng.standard_normal(n)
+        hold, branch = np.repeat(np.arange(len(LEVELS)), PER), np.ones(n, dtype=int)
+        blocks = Blocks(time, duration, load, zeros, deflection, zeros, zeros, zeros, hold, branch)
+        holds = tuple(Hold(LONG * k, LONG * (k + 1), level, 1) for k, level in enumerate(LEVELS))
+        made.append(replace(one, blocks=blocks, holds=holds, good=np.ones(n, dtype=bool)))
+    return made
+
+
+@pytest.mark.parametrize(("creep", "drift"), [(0.0, 0.0), (0.0, 2e-9), (0.02, 0.0), (0.02, 2e-9)])
+def test_what_all_holds_show_alike_is_taken_off_and_drift_is_not(creep, drift):
+    given = campaign(creep, drift)
+    less, _, conditions = without_creep(given, NOISE, 1e-8)
+    assert [str(c) for c in conditions] == (["deflection-creeps"] if creep else [])
+    if not creep:
+        assert less == given
+        return
+    assert all(0.005 < one.creep < 0.06 for one in less)
+    if not drift:
+        slopes = [np.polyfit(one.blocks.load, one.blocks.deflection, 1)[0] for one in less]
+        np.testing.assert_allclose(slopes, 4e-9, rtol=0.03)
+
+
+def test_records_without_holds_tell_no_creep():
+    ramps = [replace(one, holds=()) for one in campaign(0.02)]
+    assert without_creep(ramps, NOISE, 1e-8) == (ramps, NOISE, ())

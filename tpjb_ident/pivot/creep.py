@@ -1,0 +1,95 @@
+"""Creep of a dry test: a deflection that goes on for seconds after every step of the load, as liners and joints do.
+
+Within a hold creep looks like drift, but drift goes on through all holds at one rate of either sign, while creep
+follows the load, in all runs alike. Taken for drift it is taken off over the whole record, though it may begin anew
+with every step, and the pivot comes out several per cent too stiff. Holds tell how it goes on within them; whether the
+next one carries it on they do not: every step may add its own for ever (as in a linear solid), or the next step may
+end it. Both are tried with several time constants, weighed by how well they fit; the mean is taken off, and its size
+at the largest load counts as an error of all deflections alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.slow_noise import NoiseModel
+from tpjb_ident.pivot.dry_record import DryRecord, noise_within_holds
+
+_TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
+# standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ
+_LEAST, _ALIKE = 3.0, 5.0
+_ROUNDS = 4
+
+
+def without_creep(
+    records: Sequence[DryRecord], noise: NoiseModel, drift_rate: float
+) -> tuple[list[DryRecord], NoiseModel, tuple[Condition, ...]]:
+    """Records less the creep that their holds show alike, their noise, and a condition.
+
+    Without creep they are given back as they are.
+    """
+    held = [record for record in records if record.holds]
+    if not held:
+        return list(records), noise, ()
+    times = np.median([hold.duration for record in held for hold in record.holds]) * np.array(_TIMES)
+    less = list(records)
+    condition: tuple[Condition, ...] = ()
+    for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
+        sums = np.array([_held_to_light(record, noise, times) for record in held])
+        information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
+        total = information.sum(axis=0)
+        share = pull.sum(axis=0) / total
+        scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
+        error = np.sqrt(np.maximum(scatter, 1.0) / total)
+        best = int(np.argmax(share / error))
+        if share[best] < max(_LEAST * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
+            break
+        gain = np.where(share > 0.0, (share / error) ** 2, 0.0)
+        weight = np.exp(0.5 * (gain - gain.max()))
+        weight /= weight.sum()
+        less = [_less(record, _courses(record, times) @ (share * weight)) for record in records]
+        noise = noise_within_holds(less, drift_rate)
+        percent, seconds = f"{100 * share[best]:.1f} % (se {100 * error[best]:.1f} %)", times[best % len(times)]
+        detail = f"{percent} of the deflection follow a step within some {seconds:.2g} s"
+        condition = (Condition("deflection-creeps", detail),)
+    return less, noise, condition
+
+
+def _courses(record: DryRecord, times: FloatArray) -> FloatArray:
+    """Creep of unit size at the blocks (m, 2 k): of every time constant (k,), lost at the next step, and carried on."""
+    blocks = record.blocks
+    moved = blocks.deflection - blocks.deflection[int(np.argmin(blocks.load))]
+    starts = np.array([hold.start for hold in record.holds] + [0.0])
+    since = np.where(blocks.hold >= 0, blocks.time - starts[blocks.hold], 0.0)[:, None]
+    anew = moved[:, None] * -np.expm1(-np.maximum(since, 0.0) / times)
+    carried = np.full_like(anew, moved[0])
+    follow = -np.expm1(-np.diff(blocks.time)[:, None] / times)
+    for k in range(1, len(moved)):
+        carried[k] = carried[k - 1] + (moved[k] - carried[k - 1]) * follow[k - 1]
+    return np.hstack([anew, carried - carried[0]])
+
+
+def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a record's holds, each at a level of its own, say of the size of every course: information, and pull."""
+    used = record.blocks.hold >= 0
+    blocks = record.blocks.take(used)
+    level = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
+    covariance = noise.covariance(blocks.time, blocks.duration) + record.quantisation**2 * np.eye(len(blocks))
+    columns = np.column_stack([blocks.deflection, _courses(record, times)[used]])
+    whitened = np.linalg.solve(np.linalg.cholesky(covariance), np.column_stack([level, columns]))
+    basis, _ = np.linalg.qr(whitened[:, : level.shape[1]])
+    free = whitened[:, level.shape[1] :]
+    free = free - basis @ (basis.T @ free)
+    return np.sum(free[:, 1:] ** 2, axis=0), free[:, 1:].T @ free[:, 0]
+
+
+def _less(record: DryRecord, creep: FloatArray) -> DryRecord:
+    """A record less its creep (m,) [m], with the largest share of the deflection that it was."""
+    blocks, share = record.blocks, float(np.max(np.abs(creep))) / float(np.ptp(record.blocks.deflection))
+    return replace(record, blocks=replace(blocks, deflection=blocks.deflection - creep), creep=share)
