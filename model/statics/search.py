@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from model.conditions import has_answer, named
+from model.conditions import named
 from model.film.attitudes import attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.following_heat import heat_impedance
@@ -19,7 +19,6 @@ from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
 from model.pad.bending import SHAPES
 from model.setup import Setup
-from model.statics import conditions
 from model.statics.axial_tilt import aligned_tilt, axial_shape
 from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
 from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL, Case
@@ -46,11 +45,12 @@ from model.statics.compiled.laws import OTHER, ask_laws, encoded
 from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
 from model.statics.compiled.start import first_position, pivot_curve, warm_film
+from model.statics.conditions import status_of
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
 from model.statics.heat_paths import couples_heat, stacked_conduction
 from model.statics.pad_film import oil_constants, pad_films
-from model.statics.pad_flow import starved, through_flow
+from model.statics.pad_flow import through_flow
 from model.tilt_hold import hold_numbers
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
@@ -69,10 +69,14 @@ class Search:
 
     def __init__(self, setup: Setup, load: FloatArray, speed: float, heat: float = 1.0) -> None:
         self.setup, self.load, self.speed, self.heat = setup, load, speed, heat
-        self.films, self.works, shifts = pad_films(_as_started(setup))
+        cold, supply = setup, setup.inlet_temperature
+        if setup.growth is not None:  # the clearances of a journal as warm as the supply
+            cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
+        self.films, self.works, shifts = pad_films(cold)
         for film in self.films:
             film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
+        #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
         self.case = self._case()
         self.shapes = self._shapes()
@@ -189,10 +193,8 @@ class Search:
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
         )
 
-    def know_attitudes(self) -> None:
-        """Find the curve of every pad's loaded attitudes, if they are not known."""
-        if self.rises:
-            return
+    def _find_curves(self) -> None:
+        """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
         load = max(float(np.hypot(*self.load)), 1.0)
         case, oil = self.case, self.setup.bearing.oil
         # what the films run with, each for itself
@@ -220,7 +222,8 @@ class Search:
 
     def stand(self) -> None:
         """Put journal and pads where the curves carry the load, and films as warm as they are there."""
-        self.know_attitudes()
+        if not self.rises:
+            self._find_curves()
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
@@ -236,12 +239,10 @@ class Search:
         """How many pads carry nothing where the curves carry the load."""
         if self.case.hold.flexure > 0.0 or not self.state.idle.any():
             return 0
-        self.know_attitudes()
         return int(np.sum(~first_position(self.case.load, self.pads)[1]))
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        self.know_attitudes()
         place_pads(self.pads, self.works, self.state, loaded)
         if self.case.thermal == ISOTHERMAL:
             return
@@ -256,7 +257,6 @@ class Search:
 
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
-        self.know_attitudes()
         pads = self.pads
         reach = pads.preload + pads.frame[:, 0] @ self.state.position
         folds = np.where(pads.rows >= 2, pads.attitudes[:, 0, 0], math.inf)
@@ -410,39 +410,18 @@ class Search:
 
     def _ended(self, code: int, memory: Memory) -> Equilibrium:
         """The state as an answer."""
-        films, figures = self.films, self.state.figures
+        films, figures, trail = self.films, self.state.figures, memory.trail
         names: list[Condition] = []
+        if code in _FAILURES:
+            names.append(named(_FAILURES[code]))
+        elif code != SETTLED and self.setup.friction:  # those that the last step moved most swing
+            tilts = np.abs(self.state.moves[:, 0])
+            largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
+            names.append(named("pads {pads} neither stick nor slide at rest", largest.tolist()))
         if code != SETTLED:
-            names = [named(_FAILURES[code])] if code in _FAILURES else self._restless()
             names.append(named("not converged"))
-        if not has_answer(names) and conditions.unsupported(self.setup, self.load):
-            names.insert(0, named("no pads against the load"))
-        if has_answer(names):
-            names += conditions.overloaded_pads(films)
-        if idle := [f.number for f in films if f.idle]:
-            names.append(named("idle pads {pads}", idle))
-        if figures[BACKFLOW] > 0.0:
-            names.append(named("flow back at a leading edge"))
-        if short := starved(films):
-            ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
-            names.append(named("pads {pads} are short of oil", short, ends))
-        names += conditions.regimes(self.setup, films, self.surface_speed)
-        trail = memory.trail
+        status = status_of(self.setup, self.load, films, self.surface_speed, float(figures[BACKFLOW]), names)
         return Equilibrium(
             self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
-            float(figures[JOURNAL]), tuple(names), self.surface_speed, self.begun,
+            float(figures[JOURNAL]), status, self.surface_speed, self.begun,
         )  # fmt: skip
-
-    def _restless(self) -> list[Condition]:
-        """Names the pads with friction that the last step moved most."""
-        if not self.setup.friction:
-            return []
-        tilts = np.abs(self.state.moves[:, 0])
-        largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
-        return [named("pads {pads} neither stick nor slide at rest", largest.tolist())]
-
-
-def _as_started(setup: Setup) -> Setup:
-    """The set-up with the clearances of a journal as warm as the supply."""
-    supply, growth = setup.inlet_temperature, setup.growth
-    return setup if growth is None else setup.change(bearing=grown(setup.bearing, growth, supply, supply))
