@@ -29,10 +29,9 @@ from model.film.cavitation_matrix import (
     FaceFlows,
     assemble_columns,
     face_flows,
-    factorise_columns,
     substitute_columns,
 )
-from model.film.matrix import assemble, factorise
+from model.film.matrix import assemble, factorise, factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, _integrate, solve_film
 from model.film.slopes import net_inflow
@@ -54,18 +53,13 @@ def _jfo_slopes(
     weight = grid.area
     if sharp:
         weight = _rupture_line(grid, work, faces, x, band)
-    factorise_columns(band)
-    static = np.zeros((x.shape[0], 2))
+    factorise_general(band)
+    slopes = np.zeros((x.shape[0], 4))
+    static, rate = slopes[:, :2], slopes[:, 2:]
     _displaced(grid, work, faces, x, static)
     substitute_columns(band, static)
-    rate = np.zeros((x.shape[0], 2))
     _stored(grid, work, faces, x, static, rate)
     substitute_columns(band, rate)
-    slopes = np.empty((x.shape[0], 4))
-    for k in range(x.shape[0]):
-        for m in range(2):
-            slopes[k, m] = static[k, m]
-            slopes[k, m + 2] = rate[k, m]
     _flows(work, faces)
     return weight, slopes
 
@@ -203,7 +197,7 @@ def _conserve(
     force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
     faces = face_flows(grid, work, wedge, speed, supplied)
     _starved(work, faces)
-    if not _any_ruptured(work.ruptured):
+    if not work.ruptured.any():
         return 0, force, stiffness, damping
     x = np.empty((work.unknown.shape[0], 1))
     band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
@@ -217,15 +211,6 @@ def _conserve(
 
 
 @inner
-def _any_ruptured(ruptured: BoolArray) -> bool:
-    for i in range(ruptured.shape[0]):
-        for j in range(ruptured.shape[1]):
-            if ruptured[i, j]:
-                return True
-    return False
-
-
-@inner
 def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatArray, FloatArray]) -> int:
     """Solve F(x) = 0 by block principal pivoting; returns the number of factorisations, -2 if it did not settle."""
     band, x = space
@@ -233,7 +218,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
     fewest, patience = ruptured.size + 1, _PATIENCE
     for step in range(1, _MAX_STEPS + 1):
         assemble_columns(band, faces, ruptured, first)
-        factorise_columns(band)
+        factorise_general(band)
         _drag(work, faces, first, x)
         substitute_columns(band, x)
         wrong = _misplaced(x, ruptured, first)

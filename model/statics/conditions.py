@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from model.conditions import has_answer, named
+from model.conditions import named
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import starved
@@ -73,9 +73,9 @@ def status_of(
     `speed` of the journal's surface [m/s]; `back`: share of the oil that runs back at a leading edge.
     """
     names = list(failures)
-    if not names and unsupported(setup, load):
-        names.append(named("no pads against the load"))
-    if has_answer(names):
+    if names and unsupported(setup, load):
+        names.insert(0, named("no pads against the load"))
+    if not names:
         names += overloaded_pads(films)
     if idle := [f.number for f in films if f.idle]:
         names.append(named("idle pads {pads}", idle))

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from model.conditions import named
-from model.film.attitudes import attitudes
+from model.film.attitudes import BETWEEN, attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.following_heat import heat_impedance
-from model.film.models import FILM_MODELS
-from model.film.oil_state import Running, set_viscosity
+from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
 from model.pad.bending import SHAPES
+from model.pivot_formulas import OTHER
+from model.pivots import ask_laws, encoded
 from model.setup import Setup
 from model.statics.axial_tilt import aligned_tilt, axial_shape
-from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL, Case
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
@@ -41,17 +42,15 @@ from model.statics.compiled.iteration import (
     iterate,
     vector_size,
 )
-from model.statics.compiled.laws import OTHER, ask_laws, encoded
-from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
-from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
-from model.statics.compiled.start import first_position, pivot_curve, warm_film
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place, rescue
+from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
+from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
-from model.statics.heat_paths import couples_heat, stacked_conduction
-from model.statics.pad_film import oil_constants, pad_films
+from model.statics.pad_film import pad_films
 from model.statics.pad_flow import through_flow
-from model.tilt_hold import hold_numbers
+from model.statics.physics import case_of, couples_heat, shapes_of
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
@@ -72,16 +71,16 @@ class Search:
         cold, supply = setup, setup.inlet_temperature
         if setup.growth is not None:  # the clearances of a journal as warm as the supply
             cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
-        self.films, self.works, shifts = pad_films(cold)
+        self.films, self.works, self.grids = pad_films(cold)
         for film in self.films:
             film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
         #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
-        self.case = self._case()
-        self.shapes = self._shapes()
+        self.case = case_of(setup, self.load, self.surface_speed, heat)
+        self.shapes = shapes_of(setup, self.case, self.films, self.grids)
         self.pads = self._pads()
-        self.state = self._state(shifts)
+        self.state = self._state()
         self.operator = None
         if self.films[0].cross is not None:
             self.operator = CrossOperator.place(*self.films[0].cross.temperature.shape)
@@ -90,50 +89,6 @@ class Search:
     def surface_speed(self) -> float:
         """Of the journal [m/s]."""
         return self.speed * self.setup.bearing.journal_radius
-
-    def _case(self) -> Case:
-        setup, kept = self.setup, (1.0 - self.setup.heat_loss) * self.heat
-        oil, growth = setup.bearing.oil, setup.growth
-        thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
-        if thermal == ALONE and couples_heat(setup):
-            thermal = ACROSS if setup.thermal == "thd" else COUPLED
-        heat = (oil.specific_heat, oil.conductivity)
-        if thermal == ALONE:  # what a share of the heat does, all of it does to oil that takes up more per kelvin
-            heat = (oil.specific_heat / kept, oil.conductivity / kept)
-        if thermal == ISOTHERMAL:
-            heat = (math.inf, oil.conductivity)
-        return Case(
-            load=np.array(self.load, dtype=float),
-            running=Running(float(self.surface_speed), oil_constants(oil), heat),
-            hold=hold_numbers(setup),
-            accuracy=float(setup.accuracy),
-            thermal=thermal,
-            rupture=FILM_MODELS[self.films[0].rupture],
-            supply=float(setup.inlet_temperature),
-            kept=float(kept),
-            mixing=float(setup.mixing),
-            journal=bool(setup.options.isothermal_journal),
-            closing=0.0 if growth is None else float(growth.closing(setup.bearing)),
-            axial=setup.pads_follow,
-            fresh=oil.supply_flow
-            * float(oil.density(setup.inlet_temperature))
-            / len(self.films)
-            / setup.bearing.length,
-            length=setup.bearing.length,
-            asks_laws=bool((encoded(setup.pivots)[0][:, 0] == OTHER).any()),
-        )
-
-    def _shapes(self) -> Shapes:
-        setup, films = self.setup, self.films
-        bodies: tuple[Any, ...] = tuple(f.deformation for f in films if f.deformation is not None)
-        grid, grids = films[0].grid, stacked_grids(tuple(f.grid for f in films))
-        if self.case.thermal in (ISOTHERMAL, ALONE) and not (setup.flexible_pads or self.case.axial):
-            return Shapes(grids, None, None)
-        conducting = bodies if self.case.thermal == COUPLED and setup.options.conduction else ()
-        bending: BodyStack = stacked_bodies(
-            bodies if setup.flexible_pads else (), (grid.first, len(grid.z)), setup.bending_factor, self.case.supply
-        )
-        return Shapes(grids, bending, stacked_conduction(conducting))
 
     def _pads(self) -> PadStack:
         films, count = self.films, len(self.films)
@@ -148,7 +103,7 @@ class Search:
             np.zeros((count, 4, _ROWS)), flattest, np.zeros(count, dtype=np.int64),
         )  # fmt: skip
 
-    def _state(self, shifts: FloatArray) -> PadState:
+    def _state(self) -> PadState:
         n, works, across = len(self.films), self.works, self.case.thermal == ACROSS
         bends = self.setup.flexible_pads or self.case.axial
         shape = works.extra.shape
@@ -183,7 +138,7 @@ class Search:
             resting=np.full((n, 4), math.nan),
             steps=np.zeros(n, dtype=np.int64),
             heating=np.full(n, math.inf),
-            shift=shifts,
+            shift=np.zeros_like(works.unknown),
             bent=bent,
             mismatch=np.zeros_like(bent),
             amplitude=np.zeros((n, SHAPES, 3)),
@@ -243,14 +198,17 @@ class Search:
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        place_pads(self.pads, self.works, self.state, loaded)
-        if self.case.thermal == ISOTHERMAL:
-            return
         for m in np.flatnonzero(loaded).tolist():
+            place(self.pads, self.works, self.state, m)
+            if self.case.thermal == ISOTHERMAL:
+                continue
             (low, rises), film = self.rises[m], self.films[m]
             temperature, table = film.work.temperature, self.pads.attitudes[m, 0, : self.pads.rows[m]]
-            reach, whole = film.rigid_approach(self.state.position), film.grid.first == 1
-            warm_film(rises, low, table, reach, float(self.state.inlet[m]), whole, temperature)
+            point = np.interp(film.rigid_approach(self.state.position), table, np.arange(len(table)))
+            row = min(int((low + point) / BETWEEN), len(rises) - 2)
+            part = (low + point) / BETWEEN - row
+            along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)
+            temperature[:] = self.state.inlet[m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
             if film.cross is not None:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
@@ -425,3 +383,15 @@ class Search:
             self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
             float(figures[JOURNAL]), status, self.surface_speed, self.begun,
         )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def _spread(coarse: tuple[int, int], fine: tuple[int, int], whole: bool) -> tuple[FloatArray, FloatArray]:
+    """From a curve's mesh to a film's, along and across, where either is graded alike; a whole film is symmetric."""
+    z = np.linspace(0.0, 1.0, fine[1])
+    places = np.linspace(0.0, 1.0, fine[0]), np.abs(2.0 * z - 1.0) if whole else z
+    hats = [
+        np.array([np.interp(x, np.linspace(0.0, 1.0, count), hat) for hat in np.eye(count)])
+        for x, count in zip(places, coarse, strict=True)
+    ]
+    return hats[0].T, hats[1]

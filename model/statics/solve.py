@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -13,8 +14,8 @@ from model.conditions import named, pads_of
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.equilibrium import Equilibrium
-from model.statics.heat_paths import couples_heat
 from model.statics.pad_flow import starved
+from model.statics.physics import couples_heat
 from model.statics.search import Search
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
@@ -52,7 +53,7 @@ def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equil
         result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and warm is not None and warm.converged:
         return warm
-    for attempt in (*_RAISED, _let_held_idle, _try_sets):
+    for attempt in _ATTEMPTS:
         if not result.converged:
             result = attempt(setup, load, speed, result)
     return result
@@ -206,4 +207,9 @@ def _raise(quantity: str, setup: Setup, load: FloatArray, speed: float, failed: 
     return failed
 
 
-_RAISED = tuple(partial(_raise, quantity) for quantity in ("heat", "load", "speed", "want"))
+#: What is tried one after another where an equilibrium is not found at once.
+_ATTEMPTS: tuple[Callable[..., Equilibrium], ...] = (
+    *(partial(_raise, quantity) for quantity in ("heat", "load", "speed", "want")),
+    _let_held_idle,
+    _try_sets,
+)
