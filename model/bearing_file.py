@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
-from model.toml_text import parse_toml
+from model.toml_text import parse_toml, read_page
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
@@ -115,14 +115,8 @@ def load_bearing(source: str | Path) -> Bearing:
     if isinstance(source, str) and "\n" in source:
         return parse_bearing(source, "bearing")
     path = Path(source)
-    try:
-        if path.stat().st_size > 1_000_000:
-            raise BearingError(f"{path.name}: larger than 1 MB. A bearing file is a page of text; check the path.")
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise BearingError(f"{path}: no such file. Give the path of a tpjb-bearing/1 TOML file.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise BearingError(f"{path}: cannot be read ({error}). Save it as UTF-8 text.") from error
+    missing = "Give the path of a tpjb-bearing/1 TOML file."
+    text = read_page(path, BearingError, "A bearing file is a page of text", missing)
     return parse_bearing(text, path.name)
 
 
@@ -187,13 +181,17 @@ def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any
 
 def _read_tolerance(value: Any, entry: str, name: str) -> float:
     place = f"{name}, [tolerances] {entry}"
-    try:
-        number = float(parse_quantity(value, _TOLERANCES[entry], place))
-    except UnitError as error:
-        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    number = _quantity(value, _TOLERANCES[entry], place)
     if not 0.0 <= number < math.inf:
         raise BearingError(f"{place}: must be zero or more, got {value!r}.")
     return number
+
+
+def _quantity(value: Any, dimension: str, place: str) -> float:
+    try:
+        return float(parse_quantity(value, dimension, place))
+    except UnitError as error:
+        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
 
 
 def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
@@ -205,10 +203,7 @@ def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
         if any(isinstance(v, list) for v in value):
             raise BearingError(f"{place}: must be a list of quantities, not of lists.")
         return tuple(_read_value(v, entry, dimension, f"{place}[{i}]") for i, v in enumerate(value))
-    try:
-        number = parse_quantity(value, dimension, place)
-    except UnitError as error:
-        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    number = _quantity(value, dimension, place)
     if dimension == "temperature":
         number = round(number - ZERO_CELSIUS, 9)  # the decimals of the file, not those of the difference
     signed = dimension == "temperature" or entry == "pivot_angles"

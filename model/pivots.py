@@ -19,7 +19,7 @@ import numpy as np
 from model.bearing import Bearing, BearingError, Pivot
 from model.measured_pivot import MeasuredPivot
 from model.pivot_formulas import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL, compliance, deflection
-from model.toml_text import parse_toml
+from model.toml_text import parse_toml, read_page
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
 
@@ -308,15 +308,11 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     ['measured']
     """
     path = Path(path)
+    kind, missing = "A pivots.toml holds some hundred numbers", "`tpjb pivot CAMPAIGN` writes a pivots.toml."
+    text = read_page(path, BearingError, kind, missing, 20)
     try:
-        if path.stat().st_size > 20_000_000:
-            raise BearingError(
-                f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path."
-            )
-        data = parse_toml(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise BearingError(f"{path}: no such file. `tpjb pivot CAMPAIGN` writes a pivots.toml.") from error
-    except (OSError, ValueError) as error:  # not text, not TOML
+        data = parse_toml(text)
+    except ValueError as error:
         raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     if data.get("schema") != "tpjb-pivots/1":
         raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")

@@ -13,7 +13,6 @@ that is solved as a correction by a few Krylov steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -63,15 +62,20 @@ def settle_cross_temperatures(
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     start = journal if math.isfinite(journal) else setup.inlet_temperature
     answers: list[CrossAnswer | None] = []
+    outlets, taken = [], []
     back, around = 0.0, sum(f.inlet for f in films) / len(films)  # what the grooves hold, on the mean
     for film in order:
         answer, share = _answer(setup, film, surface_speed, (start, around), operator)
         answers.append(answer)
+        # an idle pad passes its inlet on, somewhat warmer
+        warmer = (outlet_temperature(film) - film.inlet, 1.0, 0.0)
+        outlets.append(warmer if answer is None else answer.outlet)
+        taken.append(np.zeros(3) if answer is None else answer.taken)
         back = max(back, share)
-    inlets, journal = balance_heat(
-        np.arange(len(order)), _outer(order, answers), np.array([a is not None for a in answers]),
-        float(setup.inlet_temperature), float(setup.mixing),
-    )  # fmt: skip
+    outer = np.array([through_flow(f) for f in order]), np.array(outlets), np.array(taken)
+    solved = np.array([a is not None for a in answers])
+    supply, mixing = float(setup.inlet_temperature), float(setup.mixing)
+    inlets, journal = balance_heat(np.arange(len(order)), outer, solved, supply, mixing)
     change = 0.0
     for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
         hotter = inlet - film.inlet
@@ -90,20 +94,6 @@ def settle_cross_temperatures(
         film.outlet = float(np.dot(part.outlet, weights))
         change = float(np.maximum(change, film.temperature_change))
     return change, back, journal
-
-
-def _outer(
-    order: Sequence[PadFilm], answers: Sequence[CrossAnswer | None]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What films pass on, as `balance_heat` takes it; an idle pad passes its inlet on, somewhat warmer."""
-    flows = np.array([through_flow(f) for f in order])
-    outlets, taken = np.zeros((2, len(order), 3))
-    for k, (film, part) in enumerate(zip(order, answers, strict=True)):
-        if part is None:
-            outlets[k] = outlet_temperature(film) - film.inlet, 1.0, 0.0
-        else:
-            outlets[k], taken[k] = part.outlet, part.taken
-    return flows, outlets, taken
 
 
 def _limited_share(change: float, limits: tuple[float, float]) -> float:
@@ -135,7 +125,7 @@ def _answer(
     oil = setup.bearing.oil
     heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
     back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
-    taken = (pad.flux @ (pad.to_coarse @ (cross.face - around).ravel())).reshape(cross.face.shape)
+    taken: FloatArray = np.asarray(pad.flux @ (pad.to_coarse @ (cross.face - around).ravel())).reshape(cross.face.shape)
     fields = np.zeros((taken.shape[0], operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
     sources = operator.dissipation
