@@ -197,7 +197,7 @@ def _conserve(
     force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
     faces = face_flows(grid, work, wedge, speed, supplied)
     _starved(work, faces)
-    if not work.ruptured.any():
+    if not _any_ruptured(work.ruptured):
         return 0, force, stiffness, damping
     x = np.empty((work.unknown.shape[0], 1))
     band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
@@ -208,6 +208,15 @@ def _conserve(
         _leave_behind(grid, work, faces, slopes)
         force, stiffness, damping = _integrate(grid, work, weight)
     return steps, force, stiffness, damping
+
+
+@inner
+def _any_ruptured(ruptured: BoolArray) -> bool:
+    for i in range(ruptured.shape[0]):
+        for j in range(ruptured.shape[1]):
+            if ruptured[i, j]:
+                return True
+    return False
 
 
 @inner

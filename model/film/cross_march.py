@@ -36,6 +36,10 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
                 from_journal = before[k, 2] + journal[k // cells, 1]
             for q in range(count):
                 value = before[k, 0] * old[k, q]
+                if q == 0:
+                    value += sources[i, k]
+                if q == count - 1:
+                    value += from_journal
                 if m > 0:
                     value += before[k, 1] * old[k - 1, q]
                 if m < cells - 1:
@@ -44,18 +48,15 @@ def march_cross(operator: CrossOperator, fields: FloatArray, sources: FloatArray
                     value += before[k, 3] * old[k - cells, q]
                 if k + cells < n:
                     value += before[k, 4] * old[k + cells, q]
+                for s in range(max(0, cells - k), cells):
+                    value -= band[k, s] * new[k - cells + s, q]
                 new[k, q] = value
-            new[k, 0] += sources[i, k]
-            new[k, count - 1] += from_journal
-            for s in range(max(0, cells - k), cells):
-                for q in range(count):
-                    new[k, q] -= band[k, s] * new[k - cells + s, q]
         for k in range(n - 1, -1, -1):
-            for s in range(cells + 1, cells + 1 + min(cells, n - 1 - k)):
-                for q in range(count):
-                    new[k, q] -= band[k, s] * new[k - cells + s, q]
             for q in range(count):
-                new[k, q] *= band[k, cells]
+                value = new[k, q]
+                for s in range(cells + 1, cells + 1 + min(cells, n - 1 - k)):
+                    value -= band[k, s] * new[k - cells + s, q]
+                new[k, q] = value * band[k, cells]
         for j in range(journal.shape[0]):
             k = j * cells + cells - 1
             for q in range(count):

@@ -42,7 +42,7 @@ from model.statics.compiled.iteration import (
     iterate,
     vector_size,
 )
-from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place, rescue
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
 from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
@@ -198,17 +198,22 @@ class Search:
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
+        pads, state = self.pads, self.state
+        reach, sideways = pads.preload + pads.frame[:, 0] @ state.position, pads.frame[:, 1] @ state.position
+        state.idle[loaded] = self.works.ruptured[loaded] = False
         for m in np.flatnonzero(loaded).tolist():
-            place(self.pads, self.works, self.state, m)
+            curve = pads.attitudes[m, :, : pads.rows[m]]
+            at = max(reach[m], curve[0, 0])  # at its fold where it has none there
+            state.deflection[m] = at - np.interp(at, curve[0], curve[1])
+            state.tilt[m] = (np.interp(at, curve[0], curve[2]) - sideways[m]) / pads.pivot_radius[m]
             if self.case.thermal == ISOTHERMAL:
                 continue
-            (low, rises), film = self.rises[m], self.films[m]
-            temperature, table = film.work.temperature, self.pads.attitudes[m, 0, : self.pads.rows[m]]
-            point = np.interp(film.rigid_approach(self.state.position), table, np.arange(len(table)))
+            (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
+            point = np.interp(at, curve[0], np.arange(curve.shape[1]))
             row = min(int((low + point) / BETWEEN), len(rises) - 2)
             part = (low + point) / BETWEEN - row
             along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)
-            temperature[:] = self.state.inlet[m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
+            temperature[:] = state.inlet[m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
             if film.cross is not None:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
