@@ -41,13 +41,13 @@ KERNELS = (
     "film/slopes.py",
     "film/turbulence.py",
     "interpolation.py",
-    "pivot_formulas.py",
     "statics/compiled/anderson.py",
     "statics/compiled/bending.py",
     "statics/compiled/case.py",
     "statics/compiled/elimination.py",
     "statics/compiled/heat.py",
     "statics/compiled/iteration.py",
+    "statics/compiled/laws.py",
     "statics/compiled/place.py",
     "statics/compiled/stack.py",
     "statics/compiled/start.py",
@@ -153,7 +153,7 @@ def _cache_type() -> Any:
             return loaded
 
         def save_overload(self, sig: Any, data: Any) -> None:
-            with contextlib.suppress(AttributeError):  # a numba that is built otherwise keeps all
+            with contextlib.suppress(AttributeError, ImportError):  # a numba that is built otherwise keeps all
                 data.library._shared_module = _names_of(data.library)
             super().save_overload(sig, data)
 
@@ -165,14 +165,14 @@ def _names_of(library: Any) -> Any:
 
     numba keeps a function's code also as other functions would take it in, which none does: 23 MB of a process.
     """
-    from llvmlite import binding, ir
+    from numba.core.codegen import ll, llvmir
 
     module = library.codegen._create_empty_module(library.name)
     for function in library._final_module.functions:
         if not function.is_declaration:
-            named = ir.Function(module, ir.FunctionType(ir.VoidType(), []), function.name)
-            ir.IRBuilder(named.append_basic_block()).ret_void()
-    return binding.parse_assembly(str(module))
+            named = llvmir.Function(module, llvmir.FunctionType(llvmir.VoidType(), []), function.name)
+            llvmir.IRBuilder(named.append_basic_block()).ret_void()
+    return ll.parse_assembly(str(module))
 
 
 @functools.cache
