@@ -10,7 +10,7 @@ import numpy as np
 
 from model.errors import ModelError
 from model.interpolation import monotone_cubics
-from model.statics.compiled.laws import MEASURED, compliance, deflection
+from model.pad.pivot import MEASURED, compliance, deflection
 from rigdata.arrays import FloatArray
 
 
@@ -61,7 +61,7 @@ class MeasuredPivot:
 
     @property
     def numbers(self) -> Any:
-        """Row of `model.statics.compiled.laws`."""
+        """Row of `model.pad.pivot`."""
         return MEASURED, len(self.load), 0.0, 1.0
 
     def deflection(self, load: float) -> float:

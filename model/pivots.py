@@ -18,7 +18,7 @@ import numpy as np
 
 from model.bearing import Bearing, BearingError, Pivot
 from model.measured_pivot import MeasuredPivot
-from model.statics.compiled.laws import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL, compliance, deflection
+from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL, compliance, deflection
 from model.toml_text import parse_toml, read_page
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
@@ -82,7 +82,7 @@ class PivotLaw(Protocol):
 
 
 class _Formula:
-    """A law that is a row of `model.statics.compiled.laws`."""
+    """A law that is a row of `model.pad.pivot`."""
 
     secant_vibrations: bool = False
 

@@ -11,12 +11,12 @@ import numpy as np
 from model.film.models import FILM_MODELS
 from model.film.oil_state import Running
 from model.pad.bending import PadDeformation
+from model.pad.pivot import OTHER
 from model.pivots import encoded
 from model.setup import Setup
 from model.statics.compiled.bending import Shapes, stacked_bodies
 from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
 from model.statics.compiled.heat import Conduction
-from model.statics.compiled.laws import OTHER
 from model.statics.compiled.stack import GridStack
 from model.statics.pad_film import PadFilm, oil_constants, rupture_of
 from model.tilt_hold import hold_numbers

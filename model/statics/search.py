@@ -18,6 +18,7 @@ from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
 from model.pad.bending import SHAPES
+from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
 from model.statics.axial_tilt import aligned_tilt, axial_shape
@@ -41,7 +42,6 @@ from model.statics.compiled.iteration import (
     iterate,
     vector_size,
 )
-from model.statics.compiled.laws import OTHER
 from model.statics.compiled.place import is_doubtful, is_stable, let_idle, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
 from model.statics.compiled.start import first_position, pivot_curve

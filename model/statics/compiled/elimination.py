@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import inner
+from model.pad.pivot import compliance, deflection
 from model.statics.compiled.case import Case
-from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.stack import GROWING, PadStack, PadState
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray

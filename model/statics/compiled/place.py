@@ -7,8 +7,8 @@ import math
 from model.compilation import inner
 from model.film.mesh import FilmWork
 from model.interpolation import row_below
+from model.pad.pivot import compliance
 from model.statics.compiled.case import ALONE, COUPLED, Case, along, rigid_approach
-from model.statics.compiled.laws import compliance
 from model.statics.compiled.stack import PadStack, PadState
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray

@@ -36,7 +36,7 @@ class PadStack(NamedTuple):
     pivot_radius: FloatArray  #: (n,): R_P and Cp [m].
     clearance: FloatArray
     order: IntArray  #: (n,) of int: The pads in the order in which oil passes them.
-    laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
+    laws: FloatArray  #: (n, 4): The pivots, see `model.pad.pivot`.
     curves: FloatArray  #: (n, 5, m): Measured ones.
     attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
     flattest: FloatArray  #: (n,): Wedges b up to here are none of a pad that is stable in tilt [m].

@@ -15,8 +15,8 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.interpolation import least, row_below
+from model.pad.pivot import deflection
 from model.statics.compiled.case import rigid_approach
-from model.statics.compiled.laws import deflection
 from model.statics.compiled.stack import PadStack
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
