@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
-from model.toml_text import parse_toml
+from model.toml_text import parse_toml, read_page
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
@@ -83,6 +83,11 @@ _PER_PAD = {
     "pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance", "thickness", "babbitt_thickness",
     "elastic_thickness", "mass", "moment_of_inertia", "leading_edge_pressure", *_PIVOT_SIZES,
 }  # fmt: skip
+#: What makes a pad besides its place, its material and its pivot.
+_PAD_SIZES = (
+    *(("bearing", key) for key in ("assembled_clearance", "pad_clearance")),
+    *(("pads", key) for key in _KEYS["pads"] if key not in ("pivot_angles", "back_convection")),
+)
 
 
 def load_bearing(source: str | Path) -> Bearing:
@@ -110,14 +115,8 @@ def load_bearing(source: str | Path) -> Bearing:
     if isinstance(source, str) and "\n" in source:
         return parse_bearing(source, "bearing")
     path = Path(source)
-    try:
-        if path.stat().st_size > 1_000_000:
-            raise BearingError(f"{path.name}: larger than 1 MB. A bearing file is a page of text; check the path.")
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise BearingError(f"{path}: no such file. Give the path of a tpjb-bearing/1 TOML file.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise BearingError(f"{path}: cannot be read ({error}). Save it as UTF-8 text.") from error
+    missing = "Give the path of a tpjb-bearing/1 TOML file."
+    text = read_page(path, BearingError, "A bearing file is a page of text", missing)
     return parse_bearing(text, path.name)
 
 
@@ -133,29 +132,17 @@ def parse_bearing(text: str, name: str) -> Bearing:
         raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
     values = {key: _read_section(section, key, name) for key, section in sections.items()}
     pads = _pads(values, name)
-    oil, rotation = values["oil"], values["bearing"].get("rotation", "")
-    bearing = Bearing(
+    return Bearing(
         name=values[""].get("name", name),
         journal_diameter=values["journal"]["diameter"],
         length=values["bearing"]["length"],
         pads=pads,
         pivot=_pivots(values["pivot"], len(pads), name)[0],
-        oil=Oil(
-            viscosity_40=oil["viscosity_40C"],
-            viscosity_exponent=oil["viscosity_exponent"],
-            density_40=oil["density_40C"],
-            thermal_expansion=oil["thermal_expansion"],
-            specific_heat=oil["specific_heat"],
-            conductivity=oil["conductivity"],
-            supply_temperature=oil["supply_temperature"],
-            grade=oil.get("grade", ""),
-            supply_flow=oil.get("supply_flow", math.inf),
-        ),
-        rotation=rotation,
+        oil=Oil(**{key.removesuffix("C"): value for key, value in values["oil"].items()}),
+        rotation=values["bearing"].get("rotation", ""),
         source=name,
         tolerances=tuple(values["tolerances"].items()),
     )
-    return bearing
 
 
 def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
@@ -194,13 +181,17 @@ def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any
 
 def _read_tolerance(value: Any, entry: str, name: str) -> float:
     place = f"{name}, [tolerances] {entry}"
-    try:
-        number = float(parse_quantity(value, _TOLERANCES[entry], place))
-    except UnitError as error:
-        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    number = _quantity(value, _TOLERANCES[entry], place)
     if not 0.0 <= number < math.inf:
         raise BearingError(f"{place}: must be zero or more, got {value!r}.")
     return number
+
+
+def _quantity(value: Any, dimension: str, place: str) -> float:
+    try:
+        return float(parse_quantity(value, dimension, place))
+    except UnitError as error:
+        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
 
 
 def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
@@ -212,10 +203,7 @@ def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
         if any(isinstance(v, list) for v in value):
             raise BearingError(f"{place}: must be a list of quantities, not of lists.")
         return tuple(_read_value(v, entry, dimension, f"{place}[{i}]") for i, v in enumerate(value))
-    try:
-        number = parse_quantity(value, dimension, place)
-    except UnitError as error:
-        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
+    number = _quantity(value, dimension, place)
     if dimension == "temperature":
         number = round(number - ZERO_CELSIUS, 9)  # the decimals of the file, not those of the difference
     signed = dimension == "temperature" or entry == "pivot_angles"
@@ -233,13 +221,11 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
         raise BearingError(f"{name}, [pads] pivot_angles: must be a list of 1 to 40 angles, pad #1 first.")
 
     count = len(angles)
-    sizes = {key: _per_pad(pads[key], count, f"{name}, [pads] {key}") for key in ("arc", "mass", "moment_of_inertia")}
-    for key in ("assembled_clearance", "pad_clearance"):
-        sizes[key] = _per_pad(bearing[key], count, f"{name}, [bearing] {key}")
-    sizes["pivot_offset"] = _per_pad(pads.get("pivot_offset", 0.5), count, f"{name}, [pads] pivot_offset")
-    defaults = {"thickness": 0.0, "elastic_thickness": pads["thickness"], "babbitt_thickness": 0.0}
-    for key, default in (defaults | {"leading_edge_pressure": 0.0}).items():
-        sizes[key] = _per_pad(pads.get(key, default), count, f"{name}, [pads] {key}")
+    defaults = {"pivot_offset": 0.5, "elastic_thickness": pads["thickness"], "babbitt_thickness": 0.0}
+    sizes = {}
+    for section, key in _PAD_SIZES:
+        value = values[section].get(key, defaults.get(key, 0.0))
+        sizes[key] = _per_pad(value, count, f"{name}, [{section}] {key}")
     _check_offsets(angles, sizes["arc"], sizes["pivot_offset"], bearing.get("rotation", ""), name)
     for lining, elastic, thickness in zip(*(sizes[f"{k}thickness"] for k in ("babbitt_", "elastic_", "")), strict=True):
         if not lining < elastic <= thickness:

@@ -29,6 +29,7 @@ KERNELS = (
     "film/cross_energy.py",
     "film/cross_film.py",
     "film/cross_march.py",
+    "film/dense.py",
     "film/edge_flows.py",
     "film/energy.py",
     "film/following_heat.py",
@@ -40,13 +41,13 @@ KERNELS = (
     "film/slopes.py",
     "film/turbulence.py",
     "interpolation.py",
+    "pad/pivot.py",
     "statics/compiled/anderson.py",
     "statics/compiled/bending.py",
     "statics/compiled/case.py",
     "statics/compiled/elimination.py",
     "statics/compiled/heat.py",
     "statics/compiled/iteration.py",
-    "statics/compiled/laws.py",
     "statics/compiled/place.py",
     "statics/compiled/stack.py",
     "statics/compiled/start.py",
@@ -151,7 +152,27 @@ def _cache_type() -> Any:
                 _register_inner_loops()
             return loaded
 
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with contextlib.suppress(AttributeError, ImportError):  # a numba that is built otherwise keeps all
+                data.library._shared_module = _names_of(data.library)
+            super().save_overload(sig, data)
+
     return Cache
+
+
+def _names_of(library: Any) -> Any:
+    """A module with the names of a library's functions and nothing in them.
+
+    numba keeps a function's code also as other functions would take it in, which none does: 23 MB of a process.
+    """
+    from numba.core.codegen import ll, llvmir
+
+    module = library.codegen._create_empty_module(library.name)
+    for function in library._final_module.functions:
+        if not function.is_declaration:
+            named = llvmir.Function(module, llvmir.FunctionType(llvmir.VoidType(), []), function.name)
+            llvmir.IRBuilder(named.append_basic_block()).ret_void()
+    return ll.parse_assembly(str(module))
 
 
 @functools.cache

@@ -18,12 +18,12 @@ from model.film.following_heat import heat_impedance
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
 from model.mirror import MIRROR
-from model.pad.bending import AxialTilt, force_weights
+from model.pad.bending import force_weights
 from model.setup import Setup
-from model.statics.axial_tilt import axial_tilt_of
+from model.statics.axial_tilt import AxialTilt, axial_shape
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
-from model.tilt_hold import friction_limits, tilt_hold
+from model.tilt_hold import TiltHold, friction_limits, tilt_hold
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
@@ -34,7 +34,7 @@ _HALVINGS = 60
 
 
 def flexing_impedance(
-    film: PadFilm, position: FloatArray, omega: FloatArray, factor: float, axial: tuple[AxialTilt, float] | None = None
+    film: PadFilm, position: FloatArray, omega: FloatArray, factor: float, axial: AxialTilt | None = None
 ) -> ComplexArray:
     """What bending and axial tilting with the motion add to a film's impedance.
 
@@ -47,7 +47,7 @@ def flexing_impedance(
 
     The pad's softest shapes are solved at once, the rest follows in a few turns, as in an equilibrium. At rest this
     is the slope of the static locus with pads that bend; for a stiff pad it is the rigid one. A pad's axial tilt
-    (`model.pad.bending.AxialTilt`) is one more column of S_ab, and leaves by its own equation of motion about the
+    (`model.statics.axial_tilt`) is one more column of S_ab, and leaves by its own equation of motion about the
     pivot.
 
     `position` (2,) [m], `omega` (n,) [rad/s].
@@ -56,7 +56,7 @@ def flexing_impedance(
     conductance = conductances(film.grid, work, film.pad.pad_clearance, *film.approach(position))
     still, moving = work.slopes[:, :2], work.slopes[:, 2:4]
     if axial is not None:
-        shape = axial[0].shape[:, :, None]
+        shape = axial.shape[:, :, None]
         still = np.hstack([still, shape_slopes(film.grid, work, conductance, shape)])
         moving = np.hstack([moving, squeeze_slopes(film.grid, work, shape)])
     bend = _Bend(film, conductance, factor) if factor else None
@@ -66,8 +66,8 @@ def flexing_impedance(
         pressure = rigid if bend is None else bend.pressure(rigid, w)
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
-            moment = axial[0].weights @ pressure
-            pad_impedance = axial[0].stiffness - axial[1] * w * w - moment[2]
+            moment = axial.weights @ pressure
+            pad_impedance = axial.stiffness - axial.inertia * w * w - moment[2]
             out[k] += np.outer(weights @ pressure[:, 2], moment[:2]) / pad_impedance
     return out
 
@@ -93,7 +93,8 @@ class _Bend:
                 return pressure
             asked = body.amplitudes @ missing
             bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
-            pressure = rigid + _by_shape(self.film, self.conductance, bent, omega)
+            film, moving = self.film, squeeze_slopes(self.film.grid, self.film.work, bent)
+            pressure = rigid + shape_slopes(film.grid, film.work, self.conductance, bent) + 1j * omega * moving
         return np.full_like(rigid, np.nan)
 
 
@@ -103,18 +104,6 @@ def _everywhere(film: PadFilm, pressure: ComplexArray) -> ComplexArray:
     inner = field[1:-1, film.grid.first : -1]
     inner[:] = pressure.reshape(inner.shape)
     return field.reshape(-1, pressure.shape[1])
-
-
-def _by_shape(
-    film: PadFilm, conductance: tuple[FloatArray, FloatArray], bent: ComplexArray, omega: float
-) -> ComplexArray:
-    """Pressure at the unknown nodes, (unknowns, m), that deformations (nt + 1, nz + 1, m) make."""
-    parts = np.ascontiguousarray(np.concatenate([bent.real, bent.imag], axis=2))
-    still = shape_slopes(film.grid, film.work, conductance, parts)
-    moving = squeeze_slopes(film.grid, film.work, parts)
-    by_shape = still + 1j * omega * moving
-    count = bent.shape[2]
-    return np.asarray(by_shape[:, :count] + 1j * by_shape[:, count:])
 
 
 def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray:
@@ -173,12 +162,9 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
         return None
     pad, law = film.pad, setup.pivots[film.number - 1]
     load = float(film.forces.force[0])
-    smooth = setup.change(friction=0.0) if setup.friction else setup
-    hold = tilt_hold(smooth, film.tilt, load)
+    frame, moments, hold = _frames(setup, film)
     friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
-    frame, moments = _pad_frames(film, hold.arm)
-    offset = mass_centre_offset(setup, film)
-    coupling = -pad.mass * offset  # the centre moves outward by eta - b tilt
+    coupling = -pad.mass * mass_centre_offset(setup, film)  # the centre moves outward by eta - b tilt
     return PadMatrices(
         number=film.number,
         stiffness=moments.T @ film.forces.stiffness @ frame,
@@ -190,140 +176,129 @@ def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
     )
 
 
-def _pad_frames(film: PadFilm, arm: float) -> tuple[FloatArray, FloatArray]:
-    """J = d(a, b)/d(x, y, theta, eta), (2, 4), and what the film's forces do in these directions."""
-    frame = np.array(
-        [
-            [film.normal[0], film.normal[1], 0.0, -1.0],
-            [film.tangent[0], film.tangent[1], film.pivot_radius, 0.0],
-        ]
-    )
+def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray, TiltHold]:
+    """J = d(a, b)/d(x, y, theta, eta), (2, 4), what the film's forces do in these directions, and what holds the pad.
+
+    Without friction, which vibrates otherwise than it holds.
+    """
+    assert film.forces is not None
+    smooth = setup.change(friction=0.0) if setup.friction else setup
+    hold = tilt_hold(smooth, film.tilt, float(film.forces.force[0]))
+    frame = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, film.pivot_radius, 0.0]])
     moments = frame.copy()
-    moments[0, 2] = arm
-    return frame, moments
+    moments[0, 2] = hold.arm
+    return frame, moments, hold
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
     """b_G, the mass centre's distance from the pivot line [m], positive with rotation; zero for a central pivot."""
-    pad = film.pad
-    middle = (0.5 - pad.pivot_offset) * pad.arc
-    inner = setup.bearing.journal_radius + pad.pad_clearance
-    outer = inner + pad.thickness
-    half = 0.5 * pad.arc
-    centroid = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2) * math.sin(half) / half
-    return centroid * math.sin(middle)
+    half = 0.5 * film.pad.arc
+    inner, outer = _radii(setup, film)
+    return _mean_radius(inner, outer) * math.sin(half) / half * math.sin((0.5 - film.pad.pivot_offset) * film.pad.arc)
+
+
+def _radii(setup: Setup, film: PadFilm) -> tuple[float, float]:
+    inner = setup.bearing.journal_radius + film.pad.pad_clearance
+    return inner, inner + film.pad.thickness
+
+
+def _mean_radius(inner: float, outer: float) -> float:
+    """Mean radius of a sector's area [m]."""
+    return 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2)
 
 
 def reduce_pads(
     pads: list[PadMatrices], omega: FloatArray, vibration: float = 0.0, added: list[ComplexArray] | None = None
 ) -> ComplexArray:
     """Eq. (10): the bearing's 2 x 2 impedance at every excitation frequency; `omega` (n,) [rad/s]."""
-    total = np.zeros((len(omega), 2, 2), dtype=complex)
-    for rigid in (False, True):  # a rigid pivot: eta takes no part
-        alike = [k for k, pad in enumerate(pads) if math.isinf(pad.pad_stiffness[1, 1]) == rigid]
-        if not alike:
+    if not pads:
+        return np.zeros((len(omega), 2, 2), dtype=np.complex128)
+    z, film = _impedances(pads, omega, added)
+    driven = z[..., 2:, :2]
+    follow = np.linalg.solve(film, driven)
+    for k, pad in enumerate(pads):
+        if not pad.friction[0]:
             continue
-        internal = slice(2, 3 if rigid else 4)
-        more = None if added is None else np.array([added[k] for k in alike])
-        z, film = _impedances([pads[k] for k in alike], omega, internal, more)
-        smooth = [m for m, k in enumerate(alike) if not pads[k].friction[0]]
-        if len(smooth) < len(alike):
-            rough = [(m, pads[k]) for m, k in enumerate(alike) if pads[k].friction[0]]
-            total = total + sum(_reduce_with_friction(pad, z[m], film[m], vibration) for m, pad in rough)
-            z, film = z[smooth], film[smooth]
-        reduced = z[..., :2, :2] - z[..., :2, internal] @ np.linalg.solve(film, z[..., internal, :2])
-        total = total + reduced.sum(axis=0)
-    return np.asarray(total, dtype=np.complex128)
+        loose = _broken_loose(pad, z[k], film[k], vibration)
+        for axis in range(2):  # X and Y excited one at a time
+            held, column = film[k].copy(), slice(axis, axis + 1)
+            held[:, 0, 0] += loose[:, axis] - pad.friction[0]
+            follow[k, :, :, column] = np.linalg.solve(held, driven[k, :, :, column])
+    return np.asarray((z[..., :2, :2] - z[..., :2, 2:] @ follow).sum(axis=0), dtype=np.complex128)
 
 
 def _impedances(
-    pads: list[PadMatrices], omega: FloatArray, internal: slice, more: ComplexArray | None
+    pads: list[PadMatrices], omega: FloatArray, added: list[ComplexArray] | None = None
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot."""
-    s, inner = omega[:, None, None], slice(0, internal.stop - 2)
+    """Film impedance (pads, n, 4, 4), with more beside it, and that of tilt and deflection with pad and pivot.
+
+    A rigid pivot lets eta take no part.
+    """
+    s = omega[:, None, None]
     z = np.array([p.stiffness for p in pads])[:, None] + 1j * s * np.array([p.damping for p in pads])[:, None]
-    if more is not None:
-        z = z + more
-    mass = np.array([p.pad_mass[inner, inner] for p in pads])[:, None]
-    damping = np.array([p.pad_damping[inner, inner] for p in pads])[:, None]
-    stiffness = np.array([p.pad_stiffness[inner, inner] for p in pads])[:, None]
-    return z, z[..., internal, internal] - s**2 * mass + 1j * s * damping + stiffness
-
-
-def _reduce_with_friction(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
-    """One pad of Eq. (10) whose pivot sticks or slides, X and Y excited one at a time."""
-    out = z[:, :2, :2].copy()
-    internal = slice(2, 2 + film.shape[1])
-    loose = _broken_loose(pad, z, film, vibration)
-    for axis in range(2):
-        pads = film.copy()
-        pads[:, 0, 0] += loose[:, axis] - pad.friction[0]
-        column = z[:, internal, axis : axis + 1]
-        out[:, :, axis : axis + 1] -= z[:, :2, internal] @ np.linalg.solve(pads, column)
-    return out
+    if added is not None:
+        z = z + np.array(added)
+    stiffness = np.array([p.pad_stiffness for p in pads])
+    rigid = np.isinf(stiffness[:, 1, 1])
+    z[rigid, :, 3], z[rigid, :, :, 3], stiffness[rigid, 1, 1] = 0.0, 0.0, 1.0
+    mass, damping = np.array([p.pad_mass for p in pads]), np.array([p.pad_damping for p in pads])
+    mass[rigid, 1], mass[rigid, :, 1], damping[rigid, 1] = 0.0, 0.0, 0.0
+    pivot = stiffness[:, None] - s**2 * mass[:, None] + 1j * s * damping[:, None]
+    return z, z[..., 2:, 2:] + pivot
 
 
 def _broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
     """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
     stick, slip = pad.friction
-    pad_impedance, drive = film[:, 0, 0] - stick, z[:, 2, :2]
-    if film.shape[1] == 2:  # the pivot gives way as well
-        compliance = film[:, 0, 1] / film[:, 1, 1]
-        pad_impedance, drive = pad_impedance - compliance * film[:, 1, 0], drive - compliance[:, None] * z[:, 3, :2]
+    compliance = film[:, 0, 1] / film[:, 1, 1]  # the pivot gives way as well
+    pad_impedance = film[:, 0, 0] - stick - compliance * film[:, 1, 0]
+    drive = z[:, 2, :2] - compliance[:, None] * z[:, 3, :2]
     return friction_impedance(np.repeat(pad_impedance[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
-
-
-def _axial_inertia(setup: Setup, film: PadFilm) -> float:
-    """Moment of inertia of a pad about the axis across it through its pivot [kg m^2], of a sector of a ring."""
-    pad = film.pad
-    inner = setup.bearing.journal_radius + pad.pad_clearance
-    outer = inner + pad.thickness
-    ends = pad.leading_edge, pad.leading_edge + pad.arc
-    mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
-    square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
-    radius, radius_square = 2.0 / 3.0 * (outer**3 - inner**3) / (outer**2 - inner**2), 0.5 * (outer**2 + inner**2)
-    reach = radius_square * square - 2.0 * film.pivot_radius * radius * mean + film.pivot_radius**2
-    return pad.mass * (reach + setup.bearing.length**2 / 12.0)
 
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) in the rig's frame of the bearing inside the measured displacement, with effects of the structure."""
     pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
+    heat = setup.options.perturbed_heat and setup.thermal != "isothermal"
     added = None
-    if setup.options.perturbed_heat and setup.thermal != "isothermal":
-        added = [_heat_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
-    elif setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        added = [_shape_beside(setup, equilibrium, f, omega) for f in equilibrium.films if f.forces is not None]
+    if heat or setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
+        more = _following_heat if heat else _following_shape
+        added = []
+        for film in equilibrium.films:
+            if film.forces is not None:
+                frame, moments, _ = _frames(setup, film)
+                added.append(moments.T @ more(setup, equilibrium, film, omega) @ frame)
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
 
-def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray]:
-    """`_pad_frames` of a pad as it stands."""
-    assert film.forces is not None
-    smooth = setup.change(friction=0.0) if setup.friction else setup
-    return _pad_frames(film, tilt_hold(smooth, film.tilt, float(film.forces.force[0])).arm)
-
-
-def _shape_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
-    """What bending and axial tilting with the motion add to a pad's film, (n, 4, 4)."""
-    frame, moments = _frames(setup, film)
+def _following_shape(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+    """What bending and axial tilting with the motion add to a pad's film, (n, 2, 2)."""
     factor = setup.bending_factor if setup.options.perturbed_bending else 0.0
-    axial = None
-    if setup.pads_follow:
-        assert film.forces is not None
-        axial = axial_tilt_of(setup, film, film.work.pressure, film.forces), _axial_inertia(setup, film)
-    flexing = flexing_impedance(film, equilibrium.position, omega, factor, axial)
-    return np.asarray(moments.T @ flexing @ frame, dtype=np.complex128)
+    axial = _axial_tilt(setup, film) if setup.pads_follow else None
+    return flexing_impedance(film, equilibrium.position, omega, factor, axial)
 
 
-def _heat_beside(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
-    """What a temperature that follows the motion adds to a pad's film, (n, 4, 4)."""
-    frame, moments = _frames(setup, film)
+def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
+    """A pad's freedom to tilt along the shaft, a sector of a ring about the axis across it through its pivot."""
+    assert film.forces is not None
+    pad, grid, shape = film.pad, film.grid, axial_shape(film.grid)
+    hold = tilt_hold(setup, film.axial_tilt, float(film.forces.force[0]))
+    weights = (grid.area * (shape - hold.arm * grid.cos[:, None]))[1:-1, grid.first : -1].ravel()
+    inner, outer = _radii(setup, film)
+    ends = pad.leading_edge, pad.leading_edge + pad.arc
+    mean, square = (math.sin(ends[1]) - math.sin(ends[0])) / pad.arc, 0.5
+    square += 0.25 * (math.sin(2.0 * ends[1]) - math.sin(2.0 * ends[0])) / pad.arc
+    reach = 0.5 * (outer**2 + inner**2) * square + film.pivot_radius**2
+    reach -= 2.0 * film.pivot_radius * _mean_radius(inner, outer) * mean
+    return AxialTilt(shape, weights, hold.stiffness, pad.mass * (reach + setup.bearing.length**2 / 12.0))
+
+
+def _following_heat(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omega: FloatArray) -> ComplexArray:
+    """What a temperature that follows the motion adds to a pad's film, (n, 2, 2)."""
     wedge = (film.pad.pad_clearance, *film.approach(equilibrium.position))
     running = film.running(equilibrium.surface_speed, setup.bearing.oil)
-    films = [heat_impedance(film.grid, film.work, wedge, running, float(w)) for w in omega]
-    return np.asarray(moments.T @ np.array(films) @ frame, dtype=np.complex128)
+    return np.array([heat_impedance(film.grid, film.work, wedge, running, float(w)) for w in omega])
 
 
 def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexArray:
@@ -347,9 +322,8 @@ def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) 
         pad = pad_matrices(setup, film)
         if pad is None or not pad.friction[0]:
             continue
-        internal = slice(2, 3 if math.isinf(pad.pad_stiffness[1, 1]) else 4)
-        z, film_part = _impedances([pad], omega, internal, None)
-        free = np.abs(_broken_loose(pad, z[0], film_part[0], setup.vibration)) < pad.friction[0]
+        z, tilting = _impedances([pad], omega)
+        free = np.abs(_broken_loose(pad, z[0], tilting[0], setup.vibration)) < pad.friction[0]
         (loose if free.any() else held).append(film.number)
     names = []
     if held:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from model.errors import ModelError
 from model.interpolation import monotone_cubics
+from model.pad.pivot import MEASURED, compliance, deflection
 from rigdata.arrays import FloatArray
 
 
@@ -33,7 +35,8 @@ class MeasuredPivot:
     valid_to: float = math.inf
     name: str = "measured"
     includes_housing: bool = True
-    _coefficients: FloatArray = field(init=False, repr=False, compare=False)
+    #: (5, n): Loads, and from each on the cubic's coefficients, highest power first.
+    curve: FloatArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         load, points = np.asarray(self.load, float), np.asarray(self.deflection_points, float)
@@ -53,36 +56,21 @@ class MeasuredPivot:
                 raise _PivotCurveError("a pivot curve must start at or above zero load and deflection")
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "deflection_points", points)
-        object.__setattr__(self, "_coefficients", monotone_cubics(load, points))
+        cubics = np.append(monotone_cubics(load, points), np.zeros((4, 1)), axis=1)
+        object.__setattr__(self, "curve", np.vstack([load, cubics]))
 
     @property
-    def coefficients(self) -> FloatArray:
-        """Of the cubics between the points, highest power first, (4, n - 1)."""
-        return self._coefficients
-
-    def _piece(self, load: float) -> tuple[int, float]:
-        i = int(np.searchsorted(self.load, load, side="right")) - 1
-        i = min(max(i, 0), len(self.load) - 2)
-        return i, load - self.load[i]
+    def numbers(self) -> Any:
+        """Row of `model.pad.pivot`."""
+        return MEASURED, len(self.load), 0.0, 1.0
 
     def deflection(self, load: float) -> float:
         """delta(W) [m]."""
-        if load <= 0:
-            return 0.0
-        end = self.load[-1]
-        i, s = self._piece(min(load, end))
-        c = self._coefficients[:, i]
-        value = float(((c[0] * s + c[1]) * s + c[2]) * s + c[3])
-        return value if load <= end else value + (load - end) * self._compliance(end)
-
-    def _compliance(self, load: float) -> float:
-        i, s = self._piece(min(max(load, 0.0), self.load[-1]))
-        c = self._coefficients[:, i]
-        return max(float((3 * c[0] * s + 2 * c[1]) * s + c[2]), 1e-15)
+        return float(deflection(self.numbers, self.curve, load))
 
     def stiffness(self, load: float) -> float:
         """Tangent dW/ddelta [N/m]."""
-        return 1.0 / self._compliance(load)
+        return 1.0 / float(compliance(self.numbers, self.curve, load))
 
     vibration_stiffness = stiffness
 

@@ -18,8 +18,12 @@ import numpy as np
 
 from model.bearing import Bearing, BearingError, Pivot
 from model.measured_pivot import MeasuredPivot
-from model.toml_text import parse_toml
+from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL, compliance, deflection
+from model.toml_text import parse_toml, read_page
+from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
+
+_NO_CURVE = np.zeros((5, 1))
 
 
 @runtime_checkable
@@ -77,69 +81,28 @@ class PivotLaw(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class RigidPivot:
-    """No deflection."""
+class _Formula:
+    """A law that is a row of `model.pad.pivot`."""
 
-    name: str = "rigid"
-
-    def deflection(self, load: float) -> float:
-        """Zero [m]."""
-        return 0.0
-
-    def stiffness(self, load: float) -> float:
-        """Infinite [N/m]."""
-        return math.inf
-
-    vibration_stiffness = stiffness
-
-
-@dataclass(frozen=True)
-class ConstantPivot:
-    """A linear spring."""
-
-    value: float
-    name: str = "constant"
-
-    def deflection(self, load: float) -> float:
-        """W / K [m]."""
-        return load / self.value
-
-    def stiffness(self, load: float) -> float:
-        """K [N/m]."""
-        return self.value
-
-    vibration_stiffness = stiffness
-
-
-@dataclass(frozen=True)
-class RockerPivot:
-    """Line contact, Kirk and Reedy, Eq. (16) of the paper.
-
-    K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] } is the secant; its tangent
-    has 1/3 less than the logarithm: [ ln(...) - 1/3 ].
-    """
-
-    line_modulus: float
-    load_scale: float
     secant_vibrations: bool = False
-    name: str = "kirk"
 
-    def _logarithm(self, load: float) -> float:
-        # Past W = load_scale / e the formula leaves its physics (the contact is as wide as the gap); hold it there.
-        return math.log(self.load_scale / min(max(load, 1e-9), self.load_scale / math.e))
+    @property
+    def numbers(self) -> Any:
+        """Row of the formula: which it is, two constants, a factor on the stiffness."""
+        raise NotImplementedError
 
     def deflection(self, load: float) -> float:
-        """W / K(W) [m]."""
-        return load * (2.0 / 3.0 + self._logarithm(load)) / self.line_modulus if load > 0 else 0.0
+        """delta(W) [m]."""
+        return float(deflection(self.numbers, _NO_CURVE, load))
+
+    def stiffness(self, load: float) -> float:
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
+        give = float(compliance(self.numbers, _NO_CURVE, load))
+        return 1.0 / give if give else math.inf
 
     def secant(self, load: float) -> float:
         """K as printed [N/m]."""
-        return self.line_modulus / (2.0 / 3.0 + self._logarithm(load))
-
-    def stiffness(self, load: float) -> float:
-        """Tangent [N/m]."""
-        return self.line_modulus / (self._logarithm(load) - 1.0 / 3.0)
+        return max(load, 1e-9) / self.deflection(max(load, 1e-9))
 
     def vibration_stiffness(self, load: float) -> float:
         """Tangent, or the printed secant [N/m]."""
@@ -147,7 +110,52 @@ class RockerPivot:
 
 
 @dataclass(frozen=True)
-class SphericalPivot:
+class RigidPivot(_Formula):
+    """No deflection."""
+
+    name: str = "rigid"
+
+    @property
+    def numbers(self) -> Any:
+        """Of no formula."""
+        return RIGID, 0.0, 0.0, 1.0
+
+
+@dataclass(frozen=True)
+class ConstantPivot(_Formula):
+    """A linear spring, W / K."""
+
+    value: float
+    name: str = "constant"
+
+    @property
+    def numbers(self) -> Any:
+        """Row of the formula."""
+        return CONSTANT, self.value, 0.0, 1.0
+
+
+@dataclass(frozen=True)
+class RockerPivot(_Formula):
+    """Line contact, Kirk and Reedy, Eq. (16) of the paper.
+
+    K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] } is the secant; its tangent
+    has 1/3 less than the logarithm: [ ln(...) - 1/3 ]. Past W = load_scale / e the formula leaves its physics (the
+    contact is as wide as the gap), and is held there.
+    """
+
+    line_modulus: float
+    load_scale: float
+    secant_vibrations: bool = False
+    name: str = "kirk"
+
+    @property
+    def numbers(self) -> Any:
+        """Row of the formula."""
+        return ROCKER, self.line_modulus, self.load_scale, 1.0
+
+
+@dataclass(frozen=True)
+class SphericalPivot(_Formula):
     """Point contact, sphere on flat, Eq. (17) of the paper (= Hertz).
 
     K = W / cbrt(9 W^2 (1 - nu^2)^2 / (2 E^2 D_s)); the tangent is 1.5 K.
@@ -157,21 +165,10 @@ class SphericalPivot:
     secant_vibrations: bool = False
     name: str = "kirk"
 
-    def deflection(self, load: float) -> float:
-        """W / K(W) [m]."""
-        return self.compliance * max(load, 0.0) ** (2.0 / 3.0)
-
-    def secant(self, load: float) -> float:
-        """K as printed [N/m]."""
-        return max(load, 1e-9) ** (1.0 / 3.0) / self.compliance
-
-    def stiffness(self, load: float) -> float:
-        """Tangent, 1.5 times the secant [N/m]."""
-        return 1.5 * self.secant(load)
-
-    def vibration_stiffness(self, load: float) -> float:
-        """Tangent, or the printed secant [N/m]."""
-        return self.secant(load) if self.secant_vibrations else self.stiffness(load)
+    @property
+    def numbers(self) -> Any:
+        """Row of the formula."""
+        return SPHERICAL, self.compliance, 0.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -197,6 +194,45 @@ class ScaledPivot:
     def vibration_stiffness(self, load: float) -> float:
         """F times the law's own [N/m]."""
         return self.law.vibration_stiffness(load) * self.stiffness_factor
+
+
+#: Laws that compiled searches know; one derived from them may deflect otherwise.
+_WITH_FORMULA = (RigidPivot, ConstantPivot, RockerPivot, SphericalPivot, MeasuredPivot)
+
+
+def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray]:
+    """Laws as rows of numbers, (n, 4), and the measured curves among them, (n, 5, m)."""
+    try:
+        rows, curves = _encoded(tuple(laws))
+    except TypeError:  # a law of somebody's own that has no hash
+        rows, curves = _encoded.__wrapped__(tuple(laws))
+    return rows.copy(), curves
+
+
+@lru_cache(maxsize=256)
+def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
+    rows, curves = np.zeros((len(laws), 4)), [_NO_CURVE] * len(laws)
+    for k, given in enumerate(laws):
+        factor, law = 1.0, given
+        while type(law) is ScaledPivot:
+            factor, law = factor * law.stiffness_factor, law.law
+        rows[k] = OTHER, 0.0, 0.0, 1.0
+        if isinstance(law, (_Formula, MeasuredPivot)) and type(law) in _WITH_FORMULA:
+            rows[k] = law.numbers
+            rows[k, 3] = factor
+            curves[k] = getattr(law, "curve", _NO_CURVE)
+    table = np.zeros((len(laws), 5, max(c.shape[1] for c in curves)))
+    for own, curve in zip(table, curves, strict=True):
+        own[:, : curve.shape[1]] = curve
+    return rows, table
+
+
+def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> None:
+    """Ask the laws that have no formula here: `rows` (n, 4), `loads` (n,) [N]."""
+    for law, row, load in zip(laws, rows, loads.tolist(), strict=True):
+        if row[0] == OTHER:
+            # a Hertzian pivot has no stiffness at zero
+            row[1], row[2] = law.deflection(max(load, 0.0)), 1.0 / law.stiffness(max(load, 1e-6))
 
 
 @lru_cache(maxsize=64)
@@ -272,15 +308,11 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     ['measured']
     """
     path = Path(path)
+    kind, missing = "A pivots.toml holds some hundred numbers", "`tpjb pivot CAMPAIGN` writes a pivots.toml."
+    text = read_page(path, BearingError, kind, missing, 20)
     try:
-        if path.stat().st_size > 20_000_000:
-            raise BearingError(
-                f"{path.name}: larger than 20 MB. A pivots.toml holds some hundred numbers; check the path."
-            )
-        data = parse_toml(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise BearingError(f"{path}: no such file. `tpjb pivot CAMPAIGN` writes a pivots.toml.") from error
-    except (OSError, ValueError) as error:  # not text, not TOML
+        data = parse_toml(text)
+    except ValueError as error:
         raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     if data.get("schema") != "tpjb-pivots/1":
         raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")

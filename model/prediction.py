@@ -15,6 +15,7 @@ from model.dynamics import PadMatrices, pad_matrices
 from model.setup import Setup
 from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium
+from model.statics.pad_film import PadFilm
 from model.statics.pad_flow import PadFlow, pad_flow
 from model.statics.power import power_loss
 from rigdata.arrays import ComplexArray, FloatArray
@@ -92,6 +93,10 @@ class Prediction:
         return f"<Prediction {self.summary()}>"
 
     @property
+    def _films(self) -> tuple[PadFilm, ...]:
+        return self.equilibrium.films
+
+    @property
     def _frequencies(self) -> FloatArray:
         return np.atleast_1d(np.asarray(self.excitation, float)) / (2 * math.pi)
 
@@ -161,7 +166,7 @@ class Prediction:
     @property
     def idle_pads(self) -> tuple[int, ...]:
         """Pads without a loaded attitude, numbers from 1."""
-        return tuple(f.number for f in self.equilibrium.films if f.idle)
+        return tuple(f.number for f in self._films if f.idle)
 
     @property
     def k(self) -> FloatArray:
@@ -184,22 +189,22 @@ class Prediction:
     @property
     def axial_tilt(self) -> FloatArray:
         """Of pads about the axis across them, ends at positive z outward (`Options.axial_tilt`); idle ones 0 [rad]."""
-        return np.array([0.0 if f.idle else f.axial_tilt for f in self.equilibrium.films])
+        return np.array([0.0 if f.idle else f.axial_tilt for f in self._films])
 
     @property
     def pressure(self) -> tuple[FloatArray, ...]:
         """Per pad, (nt + 1, nz + 1) on the half width (full if misaligned) [Pa]."""
-        return tuple(f.work.pressure for f in self.equilibrium.films)
+        return tuple(f.work.pressure for f in self._films)
 
     @property
     def film(self) -> tuple[FloatArray, ...]:
         """Film thickness per pad [m], shapes as `pressure`."""
-        return tuple(f.work.thickness for f in self.equilibrium.films)
+        return tuple(f.work.thickness for f in self._films)
 
     @property
     def temperature(self) -> tuple[FloatArray, ...]:
         """Film temperature per pad [degC], shapes as `pressure`."""
-        return tuple(f.work.temperature for f in self.equilibrium.films)
+        return tuple(f.work.temperature for f in self._films)
 
     @property
     def max_pressure(self) -> float:
@@ -209,13 +214,13 @@ class Prediction:
     @property
     def max_temperature(self) -> float:
         """Hottest film of a pad that carries [degC], anywhere across it."""
-        films = [f for f in self.equilibrium.films if not f.idle]
+        films = [f for f in self._films if not f.idle]
         return max((float(max(t.max() for t in f.heat_state)) for f in films), default=self.setup.inlet_temperature)
 
     @property
     def min_film(self) -> float:
         """Thinnest film [m]; infinite if no pad carries."""
-        return min((float(f.work.thickness.min()) for f in self.equilibrium.films if not f.idle), default=math.inf)
+        return min((float(f.work.thickness.min()) for f in self._films if not f.idle), default=math.inf)
 
     @property
     def face_temperature(self) -> tuple[FloatArray, ...]:
@@ -227,18 +232,18 @@ class Prediction:
         """
         journal = self.equilibrium.journal_temperature
         if not math.isfinite(journal) or self.setup.thermal == "thd":
-            return tuple(f.face_temperature for f in self.equilibrium.films)
+            return tuple(f.face_temperature for f in self._films)
         return tuple(t + 0.5 * (t - journal) for t in self.temperature)
 
     @functools.cached_property
     def pad_flow(self) -> tuple[PadFlow, ...]:
         """Per pad: oil in, out and over the sides [m^3/s], temperatures in and out [degC]."""
-        return tuple(pad_flow(f, self.setup.bearing.oil) for f in self.equilibrium.films)
+        return tuple(pad_flow(f, self.setup.bearing.oil) for f in self._films)
 
     @property
     def reynolds(self) -> float:
         """Largest local Reynolds number rho U h / mu of all films."""
-        return largest_reynolds(self.equilibrium.films, self.speed * self.setup.bearing.journal_radius)
+        return largest_reynolds(self._films, self.speed * self.setup.bearing.journal_radius)
 
     @property
     def sommerfeld(self) -> float:
@@ -292,12 +297,12 @@ class Prediction:
         (n_pads,) ndarray
             [degC]
         """
-        return np.array([film.temperature_at(fraction) for film in self.equilibrium.films])
+        return np.array([film.temperature_at(fraction) for film in self._films])
 
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
         """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
-        matrices = (pad_matrices(self.setup, f) for f in self.equilibrium.films)
+        matrices = (pad_matrices(self.setup, f) for f in self._films)
         return tuple(m for m in matrices if m is not None)
 
     @functools.cached_property

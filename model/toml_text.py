@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
 from model.errors import ModelError
@@ -12,6 +13,18 @@ from model.errors import ModelError
 MAX_DEPTH = 64
 #: A step of a dotted key: a bare or quoted piece and its dot.
 _STEP = re.compile(r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*""")
+
+
+def read_page(path: Path, refuse: type[ModelError], kind: str, missing: str, megabytes: int = 1) -> str:
+    """Text of a file, refused by name where there is none, where it is no page of its kind, or cannot be read."""
+    try:
+        if path.stat().st_size <= 1_000_000 * megabytes:
+            return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise refuse(f"{path}: no such file. {missing}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise refuse(f"{path}: cannot be read ({error}). Save it as UTF-8 text.") from error
+    raise refuse(f"{path.name}: larger than {megabytes} MB. {kind}; check the path.")
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -7,8 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from model.bearing import Pad
 from model.effects.kind import DIRECTION, PAD, EffectWords, Parameter, effect_on
 from model.setup import Setup
+
+
+def _moved(setup: Setup, name: str, change: float, number: int | None = None) -> Setup:
+    """Change a number of every pad, or of one."""
+
+    def moved(k: int, pad: Pad) -> Pad:
+        return replace(pad, **{name: getattr(pad, name) + change}) if number in (None, k) else pad
+
+    return setup.change_pads(moved)
 
 
 @effect_on(
@@ -28,10 +38,7 @@ from model.setup import Setup
 )
 def pad_offset(setup: Setup, pad: int, radial_offset: float) -> Setup:
     """The assembled clearance of one pad is Cb + radial_offset."""
-    pads = list(setup.bearing.pads)
-    nominal = pads[pad - 1]
-    pads[pad - 1] = replace(nominal, assembled_clearance=nominal.assembled_clearance + radial_offset)
-    return setup.change(bearing=setup.bearing.with_pads(tuple(pads)))
+    return _moved(setup, "assembled_clearance", radial_offset, pad)
 
 
 @effect_on(
@@ -83,7 +90,7 @@ def uneven_pads(setup: Setup, **offsets: float) -> Setup:
 )
 def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
     """Cp of every pad changes by this; Cb stays."""
-    return setup.change_pads(lambda number, pad: replace(pad, pad_clearance=pad.pad_clearance + pad_clearance_change))
+    return _moved(setup, "pad_clearance", pad_clearance_change)
 
 
 @effect_on(
@@ -100,9 +107,7 @@ def preload_error(setup: Setup, pad_clearance_change: float) -> Setup:
 )
 def pad_bore(setup: Setup, pad: int, pad_clearance_change: float) -> Setup:
     """Cp of one pad changes by this; Cb stays."""
-    return setup.change_pads(
-        lambda k, p: replace(p, pad_clearance=p.pad_clearance + pad_clearance_change) if k == pad else p
-    )
+    return _moved(setup, "pad_clearance", pad_clearance_change, pad)
 
 
 @effect_on(
@@ -121,9 +126,7 @@ def pad_bore(setup: Setup, pad: int, pad_clearance_change: float) -> Setup:
 )
 def clearance_error(setup: Setup, assembled_clearance_change: float) -> Setup:
     """Cb of every pad changes by this, cold and running."""
-    return setup.change_pads(
-        lambda k, p: replace(p, assembled_clearance=p.assembled_clearance + assembled_clearance_change)
-    )
+    return _moved(setup, "assembled_clearance", assembled_clearance_change)
 
 
 @effect_on(
@@ -139,7 +142,7 @@ def clearance_error(setup: Setup, assembled_clearance_change: float) -> Setup:
 )
 def pivot_offset_error(setup: Setup, offset_change: float) -> Setup:
     """The pivots are this share of the arc further from the leading edge than the bearing file says."""
-    return setup.change_pads(lambda k, p: replace(p, pivot_offset=p.pivot_offset + offset_change))
+    return _moved(setup, "pivot_offset", offset_change)
 
 
 @effect_on(

@@ -11,7 +11,7 @@ from typing import Any
 from model.effects.kind import EffectError
 from model.effects.registry import kind_of
 from model.setup import Setup
-from model.toml_text import parse_toml
+from model.toml_text import parse_toml, read_page
 
 
 @dataclass(frozen=True)
@@ -104,13 +104,11 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     (Effect('pad_offset', pad=1, radial_offset=5e-06),)
     """
     path = Path(path)
+    missing = "Give the path of an effects file (TOML)."
+    text = read_page(path, EffectError, "An effects file is a page of text", missing)
     try:
-        if path.stat().st_size > 1_000_000:
-            raise EffectError(f"{path.name}: larger than 1 MB. An effects file is a page of text; check the path.")
-        data = parse_toml(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise EffectError(f"{path}: no such file. Give the path of an effects file (TOML).") from error
-    except (OSError, ValueError) as error:  # not text, not TOML
+        data = parse_toml(text)
+    except ValueError as error:
         raise EffectError(f"{path}: cannot be read: {error}. Mend that line.") from error
     schema = data.get("schema", "tpjb-effects/1")
     if schema != "tpjb-effects/1":

@@ -9,7 +9,15 @@ import numpy as np
 
 from model.effects.kind import PAD, EffectWords, Parameter, effect_on
 from model.setup import Setup
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, FloatArray
+
+_PROBE_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03)
+_CELL_GAIN = Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02)
+
+
+def _misread(setup: Setup, matrix: FloatArray) -> Setup:
+    """Displacement readings are a matrix (2, 2) times the truth, at every frequency."""
+    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: matrix))
 
 
 @effect_on(
@@ -37,7 +45,7 @@ def channel_delay(setup: Setup, delay: float) -> Setup:
 
 @effect_on(
     "measurement",
-    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03),
+    _PROBE_GAIN,
     source="Eddy-current probes: 5 % for another target steel",
     words=EffectWords(
         finding="the probes read {factor:size} {factor:more|less} than true",
@@ -51,7 +59,7 @@ def channel_delay(setup: Setup, delay: float) -> Setup:
 )
 def probe_gain(setup: Setup, factor: float) -> Setup:
     """Displacement readings are factor times the truth."""
-    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: factor * np.eye(2)))
+    return _misread(setup, factor * np.eye(2))
 
 
 @effect_on(
@@ -69,12 +77,12 @@ def probe_rotation(setup: Setup, angle: float) -> Setup:
     """Both probes really stand at their stated angle + this."""
     # a probe at theta + angle reads d . e(theta + angle) = (R(-angle) d) . e(theta)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: turn))
+    return _misread(setup, turn)
 
 
 @effect_on(
     "measurement",
-    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02),
+    _CELL_GAIN,
     source="A parallel load path (hoses, leaf springs) takes 0.5 to 5 %",
     words=EffectWords(
         finding="the load cells read {factor:size} {factor:more|less} than true",
@@ -132,7 +140,7 @@ def housing_mass(setup: Setup, mass_error: float) -> Setup:
 @effect_on(
     "measurement",
     Parameter("probe", "1", "ratio", math.nan, 1, 2, options=(1, 2)),
-    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.03),
+    _PROBE_GAIN,
     source="Eddy-current probes: 5 % for another target steel, more for another driver",
     words=EffectWords(
         finding="probe {probe:0} reads {factor:size} {factor:more|less} than true",
@@ -145,14 +153,13 @@ def one_probe_gain(setup: Setup, probe: float, factor: float) -> Setup:
     """Readings of one displacement probe are factor times the truth."""
     rows = np.array([[math.cos(a), math.sin(a)] for a in setup.instruments.probe_axes])
     gains = np.where(np.arange(1, 3) == probe, factor, 1.0)
-    read = np.linalg.solve(rows, gains[:, None] * rows)
-    return setup.change(instruments=setup.instruments.read_displacement(lambda omega: read))
+    return _misread(setup, np.linalg.solve(rows, gains[:, None] * rows))
 
 
 @effect_on(
     "measurement",
     Parameter("cell", "1", "ratio", math.nan, 1, 2, options=(1, 2)),
-    Parameter("factor", "1", "ratio", 1.0, 0.2, 5.0, 0.02),
+    _CELL_GAIN,
     source="A parallel load path (hoses, leaf springs) takes 0.5 to 5 %",
     words=EffectWords(
         finding="cell {cell:0} reads {factor:size} {factor:more|less} than true",

@@ -114,7 +114,7 @@ def hot_oil_carryover(setup: Setup, fraction: float) -> Setup:
     """A share lambda of the oil that leaves a pad enters the next one, as far as that takes it in.
 
     T_in = T_supply + s (T_out before - T_supply) with s = min(1, lambda Q_out before / Q_in), see
-    `model.statics.heat_paths`.
+    `model.statics.compiled.heat`.
     """
     return setup.change(carryover=fraction)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from model.effects.kind import DIRECTION, EffectWords, Parameter, effect_on
 from model.measured_pivot import MeasuredPivot
@@ -20,13 +21,15 @@ def _add_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
     A pivot curve that was measured against the same structure already holds it once; it is taken off there, as far as
     it gives way towards that pad.
     """
-    before = setup.series_compliance
     pivots = []
     for law, pad in zip(setup.pivots, setup.bearing.pads, strict=True):
         x, y = math.cos(pad.pivot_angle), math.sin(pad.pivot_angle)
         pivots.append(_alone(law, xx * x * x + 2.0 * xy * x * y + yy * y * y))
-    total = (before[0] + xx, before[1] + xy, before[2] + yy)
-    return setup.change(series_compliance=total, pivots=tuple(pivots))
+    return setup.change(series_compliance=_sum(setup.series_compliance, xx, xy, yy), pivots=tuple(pivots))
+
+
+def _sum(before: tuple[float, ...], *more: float) -> Any:
+    return tuple(a + b for a, b in zip(before, more, strict=True))
 
 
 def _alone(law: PivotLaw, compliance: float) -> PivotLaw:
@@ -111,8 +114,7 @@ def series_compliance(setup: Setup, xx: float, xy: float, yy: float) -> Setup:
 )
 def parallel_stiffness(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant stiffness that adds to what the records show, in dynamic tests only."""
-    before = setup.parallel_stiffness
-    return setup.change(parallel_stiffness=(before[0] + xx, before[1] + xy, before[2] + yx, before[3] + yy))
+    return setup.change(parallel_stiffness=_sum(setup.parallel_stiffness, xx, xy, yx, yy))
 
 
 @effect_on(
@@ -131,5 +133,4 @@ def parallel_stiffness(setup: Setup, xx: float, xy: float, yx: float, yy: float)
 )
 def parallel_damping(setup: Setup, xx: float, xy: float, yx: float, yy: float) -> Setup:
     """A constant damping that adds to what the records show, in dynamic tests only."""
-    before = setup.parallel_damping
-    return setup.change(parallel_damping=(before[0] + xx, before[1] + xy, before[2] + yx, before[3] + yy))
+    return setup.change(parallel_damping=_sum(setup.parallel_damping, xx, xy, yx, yy))

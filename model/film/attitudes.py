@@ -98,7 +98,7 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: He
     oil = (1.0, heat.exponent, 1.0, heat.expansion)
     running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
     numbers, rises = np.zeros((2 * _ROWS, 3)), np.zeros((2 * _ROWS, *shape))
-    low, high = walk(grid, work, running, (isothermal, False, depth * radius**2 * length), (numbers, rises))
+    low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
     numbers[low - 1] = 0.0  # a parallel film
     if not isothermal:
         rises[low - 1] = rises[low]
@@ -131,15 +131,15 @@ def walk(
     grid: FilmGrid,
     work: FilmWork,
     running: Running,
-    limits: tuple[bool, bool, float],
+    limits: tuple[bool, float],
     out: tuple[FloatArray, FloatArray],
 ) -> tuple[int, int]:
     """Fill rows (A, B, W) and temperature rises, from the middle on deeper and flatter; first row and end.
 
-    `limits`: whether the film is isothermal, whether its rupture line is sharp, the largest load.
+    `limits`: whether the film is isothermal, the largest load.
     """
     numbers, rises = out
-    isothermal, sharp, depth = limits
+    isothermal, depth = limits
     middle = numbers.shape[0] // 2
     if not grid.angle[-1] > 0.0 or not grid.angle[0] < 0.0:
         return middle, middle
@@ -151,7 +151,7 @@ def walk(
             slope = (numbers[row - 1, 0] - numbers[row - 2, 0]) / (numbers[row - 1, 1] - numbers[row - 2, 1])
             curvature = numbers[row - 1, 0] + slope * (wedge - numbers[row - 1, 1])
             _warm(work, rises, row - 1, row - 2)
-        found, curvature, load = _balance(grid, work, running, (isothermal, sharp), curvature, wedge)
+        found, curvature, load = _balance(grid, work, running, isothermal, curvature, wedge)
         if not found:
             break
         _keep(work, numbers, rises, row, (curvature, wedge, load))
@@ -174,7 +174,7 @@ def walk(
             curvature = numbers[before, 0] + min(max(slope * (wedge - numbers[before, 1]), -most), most)
         _warm(work, rises, before, min(before + 1, high - 1))
         work.ruptured[:] = False
-        found, curvature, load = _balance(grid, work, running, (isothermal, sharp), max(curvature, -0.75), wedge)
+        found, curvature, load = _balance(grid, work, running, isothermal, max(curvature, -0.75), wedge)
         if found and load > 0.0:
             _keep(work, numbers, rises, row, (curvature, wedge, load))
             low, row = row, row - 1
@@ -206,15 +206,15 @@ def _keep(
 
 @inner
 def _balance(
-    grid: FilmGrid, work: FilmWork, running: Running, kind: tuple[bool, bool], curvature: float, wedge: float
+    grid: FilmGrid, work: FilmWork, running: Running, isothermal: bool, curvature: float, wedge: float
 ) -> tuple[bool, float, float]:
     """A at which the heated film has no moment, and its load: more A takes the pressure upstream."""
-    shift, (isothermal, sharp) = np.empty(work.unknown.shape[0]), kind
+    shift = np.empty(work.unknown.shape[0])
     load, share, last = 0.0, 1.0, 0.0
     for _step in range(40):
         set_viscosity(work, running.oil)
         room = 1.0 / (1.0 + curvature)
-        forces: FilmForces = solve_film(grid, work, (1.0, curvature * room, wedge * room), 1.0, sharp)
+        forces: FilmForces = solve_film(grid, work, (1.0, curvature * room, wedge * room), 1.0, False)
         if forces.steps <= 0:  # gone at the trailing edge: a larger A opens it
             curvature, last = 1.5 * curvature + 0.2, 0.0
             continue

@@ -29,10 +29,9 @@ from model.film.cavitation_matrix import (
     FaceFlows,
     assemble_columns,
     face_flows,
-    factorise_columns,
     substitute_columns,
 )
-from model.film.matrix import assemble, factorise
+from model.film.matrix import assemble, factorise, factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import FilmForces, _integrate, solve_film
 from model.film.slopes import net_inflow
@@ -54,18 +53,13 @@ def _jfo_slopes(
     weight = grid.area
     if sharp:
         weight = _rupture_line(grid, work, faces, x, band)
-    factorise_columns(band)
-    static = np.zeros((x.shape[0], 2))
+    factorise_general(band)
+    slopes = np.zeros((x.shape[0], 4))
+    static, rate = slopes[:, :2], slopes[:, 2:]
     _displaced(grid, work, faces, x, static)
     substitute_columns(band, static)
-    rate = np.zeros((x.shape[0], 2))
     _stored(grid, work, faces, x, static, rate)
     substitute_columns(band, rate)
-    slopes = np.empty((x.shape[0], 4))
-    for k in range(x.shape[0]):
-        for m in range(2):
-            slopes[k, m] = static[k, m]
-            slopes[k, m + 2] = rate[k, m]
     _flows(work, faces)
     return weight, slopes
 
@@ -233,7 +227,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
     fewest, patience = ruptured.size + 1, _PATIENCE
     for step in range(1, _MAX_STEPS + 1):
         assemble_columns(band, faces, ruptured, first)
-        factorise_columns(band)
+        factorise_general(band)
         _drag(work, faces, first, x)
         substitute_columns(band, x)
         wrong = _misplaced(x, ruptured, first)

@@ -92,22 +92,8 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
 
 
 @inner
-def factorise_columns(band: FloatArray) -> None:
-    """L U in place, without pivoting: `band` (n, 2 width + 1)."""
-    n, width = band.shape[0], band.shape[1] // 2
-    for k in range(n):
-        pivot = 1.0 / band[k, width]
-        for r in range(1, min(width, n - 1 - k) + 1):
-            factor = band[k + r, width - r] * pivot
-            if factor != 0.0:
-                band[k + r, width - r] = factor
-                for s in range(1, width + 1):
-                    band[k + r, width - r + s] -= factor * band[k, width + s]
-
-
-@inner
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
-    """Solve for the right-hand sides (n, m) in place: `band` (n, 2 width + 1), `x` (n, m)."""
+    """Solve for the right-hand sides (n, m) in place, with the factor from `factorise_general`."""
     n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):
@@ -122,4 +108,4 @@ def substitute_columns(band: FloatArray, x: FloatArray) -> None:
                 for m in range(count):
                     x[k, m] -= factor * x[k + s, m]
         for m in range(count):
-            x[k, m] /= band[k, width]
+            x[k, m] *= band[k, width]

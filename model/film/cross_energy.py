@@ -20,6 +20,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.cross_film import CrossFilm, CrossOperator
+from model.film.matrix import factorise_general
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
@@ -58,7 +59,7 @@ def cross_operator(
         _box(film, speed, heat, i, flows, space)
         _set_rows(space, factor[i], before[i])
         for j in range(lines):
-            exchange = space.high[j, cells - 1]
+            exchange = space.coupling[1, j, cells - 1]
             journal[i, j, 0] = (1.0 - space.theta[j, cells - 1]) * exchange
             journal[i, j, 1] = space.theta[j, cells - 1] * exchange
         for k in range(n):
@@ -67,7 +68,7 @@ def cross_operator(
         for k in range(n):
             dissipation[i, k] += 0.5 * heat[2] * last[k]
         _make_less(cross.temperature[i + 1], heat[4], dissipation[i], factor[i])
-        _factorise(factor[i], cells)
+        factorise_general(factor[i])
     for j in range(lines):
         for m in range(cells):
             carried[j, m] = heat[0] * max(flows[nt - 1, j, m], 0.0)
@@ -149,21 +150,14 @@ def _side_shares(cross: CrossFilm, i: int, j: int, shares: FloatArray) -> None:
 
 
 class _Space(NamedTuple):
-    """Flows and couplings of the cells between two stations, (nz + 1, cells) unless said otherwise.
+    """Flows and couplings of the cells between two stations, (nz + 1, cells) unless said otherwise."""
 
-    Over the upper face (one more cell), to line j (one more line) [kg/s]; to the cells below and above and the lines
-    before and after, carried along [W/K]; the later station's share in the exchange.
-    """
-
-    up: FloatArray
-    sideways: FloatArray
-    low: FloatArray
-    high: FloatArray
-    first: FloatArray
-    last: FloatArray
-    carried: FloatArray
-    theta: FloatArray
-    shares: FloatArray
+    up: FloatArray  #: (nz + 1, cells + 1): Over the faces below and above the cells [kg/s].
+    sideways: FloatArray  #: (nz + 2, cells): From the line before [kg/s].
+    coupling: FloatArray  #: (4, ..): To the cells below and above, the lines before and after [W/K].
+    carried: FloatArray  #: Along [W/K].
+    theta: FloatArray  #: The later station's share in the exchange.
+    shares: FloatArray  #: (cells,)
 
 
 @inner
@@ -172,10 +166,7 @@ def _space(lines: int, cells: int) -> _Space:
     return _Space(
         np.zeros((lines, cells + 1)),
         np.zeros((lines + 1, cells)),
-        np.zeros(shape),
-        np.zeros(shape),
-        np.zeros(shape),
-        np.zeros(shape),
+        np.zeros((4, lines, cells)),
         np.zeros(shape),
         np.zeros(shape),
         np.zeros(cells),
@@ -195,7 +186,8 @@ def _box(
     grid, work, cross = film
     lines, cells = space.theta.shape
     edges, conductivity, specific = cross.edges, heat[1], heat[0]
-    up, sideways, low, high, first, last, carried, theta, shares = space
+    up, sideways, coupling, carried, theta, shares = space
+    low, high, first, last = coupling[0], coupling[1], coupling[2], coupling[3]
     resists = np.empty(cells)  # of half a cell
     for j in range(lines - 1):
         _side_shares(cross, i, j, shares)
@@ -261,34 +253,21 @@ def _upward(flows: FloatArray, sideways: FloatArray, first: int, i: int, j: int,
 @inner
 def _set_rows(space: _Space, factor: FloatArray, before: FloatArray) -> None:
     """Rows of the balances: later station into the band, earlier one beside it."""
-    low, high, first, last = space.low, space.high, space.first, space.last
     theta, carried = space.theta, space.carried
     lines, cells = theta.shape
     for j in range(lines):
         for m in range(cells):
-            k, own_theta = j * cells + m, theta[j, m]
-            factor[k, cells] = carried[j, m]
-            before[k, 0] = carried[j, m]
-            if m > 0:
-                share = max(own_theta, theta[j, m - 1])
-                factor[k, cells - 1] -= share * low[j, m]
-                factor[k, cells] += share * low[j, m]
-                before[k, 1] = (1.0 - share) * low[j, m]
-            share = own_theta if m == cells - 1 else max(own_theta, theta[j, m + 1])
-            factor[k, cells] += share * high[j, m]
-            if m < cells - 1:
-                factor[k, cells + 1] -= share * high[j, m]
-            before[k, 2] = (1.0 - share) * high[j, m]
-            if j > 0:
-                share = max(own_theta, theta[j - 1, m])
-                factor[k, 0] -= share * first[j, m]
-                factor[k, cells] += share * first[j, m]
-                before[k, 3] = (1.0 - share) * first[j, m]
-            if j < lines - 1:
-                share = max(own_theta, theta[j + 1, m])
-                factor[k, 2 * cells] -= share * last[j, m]
-                factor[k, cells] += share * last[j, m]
-                before[k, 4] = (1.0 - share) * last[j, m]
+            k = j * cells + m
+            factor[k, cells] = before[k, 0] = carried[j, m]
+            for side in range(4):
+                step = 2 * (side % 2) - 1
+                line, cell = (j, m + step) if side < 2 else (j + step, m)
+                exchange, share = space.coupling[side, j, m], theta[j, m]
+                if 0 <= line < lines and 0 <= cell < cells:  # beyond there is the journal, or nothing
+                    share = max(share, theta[line, cell])
+                    factor[k, cells + (step if side < 2 else cells * step)] -= share * exchange
+                factor[k, cells] += share * exchange
+                before[k, 1 + side] = (1.0 - share) * exchange
             before[k, 0] -= before[k, 1] + before[k, 2] + before[k, 3] + before[k, 4]
 
 
@@ -318,19 +297,3 @@ def _dissipation(
             squared = (drag + slope * away) * (drag + along * slope * away)
             squared += aside * (across * away) ** 2 + driven * wide * wide / 12.0
             dissipation[j * cells + m] = squared * cross.fluidity[i, j, m] * wide * station
-
-
-@inner
-def _factorise(band: FloatArray, width: int) -> None:
-    """L U in place, 1 / U on the diagonal, without pivoting: the balances are dominant but for the flow across."""
-    n = band.shape[0]
-    for k in range(n):
-        inverse = 1.0 / band[k, width]
-        band[k, width] = inverse
-        upper = band[k, width + 1 : 2 * width + 1]
-        for r in range(1, min(width, n - 1 - k) + 1):
-            scale = band[k + r, width - r] * inverse
-            band[k + r, width - r] = scale
-            row_below = band[k + r, width - r + 1 : 2 * width - r + 1]
-            for s in range(width):
-                row_below[s] -= scale * upper[s]

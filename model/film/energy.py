@@ -18,6 +18,7 @@ from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
 from model.film.slopes import pressure_change
+from model.interpolation import largest
 from rigdata.arrays import FloatArray
 
 #: Least share of the Couette flow that is taken to run downstream. A pressure peak near a leading edge pushes oil
@@ -32,15 +33,23 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
     loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
-    dissipate(grid, work, running.speed, sources[0], loss)
-    for i in range(rows):
-        for j in range(columns):
-            less = running.oil[1] * loss[i, j]
-            sources[0, i, j] += work.gained[i, j] + less * work.temperature[i, j]
-            loss[i, j] = work.exchange[i, j] + less
+    heat_sources(grid, work, running, 1.0, sources[0], loss)
     for j in range(columns):
         temperature[0, j] = inlet
     return march(grid, work, running, loss, fields, between(sources))
+
+
+@inner
+def heat_sources(
+    grid: FilmGrid, work: FilmWork, running: Running, kept: float, made: FloatArray, loss: FloatArray
+) -> None:
+    """What stations make [W] and lose per kelvin [W/K] if a share is kept: a hotter film makes less heat."""
+    dissipate(grid, work, running.speed, made, loss)
+    for i in range(made.shape[0]):
+        for j in range(made.shape[1]):
+            fewer = kept * running.oil[1] * loss[i, j]
+            made[i, j] = kept * (made[i, j] + work.gained[i, j]) + fewer * work.temperature[i, j]
+            loss[i, j] = work.exchange[i, j] + fewer
 
 
 @inner
@@ -131,19 +140,28 @@ def heat_step(
 
     `shift` (unknowns,).
     """
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    new = np.empty((nt + 1, nz + 1))
+    new = np.empty(work.temperature.shape)
     limited = solve_energy(grid, work, thermal[0], running, new)
-    change = 0.0
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            change = max(change, abs(new[i, j] - work.temperature[i, j]))
-    share = thermal[1] * min(1.0, thermal[2] / max(change, 1e-30))
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            work.temperature[i, j] += share * (new[i, j] - work.temperature[i, j])
+    new -= work.temperature
+    change, radial, tangential = warm(grid, work, running, new, (thermal[1], thermal[2]), shift)
+    return change, limited, radial, tangential
+
+
+@inner
+def warm(
+    grid: FilmGrid, work: FilmWork, running: Running, asked: FloatArray, limits: tuple[float, float], shift: FloatArray
+) -> tuple[float, float, float]:
+    """Change a film's temperature by a share of what is asked for, no more than a limit.
+
+    Returns the largest change asked for [K], and the change of the film's force.
+    """
+    change = largest(asked.reshape(-1))
+    share = limits[0] * min(1.0, limits[1] / max(change, 1e-30))
+    for i in range(asked.shape[0]):
+        for j in range(asked.shape[1]):
+            work.temperature[i, j] += share * asked[i, j]
     force = pressure_change(grid, work, running.speed, running.oil, shift)
-    return change, limited, force[0], force[1]
+    return change, force[0], force[1]
 
 
 @inner
@@ -155,7 +173,7 @@ def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArr
     h, mu = work.thickness, work.viscosity
     for i in range(h.shape[0]):
         for j in range(h.shape[1]):
-            downstream, sideways = squared_slopes(grid, work.pressure, i, j)
+            downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
             shear = mu[i, j] * speed**2 / h[i, j]
             pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (downstream + sideways)
             station = grid.dx * grid.height[j]
@@ -163,23 +181,23 @@ def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArr
 
 
 @inner
-def squared_slopes(grid: FilmGrid, p: FloatArray, i: int, j: int) -> tuple[float, float]:
-    """Squared slopes of the pressure at a node: along, the mean of both sides, which the box scheme sees; across."""
+def slope_products(grid: FilmGrid, p: Any, q: Any, i: int, j: int) -> Any:
+    """Products of two pressures' slopes at a node: along, the mean of both sides, which the box scheme sees; across."""
     nt, nz = p.shape[0] - 1, p.shape[1] - 1
-    squared, sides = 0.0, 0
+    product, sides = 0.0 * q[i, j], 0
     if i > 0:
-        squared += ((p[i, j] - p[i - 1, j]) / grid.dx) ** 2
+        product += ((p[i, j] - p[i - 1, j]) / grid.dx) * ((q[i, j] - q[i - 1, j]) / grid.dx)
         sides += 1
     if i < nt:
-        squared += ((p[i + 1, j] - p[i, j]) / grid.dx) ** 2
+        product += ((p[i + 1, j] - p[i, j]) / grid.dx) * ((q[i + 1, j] - q[i, j]) / grid.dx)
         sides += 1
     if j == nz:
-        slope = (p[i, nz] - p[i, nz - 1]) / grid.dz[nz - 1]
+        wide, low, high = grid.dz[nz - 1], nz - 1, nz
     elif j == 0:
-        slope = 0.0 if grid.first == 0 else (p[i, 1] - p[i, 0]) / grid.dz[0]
+        wide, low, high = grid.dz[0], 0, grid.first  # at a line of symmetry there is no slope
     else:
-        slope = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1])
-    return squared / sides, slope**2
+        wide, low, high = grid.dz[j] + grid.dz[j - 1], j - 1, j + 1
+    return product / sides, ((p[i, high] - p[i, low]) / wide) * ((q[i, high] - q[i, low]) / wide)
 
 
 @inner

@@ -1,4 +1,7 @@
-"""The banded symmetric matrix of one film, L D L^T in place: the price of a film solution is this factorisation."""
+"""The banded symmetric matrix of one film, L D L^T in place: the price of a film solution is this factorisation.
+
+And L U of those that are not symmetric: films that conserve mass, heat balances across a film.
+"""
 
 from __future__ import annotations
 
@@ -179,3 +182,19 @@ def substitute_many(band: FloatArray, x: FloatArray) -> None:
             factor = band[k, r]
             for m in range(columns):
                 x[k, m] -= factor * x[k + r, m]
+
+
+@inner
+def factorise_general(band: FloatArray) -> None:
+    """L U of a band that is not symmetric, (n, 2 width + 1), in place: 1 / U on the diagonal, without pivoting."""
+    n, width = band.shape[0], band.shape[1] // 2
+    for k in range(n):
+        inverse = 1.0 / band[k, width]
+        band[k, width] = inverse
+        upper = band[k, width + 1 : 2 * width + 1]
+        for r in range(1, min(width, n - 1 - k) + 1):
+            scale = band[k + r, width - r] * inverse
+            band[k + r, width - r] = scale
+            row_below = band[k + r, width - r + 1 : 2 * width - r + 1]
+            for s in range(width):
+                row_below[s] -= scale * upper[s]

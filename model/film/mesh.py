@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,23 +117,18 @@ def film_works(grids: list[FilmGrid], inlet_temperature: float) -> tuple[FilmWor
     unknowns = nz - grids[0].first
     count, n = len(grids), (nt - 1) * unknowns
     shape = (count, nt + 1, nz + 1)
-    stack = FilmWork(
-        pressure=np.zeros(shape),
-        ruptured=np.zeros(shape, dtype=np.bool_),
-        temperature=np.full(shape, inlet_temperature),
-        viscosity=np.zeros(shape),
-        density=np.zeros(shape),
-        drag=np.ones(shape),
-        exchange=np.zeros(shape),
-        gained=np.zeros(shape),
-        thickness=np.zeros(shape),
-        extra=np.zeros(shape),
-        flow_x=np.zeros((count, nt, nz + 1)),
-        flow_z=np.zeros((count, nt + 1, nz)),
-        band=np.zeros((count, n, unknowns + 1)),
-        unknown=np.zeros((count, n)),
-        slopes=np.zeros((count, n, 4)),
-    )
+    rest: dict[str, Any] = {
+        "ruptured": np.zeros(shape, dtype=np.bool_),
+        "temperature": np.full(shape, inlet_temperature),
+        "drag": np.ones(shape),
+        "flow_x": np.zeros((count, nt, nz + 1)),
+        "flow_z": np.zeros((count, nt + 1, nz)),
+        "band": np.zeros((count, n, unknowns + 1)),
+        "unknown": np.zeros((count, n)),
+        "slopes": np.zeros((count, n, 4)),
+    }
+    rest |= {name: np.zeros(shape) for name in FilmWork._fields if name not in rest}
+    stack = FilmWork(**rest)
     return stack, [FilmWork(*parts) for parts in zip(*stack, strict=True)]
 
 

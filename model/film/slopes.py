@@ -6,6 +6,8 @@ flows into each control volume too much is the right-hand side, and one factoris
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from model.compilation import compiled, inner
@@ -15,7 +17,7 @@ from rigdata.arrays import FloatArray
 
 
 @inner
-def net_inflow(along: FloatArray, across: FloatArray, first: int, inflow: FloatArray) -> None:
+def net_inflow(along: Any, across: Any, first: int, inflow: Any) -> None:
     """What flows into every control volume less what flows out: `along` (nt, nz + 1, m), `across` (nt + 1, nz, m)."""
     nt, nz = along.shape[0], across.shape[1]
     for i in range(1, nt):
@@ -126,17 +128,16 @@ def _power(powers: tuple[FloatArray, FloatArray] | None, side: int, i: int, j: i
 
 
 @compiled
-def shape_slopes(
-    grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: FloatArray
-) -> FloatArray:
+def shape_slopes(grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: Any) -> Any:
     """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness.
 
-    `shapes` (nt + 1, nz + 1, m) [m]; gives (unknowns, m) [Pa per unit].
+    `shapes` (nt + 1, nz + 1, m) [m], real or complex; gives (unknowns, m) [Pa per unit].
     """
     p, h = work.pressure, work.thickness
     gx, gz = conductance
     nt, nz, count = gx.shape[0], gz.shape[1], shapes.shape[2]
-    along, across = np.empty((nt, nz + 1, count)), np.empty((nt + 1, nz, count))
+    along = np.empty((nt, nz + 1, count), dtype=shapes.dtype)
+    across = np.empty((nt + 1, nz, count), dtype=shapes.dtype)
     for i in range(nt):
         for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
@@ -149,7 +150,7 @@ def shape_slopes(
             slope = -3.0 * gz[i, j] * (p[i, j + 1] - p[i, j]) / (h[i, j] + h[i, j + 1])
             for m in range(count):
                 across[i, j, m] = slope * (shapes[i, j, m] + shapes[i, j + 1, m])
-    rhs = np.empty((work.unknown.shape[0], count))
+    rhs = np.empty((work.unknown.shape[0], count), dtype=shapes.dtype)
     net_inflow(along, across, grid.first, rhs)
     keep_ruptured(work, grid.first, rhs)
     substitute_many(work.band, rhs)
@@ -157,13 +158,13 @@ def shape_slopes(
 
 
 @compiled
-def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: FloatArray) -> FloatArray:
+def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: Any) -> Any:
     """Derivatives of the pressure by the rates of shapes that are added to the film thickness; as `shape_slopes`.
 
     Gives (unknowns, m) [Pa s per unit].
     """
     nt, nz, count = work.flow_x.shape[0], work.flow_z.shape[1], shapes.shape[2]
-    rhs = np.empty((work.unknown.shape[0], count))
+    rhs = np.empty((work.unknown.shape[0], count), dtype=shapes.dtype)
     for i in range(1, nt):
         for j in range(grid.first, nz):
             k = (i - 1) * (nz - grid.first) + j - grid.first
@@ -214,7 +215,7 @@ def change_by_oil(
     net_inflow(along, across, grid.first, rhs)
     keep_ruptured(work, grid.first, rhs)
     substitute(work.band, change)
-    return _force(grid, change, nt, nz)
+    return force_of(grid, change, h.shape)
 
 
 @inner
@@ -232,11 +233,12 @@ def _fluidity(work: FilmWork, oil: tuple[float, float, float, float]) -> tuple[F
 
 
 @inner
-def _force(grid: FilmGrid, pressure: FloatArray, nt: int, nz: int) -> FloatArray:
-    """Radial and tangential force of the pressure at the unknown nodes."""
-    force = np.zeros(2)
+def force_of(grid: FilmGrid, pressure: Any, shape: tuple[int, int]) -> Any:
+    """Radial and tangential force of the pressure at the unknown nodes of a mesh; real or complex."""
+    nt, nz = shape[0] - 1, shape[1] - 1
+    force = np.zeros(2, dtype=pressure.dtype)
     for i in range(1, nt):
-        total = 0.0
+        total = 0.0 * pressure[0]
         for j in range(grid.first, nz):
             total += grid.area[i, j] * pressure[(i - 1) * (nz - grid.first) + j - grid.first]
         force[0] += grid.cos[i] * total

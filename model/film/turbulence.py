@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import squared_slopes
+from model.film.energy import slope_products
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
@@ -110,7 +110,7 @@ def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
         for j in range(h.shape[1]):
             reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
             along, across = excess(reynolds, ALONG[0], ALONG[1])[0], excess(reynolds, ACROSS[0], ACROSS[1])[0]
-            downstream, sideways = squared_slopes(grid, work.pressure, i, j)
+            downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
             shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR[0], SHEAR[1])[0]
             less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways
             pressed = -(h[i, j] ** 3) / (12.0 * mu[i, j]) * less

@@ -4,14 +4,13 @@ A thin film is softer than its pad: followed one step behind, the deformation ov
 shapes in which a pad gives way most therefore take part in the Newton step: with h = ... + sum_m c_m phi_m and the
 pad's answer c = B p, the film's derivatives by c, (a, b) close the loop pad by pad, and leave an effective force and
 stiffness for the journal. What remains, and what heat does, contracts by itself. A pad that tilts along the shaft
-(`AxialTilt`) has one shape more, which the film's moment finds.
+(`model.statics.axial_tilt`) has one shape more, which the film's moment finds.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,17 +36,6 @@ class PadDeformation:
     shapes: FloatArray  #: (nt + 1, nz + 1, m): In which the pad gives way most.
     amplitudes: FloatArray  #: (m, n): Amplitudes of the shapes in a deformation.
     response: FloatArray  #: (m, unknowns): Amplitudes by the pressure at the film's unknown nodes.
-
-
-class AxialTilt(NamedTuple):
-    """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
-
-    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
-    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load
-    #: [m^3].
-    weights: FloatArray
-    stiffness: float
-    moment: float
 
 
 def pad_deformation(pad: Pad, bearing: Bearing, grid: FilmGrid, cooled: bool = False) -> PadDeformation:

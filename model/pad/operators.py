@@ -264,11 +264,6 @@ class PadOperators:
     #: (n_surface, n_temperatures): Heat flux density from film into pad per temperature rise [W/m^2/K].
     flux: FloatArray
 
-    @property
-    def coarse(self) -> tuple[Line, Line]:
-        """Bilinear elements for temperatures, along the arc and along the half length."""
-        return Line(self.theta.breaks, 1), Line(self.z.breaks, 1)
-
 
 @lru_cache(maxsize=12)  # 4 MB each
 def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:

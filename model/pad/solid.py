@@ -29,20 +29,15 @@ class AxisMap:
     project: FloatArray  #: (n_film, n_face): M^-1 G^T: film values of a face function.
 
 
-def _plain_map(face: Line, film: Line) -> AxisMap:
-    """Map of two bases on the same interval."""
-    points, weights = _points(face.breaks, film.breaks, face.degree)
-    gather = face.tabulate(points).T @ (weights[:, None] * film.tabulate(points))
-    return AxisMap(gather, _solve(film, gather.T))
-
-
-def _mirror_map(face: Line, film: Line, even: bool) -> AxisMap:
-    """Map of a basis on 0 <= z <= L/2 and a film on -L/2 <= z <= L/2, for its even or its odd part."""
-    points, weights = _points(face.breaks, np.unique(np.abs(film.breaks)), face.degree)
-    sign = 1.0 if even else -1.0
-    part = 0.5 * (film.tabulate(points) + sign * film.tabulate(-points))
-    gather = face.tabulate(points).T @ (weights[:, None] * part)
-    return AxisMap(gather, _solve(film, 2.0 * gather.T))
+def _axis_map(face: Line, film: Line, even: bool | None = None) -> AxisMap:
+    """Map of two bases on the same interval, or of one on 0 <= z <= L/2 and a film's even or odd part on -L/2..L/2."""
+    breaks = film.breaks if even is None else np.unique(np.abs(film.breaks))
+    points, weights = _points(face.breaks, breaks, face.degree)
+    values = film.tabulate(points)
+    if even is not None:
+        values = 0.5 * (values + (1.0 if even else -1.0) * film.tabulate(-points))
+    gather = face.tabulate(points).T @ (weights[:, None] * values)
+    return AxisMap(gather, _solve(film, (1.0 if even is None else 2.0) * gather.T))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +59,12 @@ class FilmMap:
     @classmethod
     def between(cls, face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> FilmMap:
         """Build the maps; `even` is None for a film on the half length, else the part of a full one."""
-        coarse = tuple(Line(line.breaks, 1) for line in face)
-
-        def axial(line: Line) -> AxisMap:
-            return _plain_map(line, film[1]) if even is None else _mirror_map(line, film[1], even)
-
+        along, across = (Line(line.breaks, 1) for line in face)
         return cls(
-            theta=_plain_map(face[0], film[0]),
-            z=axial(face[1]),
-            coarse_theta=_solve(coarse[0], _plain_map(coarse[0], film[0]).gather),
-            coarse_z=_solve(coarse[1], axial(coarse[1]).gather),
+            theta=_axis_map(face[0], film[0]),
+            z=_axis_map(face[1], film[1], even),
+            coarse_theta=_solve(along, _axis_map(along, film[0]).gather),
+            coarse_z=_solve(across, _axis_map(across, film[1], even).gather),
         )
 
     @cached_property

@@ -17,16 +17,23 @@ is what flexure, rolling or friction of the pivot (`model.tilt_hold`, alike abou
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from model.film.mesh import FilmGrid
-from model.film.reynolds import FilmForces
-from model.pad.bending import AxialTilt
 from model.setup import Setup
-from model.statics.pad_film import PadFilm
-from model.tilt_hold import tilt_hold
 from rigdata.arrays import FloatArray
+
+
+class AxialTilt(NamedTuple):
+    """A pad that is free to tilt along the shaft, about the axis across it through its pivot."""
+
+    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
+    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
+    weights: FloatArray
+    stiffness: float  #: [N m/rad]
+    inertia: float  #: [kg m^2]
 
 
 def axial_shape(grid: FilmGrid) -> FloatArray:
@@ -35,18 +42,6 @@ def axial_shape(grid: FilmGrid) -> FloatArray:
 
 
 def aligned_tilt(setup: Setup, pivot_angle: float) -> float:
-    """AxialTilt at which a pad lies along the shaft [rad]."""
+    """Axial tilt at which a pad lies along the shaft [rad]."""
     angle, toward = setup.misalignment
     return angle * math.cos(pivot_angle - toward)
-
-
-def axial_tilt_of(setup: Setup, film: PadFilm, pressure: FloatArray, forces: FilmForces) -> AxialTilt:
-    """A pad's freedom to tilt along the shaft, and the moment that is not balanced.
-
-    `pressure` (nt + 1, nz + 1) [Pa].
-    """
-    grid, shape = film.grid, axial_shape(film.grid)
-    hold = tilt_hold(setup, film.axial_tilt, float(forces.force[0]))
-    moment = float((grid.area * shape * pressure).sum()) - hold.moment
-    lever = grid.area * (shape - hold.arm * grid.cos[:, None])
-    return AxialTilt(shape, lever[1:-1, grid.first : -1].ravel(), hold.stiffness, moment)

@@ -14,6 +14,7 @@ import numpy as np
 from model.conditions import named
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
+from model.statics.pad_flow import starved
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
 
@@ -62,6 +63,28 @@ def overloaded_pads(films: Sequence[PadFilm]) -> list[Condition]:
     ]
     limits = f"{1e6 * _THINNEST_FILM:g} um, {_HIGHEST_PRESSURE / 1e6:g} MPa, {HOTTEST_FILM:g} degC"
     return [named("overloaded pads {pads}", pads, limits)] if pads else []
+
+
+def status_of(
+    setup: Setup, load: FloatArray, films: Sequence[PadFilm], speed: float, back: float, failures: Sequence[Condition]
+) -> tuple[Condition, ...]:
+    """All that is to be said of the end of a search: `failures` is empty where it found an equilibrium.
+
+    `speed` of the journal's surface [m/s]; `back`: share of the oil that runs back at a leading edge.
+    """
+    names = list(failures)
+    if names and unsupported(setup, load):
+        names.insert(0, named("no pads against the load"))
+    if not names:
+        names += overloaded_pads(films)
+    if idle := [f.number for f in films if f.idle]:
+        names.append(named("idle pads {pads}", idle))
+    if back > 0.0:
+        names.append(named("flow back at a leading edge"))
+    if short := starved(films):
+        ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
+        names.append(named("pads {pads} are short of oil", short, ends))
+    return (*names, *regimes(setup, films, speed))
 
 
 def regimes(setup: Setup, films: Sequence[PadFilm], surface_speed: float) -> list[Condition]:

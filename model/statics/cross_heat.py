@@ -3,7 +3,7 @@
 - Film: `model.film.cross_energy`; its viscosity across the film acts on the pressure (`model.film.cross_film`).
 - Pads conduct, `model.pad.operators`: film temperature and heat flux are those of the face, free faces cool in the oil.
 - Journal: one temperature, at which it keeps no heat over a turn.
-- Grooves: the flow balance of `model.statics.heat_paths`, oil of one temperature enters.
+- Grooves: the flow balance of `model.statics.compiled.heat`, oil of one temperature enters.
 
 For given flows all of it is linear: a film's temperatures are those of fresh oil, plus what they answer to its inlet
 and to the journal, and inlets and journal follow from one small system. What a pad conducts hangs on all of its face;
@@ -13,7 +13,6 @@ that is solved as a correction by a few Krylov steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -58,20 +57,25 @@ def settle_cross_temperatures(
 ) -> tuple[float, float, float]:
     """Temperatures of all films, pads and the journal for the present flows.
 
-    As `settle_temperatures` of `heat_paths`.
+    As `exchange_heat` of `model.statics.compiled.heat`.
     """
     order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
     start = journal if math.isfinite(journal) else setup.inlet_temperature
     answers: list[CrossAnswer | None] = []
-    back, around = 0.0, _housing_oil(films)
+    outlets, taken = [], []
+    back, around = 0.0, sum(f.inlet for f in films) / len(films)  # what the grooves hold, on the mean
     for film in order:
         answer, share = _answer(setup, film, surface_speed, (start, around), operator)
         answers.append(answer)
+        # an idle pad passes its inlet on, somewhat warmer
+        warmer = (outlet_temperature(film) - film.inlet, 1.0, 0.0)
+        outlets.append(warmer if answer is None else answer.outlet)
+        taken.append(np.zeros(3) if answer is None else answer.taken)
         back = max(back, share)
-    inlets, journal = balance_heat(
-        np.arange(len(order)), _outer(order, answers), np.array([a is not None for a in answers]),
-        float(setup.inlet_temperature), float(setup.mixing),
-    )  # fmt: skip
+    outer = np.array([through_flow(f) for f in order]), np.array(outlets), np.array(taken)
+    solved = np.array([a is not None for a in answers])
+    supply, mixing = float(setup.inlet_temperature), float(setup.mixing)
+    inlets, journal = balance_heat(np.arange(len(order)), outer, solved, supply, mixing)
     change = 0.0
     for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
         hotter = inlet - film.inlet
@@ -92,40 +96,9 @@ def settle_cross_temperatures(
     return change, back, journal
 
 
-def _outer(
-    order: Sequence[PadFilm], answers: Sequence[CrossAnswer | None]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What films pass on, as `balance_heat` takes it; an idle pad passes its inlet on, somewhat warmer."""
-    flows = np.array([through_flow(f) for f in order])
-    outlets, taken = np.zeros((2, len(order), 3))
-    for k, (film, part) in enumerate(zip(order, answers, strict=True)):
-        if part is None:
-            outlets[k] = outlet_temperature(film) - film.inlet, 1.0, 0.0
-        else:
-            outlets[k], taken[k] = part.outlet, part.taken
-    return flows, outlets, taken
-
-
 def _limited_share(change: float, limits: tuple[float, float]) -> float:
     """Share of a change of temperature that is made."""
     return limits[0] * min(1.0, limits[1] / max(abs(change), 1e-30))
-
-
-def _housing_oil(films: Sequence[PadFilm]) -> float:
-    """Temperature of the oil that the pads stand in [degC]: what the grooves hold, on the mean."""
-    return sum(f.inlet for f in films) / len(films)
-
-
-def _pad_heat(film: PadFilm, around: float) -> FloatArray:
-    """Heat flux density from the film into its pad, (nt + 1, nz + 1) [W/m^2]."""
-    assert film.cross is not None
-    return _into_pad(film, film.cross.face - around)
-
-
-def _into_pad(film: PadFilm, rise: FloatArray) -> FloatArray:
-    pad = film.deformation
-    assert pad is not None
-    return np.asarray(pad.flux @ (pad.to_coarse @ rise.ravel())).reshape(rise.shape)
 
 
 @lru_cache(maxsize=64)
@@ -146,12 +119,13 @@ def _answer(
     """
     journal, around = temperatures
     cross = film.cross
-    if film.forces is None or cross is None:
+    pad = film.deformation
+    if film.forces is None or cross is None or pad is None:
         return None, 0.0
     oil = setup.bearing.oil
     heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
     back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
-    taken = _pad_heat(film, around)
+    taken: FloatArray = np.asarray(pad.flux @ (pad.to_coarse @ (cross.face - around).ravel())).reshape(cross.face.shape)
     fields = np.zeros((taken.shape[0], operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
     sources = operator.dissipation
@@ -162,8 +136,7 @@ def _answer(
         given = taken if m == 0 else np.zeros_like(taken)
         face_temperature(film.work, cross.edges, oil.conductivity, fields[:, :, m], given, faces[m])
     missing = faces[0] + film.inlet * faces[1] + journal * faces[2] - cross.face
-    pad = film.deformation
-    if pad is not None and 0.0 < np.abs(missing).max() < BOUNDLESS:
+    if 0.0 < np.abs(missing).max() < BOUNDLESS:
         solved = (film.grid, film.work, cross.edges, oil.conductivity)
         resistance = _FACE_SHARE * float(film.work.thickness.mean()) / oil.conductivity
         body = (pad.flux, pad.to_coarse, _settled(pad, round(math.log2(resistance))))

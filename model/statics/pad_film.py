@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
 from model.pad.bending import PadDeformation, pad_deformation
 from model.setup import Setup
+from model.statics.compiled.stack import GridStack, stacked_grids
 from rigdata.arrays import FloatArray
 
 
@@ -80,19 +82,18 @@ class PadFilm:
         return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
 
 
-def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
-    """Lay out every pad's film: gives shifts (n, unknowns)."""
+def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack]:
+    """Lay out every pad's film."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
     across = setup.thermal == "thd"
     solid = setup.flexible_pads or setup.options.conduction or across
     angle, toward = setup.misalignment
     films = []
-    laminar = setup.options.turbulence == "none"
-    rupture = setup.options.cavitation if laminar else "turbulent"
-    grids = [_grid(setup, pad, symmetric) for pad in bearing.pads]
+    spans = tuple((p.leading_edge + setup.starvation * p.arc, p.leading_edge + p.arc) for p in bearing.pads)
+    shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
+    grids, stack = _grids(spans, bearing.journal_radius, bearing.length, shape, symmetric)
     works, each = film_works(grids, setup.inlet_temperature)
-    shifts = np.zeros_like(works.unknown)
     bent = np.zeros_like(works.extra)
     for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
         work.pressure[0, grid.first : -1] = pad.leading_edge_pressure
@@ -113,18 +114,25 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, FloatArray]:
                 bent=bent[k],
                 deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
                 kept=1.0 - setup.heat_loss,
-                rupture=rupture,
+                rupture=rupture_of(setup),
                 cross=cross_film(work, setup.inlet_temperature) if across else None,
             )
         )
-    return films, works, shifts
+    return films, works, stack
 
 
-def _grid(setup: Setup, pad: Pad, symmetric: bool) -> FilmGrid:
-    bearing = setup.bearing
-    start = pad.leading_edge + setup.starvation * pad.arc
-    shape = (setup.mesh.along, setup.mesh.across * (1 if symmetric else 2))
-    return film_grid(start, pad.leading_edge + pad.arc, bearing.journal_radius, bearing.length, shape, symmetric)
+@lru_cache(maxsize=64)
+def _grids(
+    spans: tuple[tuple[float, float], ...], radius: float, length: float, shape: tuple[int, int], symmetric: bool
+) -> tuple[list[FilmGrid], GridStack]:
+    """Meshes of films that start and end at angles from their pivots, one by one and as one."""
+    grids = [film_grid(start, end, radius, length, shape, symmetric) for start, end in spans]
+    return grids, stacked_grids(grids)
+
+
+def rupture_of(setup: Setup) -> str:
+    """Name of the model of films that rupture, see `model.film.models`."""
+    return setup.options.cavitation if setup.options.turbulence == "none" else "turbulent"
 
 
 def oil_constants(oil: Oil) -> tuple[float, float, float, float]:

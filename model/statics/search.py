@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from model.conditions import has_answer, named
-from model.film.attitudes import attitudes
+from model.conditions import named
+from model.film.attitudes import BETWEEN, attitudes
 from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
 from model.film.following_heat import heat_impedance
-from model.film.models import FILM_MODELS
-from model.film.oil_state import Running, set_viscosity
+from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces, solve_film
 from model.growth import grown
 from model.pad.bending import SHAPES
+from model.pad.pivot import OTHER
+from model.pivots import ask_laws, encoded
 from model.setup import Setup
-from model.statics import conditions
 from model.statics.axial_tilt import aligned_tilt, axial_shape
-from model.statics.compiled.bending import BodyStack, Shapes, stacked_bodies
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL, Case
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
@@ -42,16 +42,15 @@ from model.statics.compiled.iteration import (
     iterate,
     vector_size,
 )
-from model.statics.compiled.laws import OTHER, ask_laws, encoded
-from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place_pads, rescue
-from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState, stacked_grids
-from model.statics.compiled.start import first_position, pivot_curve, warm_film
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, rescue
+from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
+from model.statics.compiled.start import first_position, pivot_curve
+from model.statics.conditions import status_of
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
-from model.statics.heat_paths import couples_heat, stacked_conduction
-from model.statics.pad_film import oil_constants, pad_films
-from model.statics.pad_flow import starved, through_flow
-from model.tilt_hold import hold_numbers
+from model.statics.pad_film import pad_films
+from model.statics.pad_flow import through_flow
+from model.statics.physics import case_of, couples_heat, shapes_of
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
@@ -69,15 +68,19 @@ class Search:
 
     def __init__(self, setup: Setup, load: FloatArray, speed: float, heat: float = 1.0) -> None:
         self.setup, self.load, self.speed, self.heat = setup, load, speed, heat
-        self.films, self.works, shifts = pad_films(_as_started(setup))
+        cold, supply = setup, setup.inlet_temperature
+        if setup.growth is not None:  # the clearances of a journal as warm as the supply
+            cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
+        self.films, self.works, self.grids = pad_films(cold)
         for film in self.films:
             film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
+        #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
-        self.case = self._case()
-        self.shapes = self._shapes()
+        self.case = case_of(setup, self.load, self.surface_speed, heat)
+        self.shapes = shapes_of(setup, self.case, self.films, self.grids)
         self.pads = self._pads()
-        self.state = self._state(shifts)
+        self.state = self._state()
         self.operator = None
         if self.films[0].cross is not None:
             self.operator = CrossOperator.place(*self.films[0].cross.temperature.shape)
@@ -86,50 +89,6 @@ class Search:
     def surface_speed(self) -> float:
         """Of the journal [m/s]."""
         return self.speed * self.setup.bearing.journal_radius
-
-    def _case(self) -> Case:
-        setup, kept = self.setup, (1.0 - self.setup.heat_loss) * self.heat
-        oil, growth = setup.bearing.oil, setup.growth
-        thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
-        if thermal == ALONE and couples_heat(setup):
-            thermal = ACROSS if setup.thermal == "thd" else COUPLED
-        heat = (oil.specific_heat, oil.conductivity)
-        if thermal == ALONE:  # what a share of the heat does, all of it does to oil that takes up more per kelvin
-            heat = (oil.specific_heat / kept, oil.conductivity / kept)
-        if thermal == ISOTHERMAL:
-            heat = (math.inf, oil.conductivity)
-        return Case(
-            load=np.array(self.load, dtype=float),
-            running=Running(float(self.surface_speed), oil_constants(oil), heat),
-            hold=hold_numbers(setup),
-            accuracy=float(setup.accuracy),
-            thermal=thermal,
-            rupture=FILM_MODELS[self.films[0].rupture],
-            supply=float(setup.inlet_temperature),
-            kept=float(kept),
-            mixing=float(setup.mixing),
-            journal=bool(setup.options.isothermal_journal),
-            closing=0.0 if growth is None else float(growth.closing(setup.bearing)),
-            axial=setup.pads_follow,
-            fresh=oil.supply_flow
-            * float(oil.density(setup.inlet_temperature))
-            / len(self.films)
-            / setup.bearing.length,
-            length=setup.bearing.length,
-            asks_laws=bool((encoded(setup.pivots)[0][:, 0] == OTHER).any()),
-        )
-
-    def _shapes(self) -> Shapes:
-        setup, films = self.setup, self.films
-        bodies: tuple[Any, ...] = tuple(f.deformation for f in films if f.deformation is not None)
-        grid, grids = films[0].grid, stacked_grids(tuple(f.grid for f in films))
-        if self.case.thermal in (ISOTHERMAL, ALONE) and not (setup.flexible_pads or self.case.axial):
-            return Shapes(grids, None, None)
-        conducting = bodies if self.case.thermal == COUPLED and setup.options.conduction else ()
-        bending: BodyStack = stacked_bodies(
-            bodies if setup.flexible_pads else (), (grid.first, len(grid.z)), setup.bending_factor, self.case.supply
-        )
-        return Shapes(grids, bending, stacked_conduction(conducting))
 
     def _pads(self) -> PadStack:
         films, count = self.films, len(self.films)
@@ -144,7 +103,7 @@ class Search:
             np.zeros((count, 4, _ROWS)), flattest, np.zeros(count, dtype=np.int64),
         )  # fmt: skip
 
-    def _state(self, shifts: FloatArray) -> PadState:
+    def _state(self) -> PadState:
         n, works, across = len(self.films), self.works, self.case.thermal == ACROSS
         bends = self.setup.flexible_pads or self.case.axial
         shape = works.extra.shape
@@ -179,7 +138,7 @@ class Search:
             resting=np.full((n, 4), math.nan),
             steps=np.zeros(n, dtype=np.int64),
             heating=np.full(n, math.inf),
-            shift=shifts,
+            shift=np.zeros_like(works.unknown),
             bent=bent,
             mismatch=np.zeros_like(bent),
             amplitude=np.zeros((n, SHAPES, 3)),
@@ -189,10 +148,8 @@ class Search:
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
         )
 
-    def know_attitudes(self) -> None:
-        """Find the curve of every pad's loaded attitudes, if they are not known."""
-        if self.rises:
-            return
+    def _find_curves(self) -> None:
+        """Find the curve of every pad's loaded attitudes; pads that are alike share it."""
         load = max(float(np.hypot(*self.load)), 1.0)
         case, oil = self.case, self.setup.bearing.oil
         # what the films run with, each for itself
@@ -220,7 +177,8 @@ class Search:
 
     def stand(self) -> None:
         """Put journal and pads where the curves carry the load, and films as warm as they are there."""
-        self.know_attitudes()
+        if not self.rises:
+            self._find_curves()
         pads, state = self.pads, self.state
         state.position[:], loaded, self.other = first_position(self.case.load, pads)
         state.idle[:] = ~loaded & (self.case.hold.flexure == 0.0)  # a pad that is held in its tilt has a film anywhere
@@ -236,27 +194,32 @@ class Search:
         """How many pads carry nothing where the curves carry the load."""
         if self.case.hold.flexure > 0.0 or not self.state.idle.any():
             return 0
-        self.know_attitudes()
         return int(np.sum(~first_position(self.case.load, self.pads)[1]))
 
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
-        self.know_attitudes()
-        place_pads(self.pads, self.works, self.state, loaded)
-        if self.case.thermal == ISOTHERMAL:
-            return
+        pads, state = self.pads, self.state
+        reach, sideways = pads.preload + pads.frame[:, 0] @ state.position, pads.frame[:, 1] @ state.position
+        state.idle[loaded] = self.works.ruptured[loaded] = False
         for m in np.flatnonzero(loaded).tolist():
-            (low, rises), film = self.rises[m], self.films[m]
-            temperature, table = film.work.temperature, self.pads.attitudes[m, 0, : self.pads.rows[m]]
-            reach, whole = film.rigid_approach(self.state.position), film.grid.first == 1
-            warm_film(rises, low, table, reach, float(self.state.inlet[m]), whole, temperature)
+            curve = pads.attitudes[m, :, : pads.rows[m]]
+            at = max(reach[m], curve[0, 0])  # at its fold where it has none there
+            state.deflection[m] = at - np.interp(at, curve[0], curve[1])
+            state.tilt[m] = (np.interp(at, curve[0], curve[2]) - sideways[m]) / pads.pivot_radius[m]
+            if self.case.thermal == ISOTHERMAL:
+                continue
+            (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
+            point = np.interp(at, curve[0], np.arange(curve.shape[1]))
+            row = min(int((low + point) / BETWEEN), len(rises) - 2)
+            part = (low + point) / BETWEEN - row
+            along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)
+            temperature[:] = state.inlet[m] + along @ ((1.0 - part) * rises[row] + part * rises[row + 1]) @ across
             if film.cross is not None:
                 film.cross.temperature[:] = temperature[:, :, None]
                 film.cross.face[:] = temperature
 
     def margins(self) -> FloatArray:
         """How far pads are above the folds of their curves, as shares of their clearances, (n,)."""
-        self.know_attitudes()
         pads = self.pads
         reach = pads.preload + pads.frame[:, 0] @ self.state.position
         folds = np.where(pads.rows >= 2, pads.attitudes[:, 0, 0], math.inf)
@@ -410,39 +373,30 @@ class Search:
 
     def _ended(self, code: int, memory: Memory) -> Equilibrium:
         """The state as an answer."""
-        films, figures = self.films, self.state.figures
+        films, figures, trail = self.films, self.state.figures, memory.trail
         names: list[Condition] = []
+        if code in _FAILURES:
+            names.append(named(_FAILURES[code]))
+        elif code != SETTLED and self.setup.friction:  # those that the last step moved most swing
+            tilts = np.abs(self.state.moves[:, 0])
+            largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
+            names.append(named("pads {pads} neither stick nor slide at rest", largest.tolist()))
         if code != SETTLED:
-            names = [named(_FAILURES[code])] if code in _FAILURES else self._restless()
             names.append(named("not converged"))
-        if not has_answer(names) and conditions.unsupported(self.setup, self.load):
-            names.insert(0, named("no pads against the load"))
-        if has_answer(names):
-            names += conditions.overloaded_pads(films)
-        if idle := [f.number for f in films if f.idle]:
-            names.append(named("idle pads {pads}", idle))
-        if figures[BACKFLOW] > 0.0:
-            names.append(named("flow back at a leading edge"))
-        if short := starved(films):
-            ends = "and their films start where it suffices" if films[0].rupture == "jfo" else "and run as if it did"
-            names.append(named("pads {pads} are short of oil", short, ends))
-        names += conditions.regimes(self.setup, films, self.surface_speed)
-        trail = memory.trail
+        status = status_of(self.setup, self.load, films, self.surface_speed, float(figures[BACKFLOW]), names)
         return Equilibrium(
             self.state.position.copy(), tuple(films), int(trail[ITERATION]), float(trail[RESIDUAL]), float(trail[HEAT]),
-            float(figures[JOURNAL]), tuple(names), self.surface_speed, self.begun,
+            float(figures[JOURNAL]), status, self.surface_speed, self.begun,
         )  # fmt: skip
 
-    def _restless(self) -> list[Condition]:
-        """Names the pads with friction that the last step moved most."""
-        if not self.setup.friction:
-            return []
-        tilts = np.abs(self.state.moves[:, 0])
-        largest = np.flatnonzero(tilts >= _SWINGING * tilts.max()) + 1
-        return [named("pads {pads} neither stick nor slide at rest", largest.tolist())]
 
-
-def _as_started(setup: Setup) -> Setup:
-    """The set-up with the clearances of a journal as warm as the supply."""
-    supply, growth = setup.inlet_temperature, setup.growth
-    return setup if growth is None else setup.change(bearing=grown(setup.bearing, growth, supply, supply))
+@lru_cache(maxsize=16)
+def _spread(coarse: tuple[int, int], fine: tuple[int, int], whole: bool) -> tuple[FloatArray, FloatArray]:
+    """From a curve's mesh to a film's, along and across, where either is graded alike; a whole film is symmetric."""
+    z = np.linspace(0.0, 1.0, fine[1])
+    places = np.linspace(0.0, 1.0, fine[0]), np.abs(2.0 * z - 1.0) if whole else z
+    hats = [
+        np.array([np.interp(x, np.linspace(0.0, 1.0, count), hat) for hat in np.eye(count)])
+        for x, count in zip(places, coarse, strict=True)
+    ]
+    return hats[0].T, hats[1]

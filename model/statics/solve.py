@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,8 +14,8 @@ from model.conditions import named, pads_of
 from model.setup import Setup
 from model.statics import conditions
 from model.statics.equilibrium import Equilibrium
-from model.statics.heat_paths import couples_heat
 from model.statics.pad_flow import starved
+from model.statics.physics import couples_heat
 from model.statics.search import Search
 from rigdata.arrays import FloatArray
 from rigdata.problem import Condition
@@ -32,51 +34,51 @@ _MOST_PADS = 6
 def solve_equilibrium(setup: Setup, load: FloatArray, speed: float, start: Equilibrium | None = None) -> Equilibrium:
     """Find where the journal stands: `load` (2,) [N]."""
     load = np.asarray(load, float)
-    search, warm = Search(setup, load, speed), None
-    if start is not None and search.start_from(start):
-        warm = _settled(search, search.run())
-        # where pads are left idle that could carry, another start may leave others
-        loose = pads_of("pads {pads} cannot keep their load", warm.status)
-        if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves():
-            return warm
+    warm = None
+    if start is not None:
         search = Search(setup, load, speed)
-    search.stand()
+        if search.start_from(start):
+            warm = _settled(search, search.run())
+            # where pads are left idle that could carry, another start may leave others
+            loose = pads_of("pads {pads} cannot keep their load", warm.status)
+            if warm.converged and not loose and sum(f.idle for f in warm.films) <= search.idle_by_curves():
+                return warm
+    search = _standing(setup, load, speed)
+    near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
     result = _settled(search, search.run())
-    if not result.converged:
-        search = Search(setup, load, speed)
-        search.stand()
-        near = [m for m, above in enumerate(search.margins()) if abs(above) < _NEAR and not search.state.idle[m]]
+    if near and not result.converged:  # they may find no rest where they carry
+        search = _standing(setup, load, speed)
         search.let_idle(near)
-        other = _settled(search, search.run()) if near else result  # they may find no rest where they carry
+        other = _settled(search, search.run())
         result = other if other.converged or len(other.status) > len(result.status) else result
     if not result.converged and warm is not None and warm.converged:
         return warm
-    if not result.converged and couples_heat(setup):
-        result = _raise_heat(setup, load, speed, result)
-    for what in ("load", "speed", "want"):
+    for attempt in _ATTEMPTS:
         if not result.converged:
-            result = _raise(setup, load, speed, what)[0] or result
-    if not result.converged and (setup.friction or math.isfinite(setup.bearing.oil.supply_flow)):
-        result = _let_held_idle(setup, load, speed, result)
-    if not result.converged and _may_try_sets(setup, result):
-        result = _try_sets(setup, load, speed, result)
+            result = attempt(setup, load, speed, result)
     return result
 
 
-def _may_try_sets(setup: Setup, result: Equilibrium) -> bool:
-    """Whether which pads carry is all that is in doubt, in films that are soon solved and lost none."""
-    few = len(result.films) <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
-    found_out = (c.severity == "error" and c != "not converged" and not c.pads for c in result.status)
-    return few and not (setup.friction or setup.rotational_stiffness) and not any(found_out)
+def _standing(setup: Setup, load: FloatArray, speed: float, heat: float = 1.0) -> Search:
+    """A search that stands where the curves of the pads carry the load."""
+    search = Search(setup, load, speed, heat)
+    search.stand()
+    return search
 
 
 def _try_sets(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
-    """Try every set of two pads or more, those with the most first; where none finds rest, that is named."""
+    """Try every set of two pads or more, those with the most first; where none finds rest, that is named.
+
+    Only where which pads carry is all that is in doubt, in films that are soon solved and lost none.
+    """
     count = len(failed.films)
+    few = count <= _MOST_PADS and not setup.flexible_pads and not couples_heat(setup)
+    found_out = (c.severity == "error" and c != "not converged" and not c.pads for c in failed.status)
+    if not few or setup.friction or setup.rotational_stiffness or any(found_out):
+        return failed
     for size in range(count, 1, -1):
         for pads in itertools.combinations(range(count), size):
-            search = Search(setup, load, speed)
-            search.stand()
+            search = _standing(setup, load, speed)
             loaded = np.isin(np.arange(count), pads)
             search.load_pads(loaded & (search.pads.rows >= 2))
             search.let_idle(np.flatnonzero(~loaded).tolist())
@@ -154,53 +156,39 @@ def _named(search: Search, result: Equilibrium, near: float, held: frozenset[int
 
 def _let_held_idle(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
     """Let pads idle that friction holds where their film loses its load, or whose oil fills no gap: nothing else is."""
-    search = Search(setup, load, speed)
-    search.stand()
-    result, held = search.run(), frozenset[int]()
-    for _ in search.films:
+    if not setup.friction and math.isinf(setup.bearing.oil.supply_flow):
+        return failed
+    search, held = _standing(setup, load, speed), frozenset[int]()
+    for _ in range(len(search.films) + 1):
+        result = search.run()
         # those that idle where a full gap at their leading edge would take more oil than there is
         held |= frozenset(k - 1 for k in starved(search.films) if search.films[k - 1].idle)
         if result.converged:
             return _settled(search, result, held)
-        swinging = [
-            k - 1
-            for k in pads_of("pads {pads} neither stick nor slide at rest", result.status)
-            if not search.state.idle[k - 1]
-        ]
-        if not swinging:
-            return failed
-        held |= frozenset(swinging)
-        search.let_idle(swinging)
-        result = search.run()
-    return _settled(search, result, held) if result.converged else failed
+        swinging = pads_of("pads {pads} neither stick nor slide at rest", result.status)
+        loaded = [k - 1 for k in swinging if not search.state.idle[k - 1]]
+        if not loaded:
+            break
+        held |= frozenset(loaded)
+        search.let_idle(loaded)
+    return failed
 
 
-def _raise_heat(setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
-    """Raise the heat in steps: where it goes round, with journal and clearances, cold films are no start for hot ones.
-
-    Names a bearing that is lost on the way because it grows hotter and closer for ever: above some share of its heat.
-    """
-    found, reached = _raise(setup, load, speed, "heat")
-    hottest = max(float(f.work.temperature.max()) for f in failed.films)
-    if found is not None or not reached or hottest < conditions.HOTTEST_FILM:
-        return found or failed
-    return replace(failed, status=(named("heat runs away", number=100 * reached), *failed.status))
-
-
-def _raise(setup: Setup, load: FloatArray, speed: float, what: str) -> tuple[Equilibrium | None, float]:
+def _raise(quantity: str, setup: Setup, load: FloatArray, speed: float, failed: Equilibrium) -> Equilibrium:
     """Raise load, heat, speed or want of oil from `_FIRST_SHARE` to 1, each step started from the one before.
 
-    The equilibrium at the end, and the share reached.
+    Where heat goes round, with journal and clearances, cold films are no start for hot ones; a bearing that is lost on
+    the way because it grows hotter and closer for ever, above some share of its heat, is named.
     """
     oil = setup.bearing.oil
-    if what == "want" and math.isinf(oil.supply_flow):
-        return None, 0.0
+    if (quantity == "heat" and not couples_heat(setup)) or (quantity == "want" and math.isinf(oil.supply_flow)):
+        return failed
     reached, step = 0.0, _FIRST_SHARE
     last: Equilibrium | None = None
     while reached < 1.0 and step > _LEAST_STEP:
         share = min(1.0, reached + step)
-        shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, what: share}
-        if what == "want":
+        shares = {"load": 1.0, "heat": 1.0, "speed": 1.0, quantity: share}
+        if quantity == "want":
             fed = replace(oil, supply_flow=oil.supply_flow / share)
             setup = setup.change(bearing=replace(setup.bearing, oil=fed))
         search = Search(setup, shares["load"] * load, shares["speed"] * speed, shares["heat"])
@@ -211,4 +199,17 @@ def _raise(setup: Setup, load: FloatArray, speed: float, what: str) -> tuple[Equ
             last, reached = result, share
         else:
             step *= 0.5
-    return (last if reached == 1.0 else None), reached
+    if last is not None and reached == 1.0:
+        return last
+    hottest = max(float(f.work.temperature.max()) for f in failed.films)
+    if quantity == "heat" and last is not None and hottest >= conditions.HOTTEST_FILM:
+        return replace(failed, status=(named("heat runs away", number=100 * reached), *failed.status))
+    return failed
+
+
+#: What is tried one after another where an equilibrium is not found at once.
+_ATTEMPTS: tuple[Callable[..., Equilibrium], ...] = (
+    *(partial(_raise, quantity) for quantity in ("heat", "load", "speed", "want")),
+    _let_held_idle,
+    _try_sets,
+)

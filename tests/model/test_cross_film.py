@@ -14,7 +14,7 @@ from model.effects import Effect
 from model.errors import OptionError
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossFilm, CrossOperator, cross_film, cross_pressure_change, set_cross_viscosity
-from model.film.cross_march import conduct, face_temperature, march_cross, march_one, station_heat
+from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
 from model.film.energy import solve_energy
 from model.film.mesh import FilmGrid, FilmWork, film_grid, film_work
 from model.film.oil_state import Running
@@ -173,7 +173,7 @@ def test_one_field_marches_as_three_do():
     operator.dissipation[:, ::6] = sources
     many, taken = marched(operator)
     one = np.zeros((81, 42))
-    assert march_one(operator, one, sources) == pytest.approx(taken[0], rel=1e-12)
+    assert march_cross(operator, one[:, :, None], operator.dissipation) == pytest.approx(taken[:1], rel=1e-12)
     np.testing.assert_allclose(one, many[:, :, 0], rtol=1e-9, atol=1e-15)
 
 
@@ -188,8 +188,9 @@ def test_what_a_pad_conducts_is_that_of_its_face_s_new_temperature():
     pad = (flux, to_coarse, np.eye(21))
     more = conduct((grid, work, cross.edges, 0.13), operator, pad, alone, 1e-9, (field, face))
     heat = (flux @ (to_coarse @ face.ravel())).reshape(face.shape)
-    one, answer = np.zeros((81, 42)), np.empty((81, 7))
-    assert more == pytest.approx(march_one(operator, one, -station_heat(grid, heat)), rel=1e-6)
+    one, sources, answer = np.zeros((81, 42)), np.zeros((80, 42)), np.empty((81, 7))
+    sources[:, ::6] = -station_heat(grid, heat)
+    assert more == pytest.approx(march_cross(operator, one[:, :, None], sources)[0], rel=1e-6)
     face_temperature(work, cross.edges, 0.13, one, heat, answer)
     assert abs(answer).max() > 0.1
     np.testing.assert_allclose(face, alone + answer, atol=1e-6)

@@ -14,7 +14,7 @@ import pytest
 
 import model.film.energy
 import model.film.reynolds
-import model.statics.compiled.elimination
+import model.statics.compiled.iteration
 from model import compilation
 from model.compilation import inner
 
@@ -47,7 +47,7 @@ def test_cached_code_carries_the_stamp():
     for function in (
         model.film.reynolds.solve_film,
         model.film.energy.march,
-        model.statics.compiled.elimination.eliminate,
+        model.statics.compiled.iteration.iterate,
     ):
         assert function.dispatcher._cache._cache_file._source_stamp == compilation.stamp()
 

@@ -10,10 +10,10 @@ import pytest
 
 from model.bearing import Bearing, Oil, Pad, Pivot
 from model.measured_pivot import MeasuredPivot
-from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, formula_pivot
+from model.pad.pivot import OTHER, compliance, deflection
+from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, ask_laws, encoded, formula_pivot
 from model.predict import predict
 from model.statics.compiled.anderson import DEPTH, mixed
-from model.statics.compiled.laws import OTHER, ask_laws, compliance, deflection, encoded
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 

@@ -18,17 +18,17 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (137.47, 16_463),
-    "model": (91.86, 12_029),
-    "rigdata": (70.84, 9_480),
-    "diagnosis": (39.0, 4_824),
+    "measurement": (131.68, 15_747),
+    "model": (87.85, 11_687),
+    "rigdata": (68.95, 9_236),
+    "diagnosis": (39.18, 4_831),  # 38.48 and what fits a fault's look-alikes in its place
     "cli": (27.08, 3_713),
-    "report": (26.61, 3_413),
-    "pivot": (18.54, 2_542),
-    "clearance": (8.67, 1_149),
+    "report": (26.61, 3_414),
+    "pivot": (20.17, 2_704),  # creep of the deflection, and the refusals that check asks for too
+    "clearance": (8.72, 1_156),
     "compare": (13.01, 1_817),
     "watch": (5.88, 741),
-    "top level": (6.69, 1_303),  # a column finds its unit by its name: fewer tokens, ten lines more
+    "top level": (6.69, 1_306),  # a condition more; a column finds its unit by its name: fewer tokens, ten lines more
     "runtime": (8.02, 1_246),  # Ctrl-C and SIGTERM, which were in the command line: folders and processes hold them too
     "exports": (5.32, 826),
     "view": (4.63, 548),

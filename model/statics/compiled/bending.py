@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import inner
+from model.film.dense import solve
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.reynolds import conductances
-from model.film.slopes import shape_slopes
+from model.film.slopes import force_of, shape_slopes
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
 from model.statics.compiled.case import Case
-from model.statics.compiled.elimination import solve
 from model.statics.compiled.heat import Conduction
 from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
 from model.tilt_hold import held_moment
@@ -131,27 +131,14 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: Floa
 
 @inner
 def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArray) -> None:
-    """Product of a matrix with some rows of `given`, five at a time for every row of the matrix that is read."""
-    some = len(rows)
-    for start in range(0, some, 5):
-        one, two = given[rows[start]], given[rows[min(start + 1, some - 1)]]
-        three, four = given[rows[min(start + 2, some - 1)]], given[rows[min(start + 3, some - 1)]]
-        five = given[rows[min(start + 4, some - 1)]]
-        for i in range(matrix.shape[0]):
-            row = matrix[i]
-            a = b = c = d = e = 0.0
-            for q in range(len(row)):
-                value = np.float64(row[q])
-                a += value * one[q]
-                b += value * two[q]
-                c += value * three[q]
-                d += value * four[q]
-                e += value * five[q]
-            out[rows[start], i] = a
-            out[rows[min(start + 1, some - 1)], i] = b
-            out[rows[min(start + 2, some - 1)], i] = c
-            out[rows[min(start + 3, some - 1)], i] = d
-            out[rows[min(start + 4, some - 1)], i] = e
+    """Product of a matrix with some rows of `given`: all of them for every row of the matrix that is read."""
+    for i in range(matrix.shape[0]):
+        factors = matrix[i]
+        for row in rows:
+            total, values = 0.0, given[row]
+            for q in range(len(factors)):
+                total += np.float64(factors[q]) * values[q]
+            out[row, i] = total
 
 
 @inner
@@ -171,7 +158,7 @@ def _close_loop(
     count, unknowns = bending + (1 if case.axial else 0), len(work.unknown)
     rows, columns = work.pressure.shape
     shapes = np.empty((rows, columns, count))
-    response, weights = np.empty((count, unknowns)), np.empty((2, unknowns))
+    response = np.empty((count, unknowns))
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
     if body >= 0:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
@@ -185,10 +172,9 @@ def _close_loop(
             for j in range(columns):
                 shapes[i, j, bending] = grid.cos[i] * grid.z[j]
     asked = right[:, 0].copy()
-    _force_weights(grid, work.pressure.shape, weights)
     a, b = state.wedge[m, 0], state.wedge[m, 1]
     slopes = shape_slopes(grid, work, conductances(grid, work, pads.clearance[m], a, b), shapes)
-    felt = np.zeros((2, count))
+    felt = np.empty((2, count))
     for q in range(unknowns):
         for r in range(count):
             value = response[r, q]
@@ -196,9 +182,8 @@ def _close_loop(
             right[r, 2] += value * work.slopes[q, 1]
             for s in range(count):
                 matrix[r, s] -= value * slopes[q, s]
-        for s in range(count):
-            felt[0, s] += weights[0, q] * slopes[q, s]
-            felt[1, s] += weights[1, q] * slopes[q, s]
+    for r in range(count):
+        felt[:, r] = force_of(grid, slopes[:, r], work.pressure.shape)
     solve(matrix, right)
     for r in range(count):
         for axis in range(2):
@@ -216,16 +201,6 @@ def _close_loop(
         return 0.0
     state.axial_step[m] = right[bending]
     return abs(right[bending, 0]) * largest(shapes[:, :, bending].copy().reshape(-1))
-
-
-@inner
-def _force_weights(grid: FilmGrid, shape: tuple[int, int], weights: FloatArray) -> None:
-    """Radial and tangential force by the pressure at the unknown nodes, (2, unknowns) [m^2]."""
-    width = shape[1] - 1 - grid.first
-    for i in range(1, shape[0] - 1):
-        for j in range(grid.first, shape[1] - 1):
-            q = (i - 1) * width + j - grid.first
-            weights[0, q], weights[1, q] = grid.cos[i] * grid.area[i, j], grid.sin[i] * grid.area[i, j]
 
 
 @inner

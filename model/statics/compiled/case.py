@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from model.compilation import inner
 from model.film.oil_state import Running
-from model.statics.compiled.stack import PadStack, PadState
+from model.statics.compiled.stack import PadStack
 from model.tilt_hold import HoldNumbers
 from rigdata.arrays import FloatArray
 
@@ -45,12 +45,12 @@ class Case(NamedTuple):
 
 
 @inner
-def rigid_approach(pads: PadStack, state: PadState, m: int) -> float:
+def rigid_approach(pads: PadStack, position: FloatArray, m: int) -> float:
     """Approach of a film if its pivot were rigid [m]."""
-    return pads.preload[m] + pads.frame[m, 0, 0] * state.position[0] + pads.frame[m, 0, 1] * state.position[1]
+    return pads.preload[m] + pads.frame[m, 0, 0] * position[0] + pads.frame[m, 0, 1] * position[1]
 
 
 @inner
-def along(pads: PadStack, state: PadState, m: int) -> float:
+def along(pads: PadStack, position: FloatArray, m: int) -> float:
     """Journal's place across the pivot line [m]."""
-    return pads.frame[m, 1, 0] * state.position[0] + pads.frame[m, 1, 1] * state.position[1]
+    return pads.frame[m, 1, 0] * position[0] + pads.frame[m, 1, 1] * position[1]

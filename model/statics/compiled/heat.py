@@ -22,14 +22,13 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
+from model.film.dense import nearest, product, solve
 from model.film.edge_flows import edge_flows
-from model.film.energy import between, dissipate, heat_step, march
+from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
-from model.film.slopes import pressure_change
 from model.interpolation import largest
 from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, rigid_approach
-from model.statics.compiled.elimination import solve
 from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
@@ -74,7 +73,7 @@ def rest_films(grids: GridStack, pads: PadStack, state: PadState, case: Case) ->
     """Say what the films of idle pads do."""
     for m in range(len(state.tilt)):
         if state.idle[m]:
-            wedge = (pads.clearance[m], rigid_approach(pads, state, m))
+            wedge = (pads.clearance[m], rigid_approach(pads, state.position, m))
             found = resting_film(grid_of(grids, m), wedge, case.running, state.inlet[m])
             for k in range(4):
                 state.resting[m, k] = found[k]
@@ -117,15 +116,13 @@ def exchange_heat(
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
-        hotter = largest(asked.reshape(-1))
-        works.temperature[m] += relaxation * min(1.0, HEATING_STEP / max(hotter, 1e-30)) * asked
+        hotter, radial, tangential = warm(
+            grid_of(grids, m), work_of(works, m), case.running, asked, (relaxation, HEATING_STEP), state.shift[m]
+        )
         state.heating[m] = hotter
+        state.corrected[m, 0], state.corrected[m, 1] = state.force[m, 0] + radial, state.force[m, 1] + tangential
         if not change >= hotter:
             change = hotter
-        more = pressure_change(
-            grid_of(grids, m), work_of(works, m), case.running.speed, case.running.oil, state.shift[m]
-        )
-        state.corrected[m, 0], state.corrected[m, 1] = state.force[m, 0] + more[0], state.force[m, 1] + more[1]
     if case.journal:
         state.figures[JOURNAL] = journal
     return change
@@ -140,17 +137,15 @@ def _answer(
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
     count, rows, columns = fields.shape
-    sources, loss, less = np.zeros((count, rows, columns)), np.empty((rows, columns)), np.empty((rows, columns))
-    dissipate(grid, work, case.running.speed, sources[0], less)
+    sources, loss = np.zeros((count, rows, columns)), np.empty((rows, columns))
     for i in range(rows):
         for j in range(columns):
             station = grid.dx * grid.height[j]
             passed = _NUSSELT * case.running.heat[1] / work.thickness[i, j] * station if case.journal else 0.0
-            fewer = case.kept * case.running.oil[1] * less[i, j]
-            work.exchange[i, j], loss[i, j] = passed, passed + fewer
-            sources[0, i, j] = case.kept * (sources[0, i, j] + work.gained[i, j]) + fewer * work.temperature[i, j]
+            work.exchange[i, j] = passed
             if count == 3:
                 sources[2, i, j] = passed
+    heat_sources(grid, work, case.running, case.kept, sources[0], loss)
     for j in range(columns):
         fields[1, 0, j] = 1.0
     conducts = len(bodies.which) > 0
@@ -218,7 +213,7 @@ def _krylov(
 ) -> FloatArray:
     """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
     m, loss = film
-    size, answer = math.sqrt(_product(right, right)), np.zeros(len(right))
+    size, answer = math.sqrt(product(right, right)), np.zeros(len(right))
     if not size > 0.0:
         return answer
     basis, images = np.zeros((_KRYLOV_STEPS, len(right))), np.zeros((_KRYLOV_STEPS, len(right)))
@@ -230,44 +225,24 @@ def _krylov(
         fields[0, 0] = 0.0
         march(grid, work, case.running, loss, fields, between(taken))
         images[k] = basis[k] - fields[0].reshape(-1)
-        if not _product(images[k], images[k]) < BOUNDLESS:
+        if not product(images[k], images[k]) < BOUNDLESS:
             answer[:] = math.nan
             return answer
-        _least_squares(images, k + 1, right, weights)
+        nearest(images, k + 1, right, 1e-13, weights)
         answer[:], left = 0.0, -right
         for r in range(k + 1):
             answer += weights[r, 0] * basis[r]
             left += weights[r, 0] * images[r]
-        if k == _KRYLOV_STEPS - 1 or math.sqrt(_product(left, left)) < _CONDUCTION_TOLERANCE * size:
+        if k == _KRYLOV_STEPS - 1 or math.sqrt(product(left, left)) < _CONDUCTION_TOLERANCE * size:
             return answer
         basis[k + 1] = images[k]
         for r in range(k + 1):
-            basis[k + 1] -= _product(basis[r], basis[k + 1]) * basis[r]
-        length = math.sqrt(_product(basis[k + 1], basis[k + 1]))
+            basis[k + 1] -= product(basis[r], basis[k + 1]) * basis[r]
+        length = math.sqrt(product(basis[k + 1], basis[k + 1]))
         if not length > 1e-12 * size:
             return answer
         basis[k + 1] /= length
     return answer
-
-
-@inner
-def _product(one: FloatArray, other: FloatArray) -> float:
-    total = 0.0
-    for q in range(len(one)):
-        total += one[q] * other[q]
-    return total
-
-
-@inner
-def _least_squares(images: FloatArray, k: int, right: FloatArray, weights: FloatArray) -> None:
-    """Weights (.., 1) of the first k images (.., n) that come nearest to a right-hand side (n,)."""
-    gram = np.empty((k, k))
-    for i in range(k):
-        weights[i, 0] = _product(images[i], right)
-        for j in range(k):
-            gram[i, j] = _product(images[i], images[j])
-        gram[i, i] *= 1.0 + 1e-13  # images that hardly differ are of no use to each other
-    solve(gram, weights)
 
 
 @inner

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from model.compilation import compiled, inner
+from model.compilation import inner
 from model.film.mesh import FilmWork
 from model.interpolation import row_below
+from model.pad.pivot import compliance
 from model.statics.compiled.case import ALONE, COUPLED, Case, along, rigid_approach
-from model.statics.compiled.laws import compliance
 from model.statics.compiled.stack import PadStack, PadState
 from model.tilt_hold import held_moment
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import FloatArray
 
 #: Share of the load below which a film that opens carries nothing that is told from none: from other starts some stand
 #: at up to 7e-7 of it where the pad idles, and those that heat holds carry 0.07 and more.
@@ -28,25 +28,18 @@ def let_idle(state: PadState, m: int) -> None:
     state.tilt[m] = 0.0
 
 
-@compiled
-def place_pads(pads: PadStack, works: FilmWork, state: PadState, loaded: BoolArray) -> None:
-    """Put pads on their loaded attitudes for the journal's position; at their folds where they have none there."""
-    for m in range(len(loaded)):
-        if loaded[m]:
-            _place(pads, works, state, m)
-
-
 @inner
-def _place(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
+def place(pads: PadStack, works: FilmWork, state: PadState, m: int) -> None:
+    """Put a pad on its loaded attitude for the journal's position; at its fold where it has none there."""
     table, last = pads.attitudes[m], pads.rows[m] - 1
-    at = max(rigid_approach(pads, state, m), table[0, 0])
+    at = max(rigid_approach(pads, state.position, m), table[0, 0])
     low = row_below(table[0], pads.rows[m], at)
     share = (min(at, table[0, last]) - table[0, low]) / (table[0, low + 1] - table[0, low])
     a = table[1, low] + share * (table[1, low + 1] - table[1, low])
     b = table[2, low] + share * (table[2, low + 1] - table[2, low])
     state.idle[m] = False
     state.deflection[m] = at - a
-    state.tilt[m] = (b - along(pads, state, m)) / pads.pivot_radius[m]
+    state.tilt[m] = (b - along(pads, state.position, m)) / pads.pivot_radius[m]
     works.ruptured[m] = False
 
 
@@ -56,14 +49,14 @@ def rescue(pads: PadStack, works: FilmWork, state: PadState, m: int) -> bool:
     if pads.rows[m] < 2 or state.rescues[m] >= _RESCUES or margin(pads, state, m) < 0.0:
         return False
     state.rescues[m] += 1
-    _place(pads, works, state, m)
+    place(pads, works, state, m)
     return True
 
 
 @inner
 def margin(pads: PadStack, state: PadState, m: int) -> float:
     """How far a pad is from the fold of its loaded attitudes, as a share of its clearance; negative beyond."""
-    return (rigid_approach(pads, state, m) - pads.attitudes[m, 0, 0]) / pads.clearance[m]
+    return (rigid_approach(pads, state.position, m) - pads.attitudes[m, 0, 0]) / pads.clearance[m]
 
 
 @inner

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class PadStack(NamedTuple):
     pivot_radius: FloatArray  #: (n,): R_P and Cp [m].
     clearance: FloatArray
     order: IntArray  #: (n,) of int: The pads in the order in which oil passes them.
-    laws: FloatArray  #: (n, 4): The pivots, see `model.statics.compiled.laws`.
+    laws: FloatArray  #: (n, 4): The pivots, see `model.pad.pivot`.
     curves: FloatArray  #: (n, 5, m): Measured ones.
     attitudes: FloatArray  #: (n, 4, r): Loaded attitudes: r = a + eta, a and b [m], load [N]; the first is the fold.
     flattest: FloatArray  #: (n,): Wedges b up to here are none of a pad that is stable in tilt [m].
@@ -87,29 +87,10 @@ class PadState(NamedTuple):
 JOURNAL, GROWN, GROWING, BACKFLOW = range(4)
 
 
-def stacked_grids(grids: tuple[FilmGrid, ...]) -> GridStack:
+def stacked_grids(grids: Sequence[FilmGrid]) -> GridStack:
     """The meshes of several pads as one."""
-    return _stacked(tuple(map(_Same, grids)))
-
-
-class _Same:
-    """A mesh by its identity: `film_grid` returns the same object for the same arguments."""
-
-    def __init__(self, grid: FilmGrid) -> None:
-        self.grid = grid
-
-    def __hash__(self) -> int:
-        return id(self.grid)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.grid is other.grid
-
-
-@lru_cache(maxsize=64)
-def _stacked(same: tuple[_Same, ...]) -> GridStack:
-    grids = [one.grid for one in same]
-    arrays = {name: np.array([getattr(g, name) for g in grids]) for name in GridStack._fields if name != "first"}
-    return GridStack(**arrays, first=grids[0].first)
+    parts: dict[str, Any] = {name: np.array([getattr(g, name) for g in grids]) for name in GridStack._fields[:-1]}
+    return GridStack(**parts, first=grids[0].first)
 
 
 @inner

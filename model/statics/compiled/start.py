@@ -14,9 +14,9 @@ import math
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.attitudes import BETWEEN
 from model.interpolation import least, row_below
-from model.statics.compiled.laws import deflection
+from model.pad.pivot import deflection
+from model.statics.compiled.case import rigid_approach
 from model.statics.compiled.stack import PadStack
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
@@ -76,7 +76,7 @@ def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolAr
     doubtful, count = np.empty(n, dtype=np.int64), 0
     size = math.hypot(load[0], load[1])
     for m in range(n):
-        beyond = pads.attitudes[m, 0, 0] - _reach(pads, m, position)
+        beyond = pads.attitudes[m, 0, 0] - rigid_approach(pads, position, m)
         if loaded[m] and beyond > 0.0:
             loaded[m] = False
             if _pushes(pads, m, position)[0] > _NOTHING * size and count < _MOST_DOUBTFUL:
@@ -107,7 +107,7 @@ def _most_loaded(
                 mask[doubtful[k]] = number // 2 ** (count - 1 - k) % 2 == 1
             good = _stand(load, pads, mask, position)
             for m in range(len(mask)):
-                if mask[m] and _reach(pads, m, position) < pads.attitudes[m, 0, 0] - _FOLD * pads.clearance[m]:
+                if mask[m] and rigid_approach(pads, position, m) < pads.attitudes[m, 0, 0] - _FOLD * pads.clearance[m]:
                     good = False
             if good and best < 0:
                 best, answer, chosen = size, position, mask
@@ -128,14 +128,9 @@ def _bits(number: int) -> int:
 
 
 @inner
-def _reach(pads: PadStack, m: int, position: FloatArray) -> float:
-    return pads.preload[m] + pads.frame[m, 0, 0] * position[0] + pads.frame[m, 0, 1] * position[1]
-
-
-@inner
 def _pushes(pads: PadStack, m: int, position: FloatArray) -> tuple[float, float]:
     """Load of a pad's curve at a position [N], and its slope [N/m]."""
-    reach, table, load = _reach(pads, m, position), pads.attitudes[m, 0], pads.attitudes[m, 3]
+    reach, table, load = rigid_approach(pads, position, m), pads.attitudes[m, 0], pads.attitudes[m, 3]
     if reach < table[0]:
         tail = _TAIL * pads.clearance[m]
         push = load[0] * math.exp(max((reach - table[0]) / tail, -60.0))
@@ -201,39 +196,3 @@ def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatA
                 break
         position[0], position[1], fx, fy = trial[0], trial[1], gx, gy
     return math.hypot(fx, fy) < 10.0 * _GOOD_ENOUGH * size
-
-
-@compiled
-def warm_film(
-    rises: FloatArray, first: int, table: FloatArray, reach: float, inlet: float, whole: bool, temperature: FloatArray
-) -> None:
-    """Temperatures of a film on its loaded attitude, from those of a curve's rows: `rises` (rows, coarse mesh) [K].
-
-    `table` (n,): r of the attitudes, from the curve's point `first` on. Across, either mesh is graded alike; a whole
-    film is symmetric.
-    """
-    low = row_below(table, len(table), reach)
-    part = min(max((reach - table[low]) / (table[low + 1] - table[low]), 0.0), 1.0)
-    part = (first + low + part) / BETWEEN
-    row = min(int(part), rises.shape[0] - 2)
-    part -= row
-    rows, columns = temperature.shape
-    coarse_rows, coarse_columns = rises.shape[1], rises.shape[2]
-    for i in range(rows):
-        x = i / (rows - 1) * (coarse_rows - 1)
-        p = min(int(x), coarse_rows - 2)
-        u = x - p
-        for j in range(columns):
-            y = j / (columns - 1)
-            if whole:
-                y = abs(2.0 * y - 1.0)
-            y *= coarse_columns - 1
-            q = min(int(y), coarse_columns - 2)
-            v = y - q
-            total = 0.0
-            for k in range(2):
-                field = rises[row + k]
-                value = (1.0 - u) * ((1.0 - v) * field[p, q] + v * field[p, q + 1])
-                value += u * ((1.0 - v) * field[p + 1, q] + v * field[p + 1, q + 1])
-                total += (part if k == 1 else 1.0 - part) * value
-            temperature[i, j] = inlet + total

@@ -13,12 +13,9 @@ from model.film.oil_state import least_share, set_viscosity
 from model.interpolation import least
 from model.statics.compiled.bending import Shapes, bend_pads, change_shape
 from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, along, rigid_approach
-from model.statics.compiled.elimination import PadEquations, eliminate
 from model.statics.compiled.heat import rest_films
-from model.statics.compiled.laws import compliance, deflection
 from model.statics.compiled.place import let_idle, rescue
 from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadStack, PadState, grid_of, work_of
-from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray
 
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
@@ -42,8 +39,8 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
         while not state.idle[m]:
             if not sharp and case.thermal != ACROSS:
                 set_viscosity(work, case.running.oil)
-            a = rigid_approach(pads, state, m) - state.deflection[m]
-            b = along(pads, state, m) + pads.pivot_radius[m] * state.tilt[m]
+            a = rigid_approach(pads, state.position, m) - state.deflection[m]
+            b = along(pads, state.position, m) + pads.pivot_radius[m] * state.tilt[m]
             wedge, speed = (pads.clearance[m], a, b), case.running.speed
             found = solve_by(case.rupture, grid, work, wedge, speed, sharp, state.supplied[m])
             state.wedge[m, 0], state.wedge[m, 1], state.solved[m] = a, b, True
@@ -106,45 +103,6 @@ def mean_temperature(shapes: Shapes, works: FilmWork, state: PadState) -> float:
                     area += shapes.grids.area[m, i, j]
                     total += shapes.grids.area[m, i, j] * works.temperature[m, i, j]
     return total / area if area > 0.0 else state.inlet[0]
-
-
-@inner
-def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArray]:
-    """Solve the linearised equilibrium once: residual, shift (2,) of the journal; moves of the pads in the state."""
-    n = 0
-    for m in range(len(state.tilt)):
-        n += 1 if state.solved[m] else 0
-    rows = PadEquations(
-        np.empty((n, 2, 2)), np.empty((n, 2)), np.empty((n, 2, 2)), np.empty(n), np.empty(n), np.empty((n, 2)),
-        np.empty(n), np.empty(n),
-    )  # fmt: skip
-    closing = case.closing * state.figures[GROWING]
-    k = 0
-    for m in range(len(state.tilt)):
-        if not state.solved[m]:
-            continue
-        radial, radius = state.felt[m, 0], pads.pivot_radius[m]
-        rows.frame[k], rows.stiffness[k], rows.pivot_radius[k] = pads.frame[m], state.felt_stiffness[m], radius
-        # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
-        for i in range(2):
-            rows.force[k, i] = state.felt[m, i] + closing * state.felt_stiffness[m, i, 0]
-        moment, stiffness, arm, _ = held_moment(case.hold, state.tilt[m], radial)
-        rows.holding_force[k] = moment / radius
-        rows.holding_slopes[k, 0], rows.holding_slopes[k, 1] = stiffness / radius, arm / radius
-        given = deflection(pads.laws[m], pads.curves[m], max(radial, 0.0))
-        rows.missing_deflection[k] = given - state.deflection[m]
-        rows.pivot_compliance[k] = compliance(pads.laws[m], pads.curves[m], max(radial, 1e-6))
-        k += 1
-    residual, shift, moves = eliminate(case.load, rows)
-    state.moves[:] = 0.0
-    k = 0
-    for m in range(len(state.tilt)):
-        if state.solved[m]:
-            state.moves[m] = moves[k]
-            if case.hold.slip > 0.0 and state.tilt[m] * (state.tilt[m] + moves[k, 0]) < 0.0:
-                state.moves[m, 0] = -state.tilt[m]  # the friction turns round there
-            k += 1
-    return residual, shift
 
 
 @inner

@@ -1,0 +1,64 @@
+"""Small dense systems: Gauss' elimination, and the combination of a few vectors that comes nearest to another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.compilation import inner
+from rigdata.arrays import FloatArray
+
+
+@inner
+def solve(matrix: FloatArray, right: FloatArray) -> None:
+    """Gauss' elimination with the largest pivot of each column; the solutions replace the right-hand sides (n, q)."""
+    n = len(matrix)
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if best != k:
+            for j in range(n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            for j in range(right.shape[1]):
+                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] / matrix[k, k]
+            for j in range(k, n):
+                matrix[i, j] -= factor * matrix[k, j]
+            for j in range(right.shape[1]):
+                right[i, j] -= factor * right[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(right.shape[1]):
+            total = right[k, j]
+            for i in range(k + 1, n):
+                total -= matrix[k, i] * right[i, j]
+            right[k, j] = total / matrix[k, k]
+
+
+@inner
+def nearest(images: FloatArray, count: int, right: FloatArray, apart: float, weights: FloatArray) -> bool:
+    """Weights (.., 1) of the first images (.., n) whose sum is nearest to a vector (n,); False if all are zero.
+
+    Images that hardly differ are of no use to each other: `apart` is the share by which they are taken to.
+    """
+    gram, trace = np.empty((count, count)), 0.0
+    for i in range(count):
+        weights[i, 0] = product(images[i], right)
+        for j in range(count):
+            gram[i, j] = product(images[i], images[j])
+        gram[i, i] *= 1.0 + apart
+        trace += gram[i, i]
+    if not trace > 0.0:
+        return False
+    solve(gram, weights)
+    return True
+
+
+@inner
+def product(one: FloatArray, other: FloatArray) -> float:
+    """Sum of products."""
+    total = 0.0
+    for q in range(len(one)):
+        total += one[q] * other[q]
+    return total

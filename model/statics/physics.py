@@ -1,0 +1,84 @@
+"""Which physics a set-up asks for, as compiled searches take it: the case's numbers, bodies that bend and conduct."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from model.film.models import FILM_MODELS
+from model.film.oil_state import Running
+from model.pad.bending import PadDeformation
+from model.pad.pivot import OTHER
+from model.pivots import encoded
+from model.setup import Setup
+from model.statics.compiled.bending import Shapes, stacked_bodies
+from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
+from model.statics.compiled.heat import Conduction
+from model.statics.compiled.stack import GridStack
+from model.statics.pad_film import PadFilm, oil_constants, rupture_of
+from model.tilt_hold import hold_numbers
+from rigdata.arrays import FloatArray
+
+
+def couples_heat(setup: Setup) -> bool:
+    """Whether the films' temperatures depend on more than their own inlets."""
+    return setup.thermal != "isothermal" and bool(
+        setup.thermal == "thd" or setup.mixing or setup.options.conduction or setup.options.isothermal_journal
+    )
+
+
+def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -> Case:
+    """The numbers of a search; `heat` is the share of the heat that the films keep."""
+    oil, growth, length = setup.bearing.oil, setup.growth, setup.bearing.length
+    kept, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
+    thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
+    if couples_heat(setup):
+        thermal = ACROSS if setup.thermal == "thd" else COUPLED
+    carried = (oil.specific_heat, oil.conductivity)
+    if thermal == ALONE:  # what a share of the heat does, all of it does to oil that takes up more per kelvin
+        carried = (oil.specific_heat / kept, oil.conductivity / kept)
+    if thermal == ISOTHERMAL:
+        carried = (math.inf, oil.conductivity)
+    return Case(
+        load=np.array(load, dtype=float),
+        running=Running(float(surface_speed), oil_constants(oil), carried),
+        hold=hold_numbers(setup),
+        accuracy=float(setup.accuracy),
+        thermal=thermal,
+        rupture=FILM_MODELS[rupture_of(setup)],
+        supply=supply,
+        kept=float(kept),
+        mixing=float(setup.mixing),
+        journal=bool(setup.options.isothermal_journal),
+        closing=0.0 if growth is None else float(growth.closing(setup.bearing)),
+        axial=setup.pads_follow,
+        fresh=oil.supply_flow * float(oil.density(supply)) / len(setup.bearing.pads) / length,
+        length=length,
+        asks_laws=bool((encoded(setup.pivots)[0][:, 0] == OTHER).any()),
+    )
+
+
+def shapes_of(setup: Setup, case: Case, films: Sequence[PadFilm], grids: GridStack) -> Shapes:
+    """Meshes of the films, and the bodies of their pads where they bend or conduct."""
+    if case.thermal in (ISOTHERMAL, ALONE) and not (setup.flexible_pads or case.axial):
+        return Shapes(grids, None, None)
+    bodies = tuple(f.deformation for f in films if f.deformation is not None)
+    conducting = bodies if case.thermal == COUPLED and setup.options.conduction else ()
+    bending = bodies if setup.flexible_pads else ()
+    unknown = grids.first, grids.z.shape[1]
+    stacked = stacked_bodies(bending, unknown, setup.bending_factor, case.supply)
+    return Shapes(grids, stacked, _stacked_conduction(conducting))
+
+
+@lru_cache(maxsize=8)
+def _stacked_conduction(bodies: tuple[PadDeformation, ...]) -> Conduction:
+    """What the pads conduct, side by side; without bodies nothing."""
+    if not bodies:
+        nothing = np.zeros((0, 0, 0))
+        return Conduction(np.zeros(0, dtype=np.int64), nothing, nothing)
+    kinds = list(dict.fromkeys(bodies))
+    which = np.array([kinds.index(b) for b in bodies])
+    return Conduction(which, np.array([b.flux for b in kinds]), np.array([b.to_coarse for b in kinds]))
