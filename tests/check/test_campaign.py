@@ -27,8 +27,8 @@ from tpjb_ident.check.lines import excitation_line, other_line, steady_level
 from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.signals import check_signal, is_spare
 from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.bad_samples import robust_fit
 from tpjb_ident.phasors.run_phasors import run_phasors
 from tpjb_ident.phasors.windows import line_design

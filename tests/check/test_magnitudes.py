@@ -16,8 +16,8 @@ from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, _weight, check_magnitudes
 from tpjb_ident.check.observation import observe
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 
 
 def random_rig(rng: np.random.Generator, demo) -> Sizes:

@@ -11,7 +11,7 @@ import pytest
 
 from rigdata.virtual_rig import write_campaign
 from tests.command_line import tpjb
-from tests.dynamic.test_identify import rig
+from tests.identification.test_identify import rig
 
 DISTURBED = "d-05000-25-02"
 

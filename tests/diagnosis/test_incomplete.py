@@ -11,7 +11,7 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.diagnosis.campaign import unknown_centre
 from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import _mains_on_excitation, observe
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
+from tpjb_ident.estimators.stiffness import DynamicStiffness
 
 
 def point(*quality: str, load: float = 5000.0):

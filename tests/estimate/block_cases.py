@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.operating_point import OperatingPoint
-from tests.dynamic.phasor_cases import complex_normal
+from tests.phasors.phasor_cases import complex_normal
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.clock import Clock

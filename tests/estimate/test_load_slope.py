@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import H, place
+from tests.phasors.phasor_cases import H, place
 from tpjb_ident.estimate.load_slope import slopes_over_load
 from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
 

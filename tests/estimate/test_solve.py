@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import complex_normal
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
+from tests.phasors.phasor_cases import complex_normal
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 

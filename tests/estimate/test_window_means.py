@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import complex_normal, hermitian
+from tests.phasors.phasor_cases import complex_normal, hermitian
 from tpjb_ident.estimate.motion import motion_in
 from tpjb_ident.estimate.window_means import Readings, aligned, window_means
 

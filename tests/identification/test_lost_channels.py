@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.dynamic.test_assemble import LOADS, found, law, run_at
+from tests.identification.test_assemble import LOADS, found, law, run_at
 
 
 def without_cells(run):

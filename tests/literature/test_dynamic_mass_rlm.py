@@ -16,8 +16,8 @@ import pytest
 from statsmodels.robust.scale import HuberScale
 
 from tests.rigs.estimator_cases import Case, draw
-from tpjb_ident.dynamic.estimators.r_matrix import phasor_table, real_rows
-from tpjb_ident.dynamic.estimators.rlm import RlmSettings, solve_rlm
+from tpjb_ident.estimators.r_matrix import phasor_table, real_rows
+from tpjb_ident.estimators.rlm import RlmSettings, solve_rlm
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "mass_rlm.json").read_text(encoding="utf-8"))
 

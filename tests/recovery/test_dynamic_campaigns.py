@@ -12,8 +12,8 @@ import pytest
 
 from rigdata.campaign import load_campaign
 from rigdata.virtual_rig import RigPlan, RigTruth, VirtualRig, operating_points, write_campaign
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.terms.mains import MainsEquations
 
 DIRECT = [0, 3, 4, 7]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.rigs.estimator_cases import H_TRUE, OMEGA, TRUE, Case, draw, score
-from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
+from tpjb_ident.estimators.estimate import estimate_dynamic_stiffness
 
 SEED = 61
 

@@ -13,8 +13,8 @@ from rigdata.virtual_rig import Fault, Noise
 from rigdata.virtual_rig.truth import load_vector
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, directions, stiff_rig
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 
 SHORT = replace(PLAN, locus=(), dry=())
 MISS = Noise.like_samples().set_point

@@ -14,8 +14,8 @@ from tests.command_line import tpjb
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tpjb_ident.clearance.measure import measure_run
 from tpjb_ident.clearance.polygon import gain_ratio
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 
 CLEARANCE = 80e-6
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tpjb_ident.dynamic.estimators.estimate import estimate_dynamic_stiffness
+from tpjb_ident.estimators.estimate import estimate_dynamic_stiffness
 
 OMEGA = 2 * np.pi * 25.0
 H_TRUE = np.array(

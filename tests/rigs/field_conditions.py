@@ -18,9 +18,9 @@ from tests.rigs.campaign_file import plans_of
 from tests.rigs.field_rig import CHANNELS, Device, Plan, Rig
 from tpjb_ident.cli.command import Command
 from tpjb_ident.cli.identification import identify_settings, refuse_untrusted
-from tpjb_ident.dynamic.results.identification import Identification
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.results.identification import Identification
 
 CELLS = tuple(name for name, (quantity, _) in CHANNELS.items() if quantity == "force")
 RIG = Rig()

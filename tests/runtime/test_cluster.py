@@ -58,7 +58,7 @@ def cluster(tmp_path_factory):
 @pytest.fixture(scope="module")
 def campaign_file(tmp_path_factory):
     from rigdata.virtual_rig import write_campaign
-    from tests.dynamic.test_identify import rig
+    from tests.identification.test_identify import rig
 
     path = tmp_path_factory.mktemp("rig") / "campaign.h5"
     write_campaign(path, rig([(2500.0, 25.0), (5000.0, 25.0)], seed=7))
@@ -75,8 +75,8 @@ def wait_for(address: str, count: int) -> None:
 @pytest.mark.slow
 def test_a_worker_killed_half_way_changes_no_bit(cluster, campaign_file, tmp_path):
     from rigdata.campaign import load_campaign
-    from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.identification.identify import identify
+    from tpjb_ident.identification.settings import IdentifySettings
 
     wait_for(str(cluster.file), 2)
     campaign = load_campaign(campaign_file)
@@ -124,7 +124,7 @@ def test_the_command_line_works_on_a_cluster(cluster, small_campaign, tmp_path):
 def test_a_client_killed_half_way_is_taken_up_where_it_stopped(cluster, campaign_file, tmp_path, monkeypatch):
     from tests.command_line import tpjb
     from tpjb_ident.cli.commands.identify import KEPT
-    from tpjb_ident.dynamic.runs.run_store import RunStore
+    from tpjb_ident.runs.run_store import RunStore
 
     wait_for(str(cluster.file), 1)
     out = tmp_path / "out"

@@ -21,7 +21,7 @@ EXTENSION_POINTS = {
     "a pivot law": ("model/pivots.py:PivotLaw", "tpjb_ident/pivot/laws.py:Law"),
     "a film": ("model/film/reynolds.py:solve_film", "model/film/reynolds.py:FilmForces"),
     "a reader": ("rigdata/readers/formats/*.py:read_[!s]*", "rigdata/readers/*.py:Series"),
-    "an estimator": ("tpjb_ident/dynamic/estimators/r_matrix.py:PhasorTable",),
+    "an estimator": ("tpjb_ident/estimators/r_matrix.py:PhasorTable",),
     "a term": ("tpjb_ident/estimate/term.py:Term",),
     "an export": tuple(f"tpjb_ident/exports/*.py:{n}" for n in ("write_*", "Chosen", "Export")),
     "workers": ("tpjb_ident/runtime/executors.py:Workers",),
@@ -29,7 +29,7 @@ EXTENSION_POINTS = {
     "what a face returns": (
         "model/bearing.py:Pad",
         "model/bearing.py:Oil",
-        "tpjb_ident/dynamic/results/point_result.py:PointResult",
+        "tpjb_ident/results/point_result.py:PointResult",
         "tpjb_ident/pivot/*.py:PivotSteps",
         "tpjb_ident/pivot/*.py:Hysteresis",
         "tpjb_ident/clearance/*.py:Locus",

@@ -10,8 +10,8 @@ from rigdata.near_names import nearest_name
 from rigdata.problem import RigDataError, RigError
 from rigdata.units import UnitError
 from tests.structure.sources import statements, trees
-from tpjb_ident.dynamic.estimators.rlm import ComplexInputError
 from tpjb_ident.errors import TpjbError
+from tpjb_ident.estimators.rlm import ComplexInputError
 
 #: Classes that are no refusals: a mistake of the code, and an answer that is not to be trusted.
 NO_REFUSALS = {"UnknownConditionError", "NotTrustedError"}

@@ -33,7 +33,7 @@ LIMITS = {
     "exports": (5.32, 826),
     "view": (4.63, 548),
 }
-MEASUREMENT = ("dynamic", "check", "phasors", "estimate", "terms", "identification")
+MEASUREMENT = ("check", "phasors", "bands", "estimate", "terms", "estimators", "runs", "identification", "results")
 COUNTED = (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 

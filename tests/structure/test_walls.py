@@ -77,7 +77,7 @@ def test_no_import_goes_through_a_wall():
         ("model/x.py", "from rigdata.calibration import Channel"),
         ("model/effects/x.py", "import importlib\nimportlib.import_module('rigdata')"),
         ("model/effects/x.py", "from importlib import import_module\nimport_module('rigdata')"),
-        ("tpjb_ident/dynamic/x.py", "from model.bearing import Bearing"),
+        ("tpjb_ident/results/x.py", "from model.bearing import Bearing"),
         ("tpjb_ident/compare/x.py", "import matplotlib.pyplot as plt"),
         ("tpjb_ident/report/x.py", "from tpjb_ident.cli import app"),
     ],

@@ -19,8 +19,8 @@ from tests.studies.field import acquisition
 from tests.studies.field import closed_form as cf
 from tests.studies.field.acquisition import Acquisition, write_campaign
 from tests.studies.results import report, study_parser, table
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 
 THREE, FOUR = (0.0, 60.0, 120.0), (0.0, 45.0, 90.0, 135.0)
 LOADS = (2500.0, 5000.0, 8750.0)

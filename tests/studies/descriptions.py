@@ -23,8 +23,8 @@ from rigdata.problem import RigDataError
 from tests.studies.results import report, study_parser, table
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.compare.static_tests import bearing_problems
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 
 DEMO = Path(__file__).resolve().parents[2] / "rigdata" / "samples" / "demo.h5"
 SENSORS = {

@@ -179,8 +179,8 @@ def judge(path: Path, struck: str | None) -> tuple[bool, bool, str]:
 
 def identified(path: Path) -> tuple[float, list[str]]:
     """Largest error of the direct terms at the struck point; names of what identification says."""
-    from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.identification.identify import identify
+    from tpjb_ident.identification.settings import IdentifySettings
 
     try:
         result = identify(rigdata.load_campaign(path), IdentifySettings(methods=(), clearance=CLEARANCE))

@@ -29,10 +29,10 @@ class Mutant(NamedTuple):
     after: str
 
 
-_IDENTIFIED = "tpjb_ident/dynamic/results/identification.py"
-_STIFFNESS = "tpjb_ident/dynamic/estimators/stiffness.py"
-_BANDS = "tpjb_ident/dynamic/results/band_result.py"
-_MODELS = "tpjb_ident/dynamic/results/frequency_model.py"
+_IDENTIFIED = "tpjb_ident/results/identification.py"
+_STIFFNESS = "tpjb_ident/estimators/stiffness.py"
+_BANDS = "tpjb_ident/results/band_result.py"
+_MODELS = "tpjb_ident/results/frequency_model.py"
 _PIVOTS = "tpjb_ident/pivot/curve.py"
 _PIVOT_TABLE = "tpjb_ident/pivot/tables.py"
 _DIFFERENCE = "tpjb_ident/compare/difference.py"
@@ -42,7 +42,7 @@ _EXPORTS = "tpjb_ident/exports/formats.py"
 #: Tests nearest to each file, the cheap ones first.
 TESTS = {
     _IDENTIFIED: ("tests/runtime/test_intervals.py", "-k", "points"),
-    _STIFFNESS: ("tests/dynamic/test_joints.py",),
+    _STIFFNESS: ("tests/identification/test_joints.py",),
     _BANDS: ("tests/runtime/test_intervals.py", "-k", "bands"),
     _MODELS: ("tests/runtime/test_intervals.py",),
     _PIVOTS: ("tests/pivot/test_tables.py",),

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.dynamic.phasor_cases import FILM_H as H
-from tests.dynamic.phasor_cases import complex_normal
+from tests.phasors.phasor_cases import FILM_H as H
+from tests.phasors.phasor_cases import complex_normal
 from tpjb_ident.phasors.line_means import mains_lines
 from tpjb_ident.phasors.lines import LineSettings, known_lines
 from tpjb_ident.terms import mains

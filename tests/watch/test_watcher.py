@@ -17,7 +17,7 @@ import pytest
 from rigdata.virtual_rig import Fault, write_campaign
 from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig
-from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.watch.landing import NewFiles
 from tpjb_ident.watch.watcher import Watcher
 

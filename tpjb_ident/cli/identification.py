@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from rigdata.arrays import FloatArray
     from rigdata.campaign import Campaign
-    from tpjb_ident.dynamic.results.frequency_model import FrequencyModel
-    from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.identification.settings import IdentifySettings
+    from tpjb_ident.results.frequency_model import FrequencyModel
+    from tpjb_ident.results.identification import Identification
 
 #: Share of the mean direct coefficient from which a cross-coupled one is shown.
 _CROSS_COUPLED = 0.1
@@ -54,8 +54,8 @@ _MODEL_TABLE = [_LOAD, _MODEL, *(_COEFFICIENTS[i] for i in _DIRECT), *_MASSES, _
 def identify_settings(c: Command, campaign: Campaign, method: str, norm: str | None) -> IdentifySettings:
     """Build `IdentifySettings` from options, with the campaign's clearance for the amplitude check."""
     from tpjb_ident.arguments import least_clearance
-    from tpjb_ident.dynamic.estimators.estimate import METHODS, NORMS
-    from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.estimators.estimate import METHODS, NORMS
+    from tpjb_ident.identification.settings import IdentifySettings
 
     refuse_unknown(method, METHODS, "--method")
     if norm is not None:
@@ -79,7 +79,7 @@ def identified(c: Command, campaign: Campaign, method: str, norm: str | None) ->
 
 def write_identification(c: Command, result: Identification) -> None:
     """Write coefficients, estimators, windows and the models over frequency; h over the band where one was excited."""
-    from tpjb_ident.dynamic.results.band_result import frf_frame, models_frame
+    from tpjb_ident.results.band_result import frf_frame, models_frame
 
     if result.bands:
         c.table("frf", frf_frame(result.bands))

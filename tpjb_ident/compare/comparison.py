@@ -26,10 +26,10 @@ from tpjb_ident.compare.predictions import (
     point_columns,
     predict_points,
 )
-from tpjb_ident.dynamic.results.identification import Identification, coefficient_columns
-from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
+from tpjb_ident.results.identification import Identification, coefficient_columns
+from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.identification.settings import IdentifySettings
     from tpjb_ident.pivot import PivotCurve
 
 
@@ -225,8 +225,8 @@ def compare_campaign(
     >>> len(comparison.identification.points), [variant.name for variant in comparison.variants]
     (7, ['rigid'])
     """
-    from tpjb_ident.dynamic.settings import IdentifySettings
     from tpjb_ident.identification.identify import identify
+    from tpjb_ident.identification.settings import IdentifySettings
 
     settings = settings or CompareSettings()
     _check(campaign, settings)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from rigdata.campaign import Campaign
     from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
 #: Set points of both that are the same: share of the load, deg of its direction, share of the frequencies.
 _SAME_POINT = (0.002, 0.5, 0.002)

@@ -22,10 +22,10 @@ from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, Comparison,
 from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.condition_kinds import KINDS
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.point_result import PointResult
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.point_result import PointResult
 
 _METHOD = "table"
 

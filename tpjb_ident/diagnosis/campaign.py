@@ -19,9 +19,9 @@ from tpjb_ident.diagnosis.diagnose import Diagnosis, before_and_after, diagnose,
 from tpjb_ident.diagnosis.forward.forward import SENSOR
 from tpjb_ident.diagnosis.forward.tolerances import Tolerances
 from tpjb_ident.diagnosis.observations.observe import observe, observe_table
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.presentation import Presented
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.static_tests import StaticTests
-    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.results.identification import Identification
 
 
 @dataclass(frozen=True)

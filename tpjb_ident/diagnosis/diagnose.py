@@ -29,13 +29,13 @@ from tpjb_ident.diagnosis.observations.constants import Deciding
 from tpjb_ident.diagnosis.observations.observe import Layout, Observations
 from tpjb_ident.diagnosis.verdict.decide import decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
-from tpjb_ident.dynamic.results.identification import coefficient_columns
+from tpjb_ident.results.identification import coefficient_columns
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
 #: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
 ACCURACY = 1e-5

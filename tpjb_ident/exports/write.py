@@ -26,7 +26,7 @@ from tpjb_ident.schema import STATIC_KEY
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
 #: Tables of an output folder that hold coefficients.
 _RESULT_TABLES = ("coefficients.csv", "prediction.csv")
@@ -155,7 +155,7 @@ def _table(source: Identification | pd.DataFrame | str | Path) -> tuple[pd.DataF
         if reason := contradiction(path):
             raise ExportError(f"{path}: {reason}. Run the command again, or move the file out of its results.")
         return read_table(path), path.parent.resolve().name
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
     if isinstance(source, Identification):
         return source.to_frame(), source.campaign

@@ -10,14 +10,14 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.dynamic.broadband.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
-from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, RunSpectra
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
+from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
+from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.campaign_blocks import calibration_numbers
 from tpjb_ident.identification.point_means import warm_gain
+from tpjb_ident.runs.static_load import LoadMiss
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
 #: F ratio from which an excitation tells the displacements from their noise.

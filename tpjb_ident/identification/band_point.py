@@ -15,11 +15,11 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.dynamic.broadband.clock_rate import common_rates
-from tpjb_ident.dynamic.broadband.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun
+from tpjb_ident.bands.clock_rate import common_rates
+from tpjb_ident.bands.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.runs.excluded_runs import ExcludedRun
 
 #: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
 _TELL_CLOCKS = ("multisine", "random", "impact")

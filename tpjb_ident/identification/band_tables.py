@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.broadband.classic import ClassicLine
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
-from tpjb_ident.dynamic.results.band_result import BandLine, BandResult
-from tpjb_ident.dynamic.results.frequency_model import FrequencyModel, fit_over_frequency, supported
-from tpjb_ident.dynamic.results.point_result import PointResult, mean_position
-from tpjb_ident.dynamic.results.quality import feeds_motion
-from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.estimate.shape import MODELS, real_numbers
+from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
 from tpjb_ident.identification.shared_changes import sources_of, total
+from tpjb_ident.results.band_result import BandLine, BandResult
+from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequency, supported
+from tpjb_ident.results.harmonics import FilmChange, change_conditions
+from tpjb_ident.results.point_result import PointResult, mean_position
+from tpjb_ident.results.quality import feeds_motion
+from tpjb_ident.runs.point_data import pad_means
+from tpjb_ident.runs.static_load import LoadMiss
 
 
 @dataclass(frozen=True)

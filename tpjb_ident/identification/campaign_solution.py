@@ -9,16 +9,16 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.dynamic.corrections.static_load import StaticLoads, static_loads
-from tpjb_ident.dynamic.instruments.harmonics import FilmChange, film_change
-from tpjb_ident.dynamic.runs.finished_runs import RunDigest
-from tpjb_ident.dynamic.runs.point_data import PointData
 from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, film_force, vector
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
 from tpjb_ident.identification.unstated_clocks import with_found_devices
+from tpjb_ident.results.harmonics import FilmChange, film_change
+from tpjb_ident.runs.finished_runs import RunDigest
+from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.runs.static_load import StaticLoads, static_loads
 from tpjb_ident.runtime.executors import Workers, map_ordered
 from tpjb_ident.terms.clock import START, Clock
 from tpjb_ident.terms.mains import (

@@ -8,26 +8,26 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.vector import zero_uncertainty
+from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.conditions import merged
-from tpjb_ident.dynamic.broadband.run_spectra import is_broadband
-from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.quality import with_probe_doubts
-from tpjb_ident.dynamic.runs.baseline import DryTest, dry_test
-from tpjb_ident.dynamic.runs.checked_runs import check_finished
-from tpjb_ident.dynamic.runs.excluded_runs import lost_points, named_runs, without_runs
-from tpjb_ident.dynamic.runs.finished_runs import FinishedRuns
-from tpjb_ident.dynamic.runs.point_data import campaign_points
-from tpjb_ident.dynamic.runs.run_jobs import Progress, all_runs
-from tpjb_ident.dynamic.runs.run_store import RunStore
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.identification.campaign_blocks import unstated
 from tpjb_ident.identification.campaign_solution import solve_campaign
 from tpjb_ident.identification.identify_bands import identify_bands
 from tpjb_ident.identification.methods import own_method
 from tpjb_ident.identification.point import PointTask, finished_point, point_share
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.phasors.mains_frequency import mains_frequency
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.quality import with_probe_doubts
+from tpjb_ident.runs.baseline import DryTest, dry_test
+from tpjb_ident.runs.checked_runs import check_finished
+from tpjb_ident.runs.excluded_runs import lost_points, named_runs, without_runs
+from tpjb_ident.runs.finished_runs import FinishedRuns
+from tpjb_ident.runs.point_data import campaign_points
+from tpjb_ident.runs.run_jobs import Progress, all_runs
+from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime.executors import Workers, map_ordered
 from tpjb_ident.terms.registry import cell_stiffness
 

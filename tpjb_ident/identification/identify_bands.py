@@ -9,15 +9,10 @@ import numpy as np
 
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
+from tpjb_ident.bands.classic import ClassicLine, classic_line
+from tpjb_ident.bands.run_spectra import OPEN_ENDS, is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import merged
-from tpjb_ident.dynamic.broadband.classic import ClassicLine, classic_line
-from tpjb_ident.dynamic.broadband.run_spectra import OPEN_ENDS, is_broadband
-from tpjb_ident.dynamic.corrections.static_load import StaticLoads, static_loads
-from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.runs.checked_runs import campaign_verdicts, check_conditions
-from tpjb_ident.dynamic.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.estimate.blocks import RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
@@ -26,7 +21,12 @@ from tpjb_ident.identification.band_point import BandPoint, band_groups, read_po
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
 from tpjb_ident.identification.band_tables import SolvedBands, band_result
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated, with_start
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
+from tpjb_ident.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
+from tpjb_ident.runs.static_load import StaticLoads, static_loads
 from tpjb_ident.terms.clock import START
 from tpjb_ident.terms.registry import cell_stiffness
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.dynamic.estimators.estimate import estimate_table
-from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
-from tpjb_ident.dynamic.estimators.rlm import RlmSettings
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.runs.point_data import PointData
-from tpjb_ident.dynamic.settings import IdentifySettings
+from tpjb_ident.estimators.estimate import estimate_table
+from tpjb_ident.estimators.r_matrix import phasor_table
+from tpjb_ident.estimators.rlm import RlmSettings
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.runs.point_data import PointData
 
 #: Windows that a run needs, for its mean to be nearly free of each window's own noise.
 _MIN_WINDOWS = 5

@@ -9,15 +9,20 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.check.findings import Verdicts
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.dynamic.corrections.static_load import LoadMiss
-from tpjb_ident.dynamic.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions
-from tpjb_ident.dynamic.estimators.r_matrix import phasor_table
-from tpjb_ident.dynamic.estimators.solved_windows import not_locked
-from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-from tpjb_ident.dynamic.instruments.amplitude import amplitude_slope
-from tpjb_ident.dynamic.instruments.harmonics import FilmChange, change_conditions
-from tpjb_ident.dynamic.results.point_result import PointResult, mean_position
-from tpjb_ident.dynamic.results.quality import (
+from tpjb_ident.estimators.estimate import REJECTED_WEIGHT, estimate_table, fit_conditions
+from tpjb_ident.estimators.r_matrix import phasor_table
+from tpjb_ident.estimators.solved_windows import not_locked
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.identification.campaign_solution import CampaignSolution
+from tpjb_ident.identification.methods import all_methods, disagreement
+from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
+from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.identification.shared_changes import sources_of, total
+from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.results.amplitude import amplitude_slope
+from tpjb_ident.results.harmonics import FilmChange, change_conditions
+from tpjb_ident.results.point_result import PointResult, mean_position
+from tpjb_ident.results.quality import (
     amplitude,
     coherence,
     directional_pattern,
@@ -25,15 +30,10 @@ from tpjb_ident.dynamic.results.quality import (
     flags,
     rejected_windows,
 )
-from tpjb_ident.dynamic.runs.baseline import DryTest
-from tpjb_ident.dynamic.runs.checked_runs import check_conditions
-from tpjb_ident.dynamic.runs.point_data import PointData, pad_means
-from tpjb_ident.dynamic.settings import IdentifySettings
-from tpjb_ident.identification.campaign_solution import CampaignSolution
-from tpjb_ident.identification.methods import all_methods, disagreement
-from tpjb_ident.identification.point_means import MeansTask, channel_windows, clock_turns, vectors, window_times
-from tpjb_ident.identification.shared_changes import sources_of, total
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.runs.baseline import DryTest
+from tpjb_ident.runs.checked_runs import check_conditions
+from tpjb_ident.runs.point_data import PointData, pad_means
+from tpjb_ident.runs.static_load import LoadMiss
 
 #: Name of the method that the solve stands for in the tables.
 SOLVED = "mm-eiv"

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.compare.predictions import Formula
     from tpjb_ident.conditions import Condition
-    from tpjb_ident.dynamic.results.identification import Identification
     from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.results.identification import Identification
 
 
 def write_report(

@@ -13,7 +13,7 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.conditions import SEVERITIES
-from tpjb_ident.dynamic.estimators.stiffness import ENTRIES
+from tpjb_ident.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from tpjb_ident.clearance.measure import ClearancePolygon
     from tpjb_ident.compare.comparison import Comparison
     from tpjb_ident.conditions import Condition
-    from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.dynamic.results.point_result import PointResult
     from tpjb_ident.pivot import PivotCurve
+    from tpjb_ident.results.identification import Identification
+    from tpjb_ident.results.point_result import PointResult
 
 _KINDS_IN_WORDS = {"dynamic": "dynamic", "locus": "shaft locus", "clearance": "clearance sweep",
                   "dry_pivot": "dry pivot test"}  # fmt: skip

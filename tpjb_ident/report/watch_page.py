@@ -26,7 +26,7 @@ from tpjb_ident.runtime.tables import write_text
 from tpjb_ident.watch.next_steps import described, lacking, located
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.results.point_result import PointResult
     from tpjb_ident.watch.next_steps import RunStatus
     from tpjb_ident.watch.watcher import Snapshot
 

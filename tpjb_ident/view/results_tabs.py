@@ -28,7 +28,7 @@ from tpjb_ident.view.records_tab import follow
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
     from tpjb_ident.view.server import Session
 
 #: Frequencies of the curves [Hz].

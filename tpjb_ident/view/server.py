@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.campaign import Campaign
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
 #: The only address that is ever listened on.
 _LOOPBACK = "127.0.0.1"

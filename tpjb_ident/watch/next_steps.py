@@ -16,7 +16,7 @@ from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import SEVERITIES
-from tpjb_ident.dynamic.results.point_result import PointResult
+from tpjb_ident.results.point_result import PointResult
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.

@@ -21,14 +21,14 @@ from tpjb_ident.check.campaign import judged
 from tpjb_ident.check.findings import Finding
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
-from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.dynamic.runs.run_store import RunStore
-from tpjb_ident.dynamic.settings import IdentifySettings
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.pivot import PivotSettings, fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import FileState, NewFiles, Unplanned, file_state, place_record
 from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks

@@ -23,9 +23,9 @@ from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.dynamic.plain import PlainSettings
-    from tpjb_ident.dynamic.runs.run_store import RunStore
+    from tpjb_ident.identification.plain import PlainSettings
     from tpjb_ident.phasors.run_phasors import PhasorSettings
+    from tpjb_ident.runs.run_store import RunStore
 
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
@@ -71,7 +71,7 @@ def identify(
             result = run_identification(source, settings, show, team, store)
         write_identification(c, result)
         if plain or keep_r:
-            from tpjb_ident.dynamic.plain import plain_frame, plain_points, write_r_matrices
+            from tpjb_ident.identification.plain import plain_frame, plain_points, write_r_matrices
 
             plain_settings = _plain_settings(window, norm)
             points = plain_points(source, plain_settings)
@@ -94,7 +94,7 @@ def _finished_runs(target: Path) -> Iterator[RunStore]:
     Results come into the folder whole or not at all; what is stored for a rerun is apart from them, in a folder of
     its own, and goes when the command ends, well or with an error.
     """
-    from tpjb_ident.dynamic.runs.run_store import RunStore
+    from tpjb_ident.runs.run_store import RunStore
 
     store = RunStore(target / KEPT)
     try:
@@ -133,7 +133,7 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
 
 def _plain_settings(window: str, norm: str | None) -> PlainSettings:
     """Build `PlainSettings` from ``--window`` and ``--norm``."""
-    from tpjb_ident.dynamic.plain import PlainSettings
+    from tpjb_ident.identification.plain import PlainSettings
 
     length = parse_amount(window, "time", f"--window {window!r}", "--window '0.5 s'")
     if not length > 0:

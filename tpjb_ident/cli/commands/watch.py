@@ -86,8 +86,8 @@ def _open_watcher(
             f"{folder}: has no campaign.toml. Write one with `tpjb init {folder}` as soon as the first "
             "record is there, and list the runs that you plan."
         )
-    from tpjb_ident.dynamic.runs.run_store import RunStore
-    from tpjb_ident.dynamic.settings import IdentifySettings
+    from tpjb_ident.identification.settings import IdentifySettings
+    from tpjb_ident.runs.run_store import RunStore
     from tpjb_ident.watch.landing import NewFiles
     from tpjb_ident.watch.watcher import Watcher
 

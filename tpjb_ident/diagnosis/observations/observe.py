@@ -21,10 +21,10 @@ from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
 from tpjb_ident.compare.coefficient_table import read_coefficients
 from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
-from tpjb_ident.dynamic.results.identification import Identification
-from tpjb_ident.dynamic.results.point_result import PointResult
-from tpjb_ident.dynamic.runs.point_data import pad_means
 from tpjb_ident.pivot.curve import PivotCurve
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.runs.point_data import pad_means
 from tpjb_ident.terms.mains import MAINS_CORRECTED, MAINS_ON_LINE
 
 

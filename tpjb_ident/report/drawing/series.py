@@ -16,7 +16,7 @@ from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
-    from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.results.point_result import PointResult
 
 #: Column that a series runs over, its quantity and its name.
 _AXES = {

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tpjb_ident.compare.comparison import Comparison
-    from tpjb_ident.dynamic.results.band_result import BandResult
-    from tpjb_ident.dynamic.results.frequency_model import FrequencyModel
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.band_result import BandResult
+    from tpjb_ident.results.frequency_model import FrequencyModel
+    from tpjb_ident.results.identification import Identification
 
 #: Intervals of a smaller share [%] are hidden by their marks: then differences get a panel of their own.
 _SMALL = 5.0
@@ -256,7 +256,7 @@ def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.Da
     """Rows as in ``frf.csv`` (without coherence where sines were run), and the model through them."""
     import pandas as pd
 
-    from tpjb_ident.dynamic.results.identification import Identification
+    from tpjb_ident.results.identification import Identification
 
     if isinstance(source, Identification):
         series = longest_series(source.to_frame(), "frequency")
@@ -265,7 +265,7 @@ def _frf_rows(source: BandResult | Identification | pd.DataFrame) -> tuple[pd.Da
         if "hxx_real_N_per_m" in source:
             return source.sort_values("excitation_Hz", kind="stable"), None
         return _rows_of_sines(longest_series(source, "frequency")), None
-    from tpjb_ident.dynamic.results.band_result import frf_frame
+    from tpjb_ident.results.band_result import frf_frame
 
     model = source.models.get(source.supported)
     return frf_frame([source]), model

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rigdata.run import Run
-    from tpjb_ident.dynamic.estimators.stiffness import DynamicStiffness
-    from tpjb_ident.dynamic.results.identification import Identification
-    from tpjb_ident.dynamic.results.point_result import PointResult
+    from tpjb_ident.estimators.stiffness import DynamicStiffness
+    from tpjb_ident.results.identification import Identification
+    from tpjb_ident.results.point_result import PointResult
 
 #: More samples could not be told apart.
 _MOST_SAMPLES = 4000

@@ -1,0 +1,388 @@
+"""Models over frequency, lines, windows, amplitude and calibration: answers that can be written down beforehand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from scipy.stats import t as student_t
+
+from rigdata.operating_point import OperatingPoint
+from tests.phasors import phasor_cases
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimate.blocks import RigStiffness
+from tpjb_ident.phasors.lines import Line, LineSet, LineSettings, known_lines
+from tpjb_ident.phasors.windows import WindowSettings, line_design, plan_windows, variance_inflation
+from tpjb_ident.results.amplitude import MIN_RATIO, NOTABLE, SIGNIFICANCE, AmplitudeSlope, amplitude_slope
+from tpjb_ident.results.frequency_model import REFUSED, fit_over_frequency, fits_over_frequency
+from tpjb_ident.runs.baseline import DryTest
+
+K = np.array([[2.0e8, 1e7], [-3e7, 4.0e8]])
+C = np.array([[4e5, 2e4], [-1e4, 6e5]])
+M = np.array([[30.0, 4.0], [-2.0, 50.0]])
+OMEGAS = 2 * np.pi * np.array([15.0, 25.0, 40.0, 60.0])
+
+
+def estimate(omega, mass=0.0, off=0.0, error=1e6, covariance=None):
+    h = K - mass * omega**2 * M + 1j * omega * C + off
+    return phasor_cases.stiff(h, float(omega), error**2 * np.eye(8) if covariance is None else covariance)
+
+
+def test_stiffness_and_damping_that_are_there_are_found_exactly():
+    fit = fit_over_frequency([estimate(w) for w in OMEGAS], "K-C")
+    np.testing.assert_allclose(fit.parameters, np.concatenate([K.ravel(), C.ravel()]), rtol=1e-9)
+    assert fit.chi_square < 1e-3
+    assert fit.misfit < 1e-9
+    assert (fit.spare, fit.n_frequencies) == (24, 4)
+    np.testing.assert_allclose(fit.band, (15.0, 60.0), rtol=1e-12)
+    np.testing.assert_allclose(fit.h(100.0), K + 100j * C, rtol=1e-9)
+    # equal errors: K is a mean, C a slope through the origin
+    expected = np.repeat([1e6**2 / 4, 1e6**2 / np.sum(OMEGAS**2)], 4)
+    np.testing.assert_allclose(np.diag(fit.covariance), expected, rtol=1e-9)
+    np.testing.assert_allclose(fit.covariance - np.diag(np.diag(fit.covariance)), 0.0, atol=1e-3)
+    np.testing.assert_allclose(fit.standard_error, np.sqrt(expected), rtol=1e-9)
+
+
+def test_a_mass_is_found_and_its_want_refused():
+    given = [estimate(w, mass=1.0, error=1e5) for w in OMEGAS]
+    fit = fit_over_frequency(given, "K-C-M")
+    np.testing.assert_allclose(fit.parameters[8:], M.ravel(), rtol=1e-6)
+    np.testing.assert_allclose(fit.parameters[:4], K.ravel(), rtol=1e-9)
+    np.testing.assert_allclose(fit.h(200.0), K - 200.0**2 * M + 200j * C, rtol=1e-8)
+    assert fit.spare == 20
+    assert not fit.refused
+    without = fit_over_frequency(given, "K-C")
+    assert without.refused
+    worst = max(np.linalg.norm(without.h(e.omega) - e.h) / np.linalg.norm(e.h) for e in given)
+    assert without.misfit == pytest.approx(worst)
+    assert without.probability == pytest.approx(float(chi2.sf(without.chi_square, 24)))
+    inflated = np.sqrt(np.diag(without.covariance) * without.chi_square / 24)
+    np.testing.assert_allclose(without.standard_error, inflated, rtol=1e-12)
+
+
+def test_chi_square_is_the_weighted_sum_of_what_is_left():
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((8, 8))
+    spread = 1e10 * (root @ root.T + np.eye(8))
+    given = [estimate(w, off=1e6 * (rng.standard_normal((2, 2)) + 1j), covariance=(k + 1) * spread)
+             for k, w in enumerate(OMEGAS)]  # fmt: skip
+    for model in ("K-C", "K-C-M"):
+        fit = fit_over_frequency(given, model)
+        left = 0.0
+        for est in given:
+            miss = est.h - fit.h(est.omega)
+            vector = np.concatenate([miss.real.ravel(), miss.imag.ravel()])
+            left += vector @ np.linalg.solve(est.covariance, vector)
+        assert fit.chi_square == pytest.approx(left, rel=1e-6)
+        turned = fit_over_frequency(given[::-1], model)
+        np.testing.assert_allclose(turned.parameters, fit.parameters, rtol=1e-9)
+
+
+def test_one_frequency_is_its_own_answer():
+    fit = fit_over_frequency([estimate(OMEGAS[1])], "K-C")
+    np.testing.assert_allclose(fit.parameters[4:], C.ravel(), rtol=1e-9)
+    assert fit.spare == 0
+    assert math.isnan(fit.probability)
+    assert not fit.refused
+    np.testing.assert_allclose(fit.standard_error, np.sqrt(np.diag(fit.covariance)))
+    # two estimates at one frequency: the second model still needs another
+    twice = [estimate(OMEGAS[1]), estimate(OMEGAS[1])]
+    assert fit_over_frequency(twice, "K-C").spare == 8
+    with pytest.raises(ValueError, match="K-C-M needs 2 frequencies with an answer, got 1"):
+        fit_over_frequency(twice, "K-C-M")
+    with pytest.raises(ValueError, match="K-C needs 1 frequencies with an answer, got 0"):
+        fit_over_frequency([replace(twice[0], h=np.full((2, 2), np.nan + 0j))], "K-C")
+    with pytest.raises(ValueError, match="unknown model 'K'"):
+        fit_over_frequency(twice, "K")
+
+
+def test_estimates_without_an_interval_are_left_out():
+    lost = replace(estimate(OMEGAS[2], off=1e9), covariance=np.full((8, 8), np.nan))
+    fit = fit_over_frequency([estimate(OMEGAS[0]), lost, estimate(OMEGAS[3])], "K-C")
+    np.testing.assert_allclose(fit.parameters[:4], K.ravel(), rtol=1e-9)
+    assert fit.n_frequencies == 2
+
+
+def test_a_gain_that_all_frequencies_share_is_in_the_interval_as_it_is_in_theirs():
+    gain = 0.01 * np.array([estimate(w).vector for w in OMEGAS])
+    given = [replace(estimate(w, error=1.0), systematic=np.outer(g, g)) for w, g in zip(OMEGAS, gain, strict=True)]
+    fit = fit_over_frequency(given, "K-C", gain.reshape(1, -1))
+    truth = np.concatenate([K.ravel(), C.ravel()])
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.systematic)), np.abs(0.01 * truth), rtol=1e-6)
+    # each frequency's own errors average out
+    single = fit_over_frequency(given, "K-C")
+    np.testing.assert_allclose(np.diag(single.systematic)[:4], (0.01 * K.ravel()) ** 2 / 4, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_intervals_over_frequency_hold_the_truth():
+    rng = np.random.default_rng(11)
+    dof, draws, inside = 16.0, 400, 0
+    truth = np.concatenate([K.ravel(), C.ravel()])
+    for _ in range(draws):
+        common = 0.003 * rng.standard_normal()
+        given, changes = [], []
+        for w in OMEGAS[:3]:
+            exact = estimate(w)
+            error = 1e6 * rng.standard_normal(8)
+            measured = 1e12 * np.eye(8) * rng.chisquare(dof) / dof
+            h = exact.h * (1 + common) + error[:4].reshape(2, 2) + 1j * error[4:].reshape(2, 2)
+            change = 0.003 * exact.vector
+            given.append(
+                replace(exact, h=h, covariance=measured, dof=np.full(8, dof), systematic=np.outer(change, change))
+            )
+            changes.append(change)
+        fit = fit_over_frequency(given, "K-C", np.concatenate(changes)[None])
+        inside += np.count_nonzero(np.abs(fit.parameters - truth) < fit.half_width())
+    assert 0.93 < inside / (8 * draws) < 0.98
+
+
+def point(stiffness, load=5000.0, direction=-90.0, speed=22.0):
+    where = OperatingPoint(load, math.radians(direction), 2 * math.pi * speed)
+    return SimpleNamespace(point=where, stiffness=stiffness)
+
+
+@pytest.mark.parametrize(("mass", "wild", "supported"), [(0.0, 0.0, "K-C"), (1.0, 0.0, "K-C-M"), (0.0, 3e7, "raw H")])
+def test_the_simplest_model_that_is_not_refused_is_supported(mass, wild, supported):
+    off = wild * np.array([1, -1, 1, -1])
+    points = tuple(point(estimate(w, mass, o, error=1e5)) for w, o in zip(OMEGAS, off, strict=True))
+    (found,) = fits_over_frequency(points)
+    assert found.supported == supported
+    assert set(found.fits) == {"K-C", "K-C-M"}
+    assert found.points == points
+
+
+def test_loads_directions_and_speeds_are_fitted_apart():
+    two = OMEGAS[:2]
+    places = ((5e3, -90, 22), (6e3, -90, 22), (5e3, -60, 22), (5e3, -90, 33))
+    points = [point(estimate(w), *place) for w in two for place in places]
+    points.append(point(estimate(two[0]), load=7e3))  # alone at its load
+    points += [point(estimate(two[0]), load=8e3), point(replace(estimate(two[1]), h=np.full((2, 2), np.nan)), load=8e3)]
+    found = fits_over_frequency(tuple(points))
+    assert [len(f.points) for f in found] == [2, 2, 2, 2]
+    assert 0.0 < REFUSED < 0.05
+
+
+def lines_of(found):
+    return [(line.name, line.frequency) for line in found.nuisance]
+
+
+def test_every_kind_of_line_has_its_place_and_order():
+    settings = LineSettings(mains=60.0, shaft_harmonics=3, drive_harmonics=3, mains_harmonics=2)
+    found = known_lines((33.0, 25.0), 10.0, 1000.0, settings, extra=(71.3,))
+    assert [e.frequency for e in found.excitation] == [25.0, 33.0]
+    assert lines_of(found) == [
+        ("1X", 10.0), ("2X", 20.0), ("3X", 30.0), ("mains", 60.0), ("mains 2", 120.0),
+        ("harmonic 2", 50.0), ("harmonic 3", 75.0), ("harmonic 2", 66.0), ("harmonic 3", 99.0), ("found", 71.3),
+    ]  # fmt: skip
+    np.testing.assert_array_equal(found.frequencies[:3], [25.0, 33.0, 10.0])
+    moved = found.at_speed(11.0)
+    assert lines_of(moved)[:3] == [("1X", 11.0), ("2X", 22.0), ("3X", 33.0)]
+    assert lines_of(moved)[3:] == lines_of(found)[3:]
+    assert (found.speed, moved.speed) == (10.0, 11.0)
+    assert known_lines((25.0, 25.0), 0.0, 1000.0, LineSettings(mains=0.0)).frequencies.tolist() == [25.0, 50.0]
+
+
+@pytest.mark.parametrize(("speed", "coincident"), [(24.93, True), (24.91, False), (25.08, True), (25.09, False)])
+def test_a_shaft_within_its_wander_strikes_the_excitation(speed, coincident):
+    found = known_lines((25.0,), speed, 1000.0)
+    assert (found.conditions == ("1X on excitation line",)) is coincident
+    assert ("1X" in [name for name, _ in lines_of(found)]) is (not coincident)
+
+
+@pytest.mark.parametrize(
+    ("speed", "names"), [(12.45, ["1X"]), (12.41, ["1X", "2X"]), (12.57, ["1X"]), (12.6, ["1X", "2X"])]
+)
+def test_a_second_harmonic_wanders_twice_as_far(speed, names):
+    found = known_lines((25.0,), speed, 1000.0, LineSettings(mains=0.0, drive_harmonics=1))
+    assert [name for name, _ in lines_of(found)] == names
+
+
+def test_lines_closer_than_either_wanders_are_one():
+    settings = LineSettings(drive_harmonics=1)
+    assert [n for n, _ in lines_of(known_lines((30.0,), 49.9, 1000.0, settings))] == ["1X", "2X"]
+    assert [n for n, _ in lines_of(known_lines((30.0,), 49.8, 1000.0, settings))] == ["1X", "2X", "mains"]
+
+
+def test_what_a_record_cannot_tell_apart_is_one_line_the_shafts_before_the_films():
+    """25 Hz at 50.2 Hz: the film's second harmonic is the shaft's line in 2 s, another one in 4 s."""
+    settings = LineSettings(mains=60.0)
+    short, long = (known_lines((25.0,), 50.2, 1000.0, settings, (), duration) for duration in (2.0, 4.0))
+    assert ("1X", 50.2) in lines_of(short)
+    assert "harmonic 2" not in [n for n, _ in lines_of(short)]
+    assert {("1X", 50.2), ("harmonic 2", 50.0)} < set(lines_of(long))
+
+
+def test_faint_lines_are_those_of_the_whole_record_unless_they_stand_out():
+    found = known_lines((25.0,), 22.0, 1000.0, None, (66.0, 71.0), 4.0)
+    assert [(line.name, line.frequency) for line in found.faint] == [
+        ("4X", 88.0), ("harmonic 3", 75.0), ("2X-f", 19.0), ("2f-X", 28.0)
+    ]  # fmt: skip
+    assert lines_of(found)[3:] == [("3X", 66.0), ("found", 71.0)]
+    assert [line.frequency for line in found.at_speed(22.5).faint] == [90.0, 75.0, 20.0, 27.5]
+    # |2X - f| falls where 2X is below f
+    assert known_lines((50.0,), 22.0, 1000.0).at_speed(22.5).faint[-2].frequency == 5.0
+    assert known_lines((65.0,), 22.0, 1000.0).conditions == ()
+    assert known_lines((66.0,), 22.0, 1000.0).conditions == ("3X on excitation line",)
+
+
+def test_what_film_and_shaft_make_at_next_to_no_frequency_is_the_mean():
+    names = [line.name for line in known_lines((25.0,), 50.02, 1000.0, duration=2.0).whole]
+    assert "2f-X" not in names
+    assert "2f-X" in [line.name for line in known_lines((25.0,), 47.0, 1000.0, duration=2.0).whole]
+
+
+@pytest.mark.parametrize("frequencies", [(), (0.0,), (-5.0,), (450.0,), (600.0,), (25.0, 460.0)])
+def test_excitations_outside_the_band_are_refused(frequencies):
+    with pytest.raises(ValueError, match="between 0 and 450 Hz"):
+        known_lines(frequencies, 22.0, 1000.0)
+    assert known_lines((449.0,), 22.0, 1000.0).excitation[0].frequency == 449.0
+    assert "harmonic 2" not in [n for n, _ in lines_of(known_lines((230.0,), 22.0, 1000.0))]
+
+
+def test_columns_are_phasors_and_a_straight_drift():
+    time = 3.0 + np.arange(400) / 1000.0
+    design = line_design(time, np.array([20.0, 35.0]))
+    z = np.array([1.0 - 2.0j, 0.5j])
+    wave = sum((a * np.exp(2j * np.pi * f * time)).real for a, f in zip(z, (20.0, 35.0), strict=True))
+    coefficients = np.array([z[0].real, z[0].imag, z[1].real, z[1].imag, 7.0, -3.0])
+    np.testing.assert_allclose(design @ coefficients, wave + 7.0 - 3.0 * np.linspace(-1, 1, 400), atol=1e-12)
+    assert line_design(time, np.array([20.0]), drift_order=0).shape == (400, 3)
+    assert np.isfinite(line_design(time[:1], np.array([20.0]))).all()
+
+
+def test_inflation_is_the_variance_of_a_phasor_over_that_of_the_line_alone():
+    """One line over whole cycles: one; a neighbour half a beat away: from the Gram matrix of both."""
+    for alone in ([20.0], [25.0, 20.0]):
+        assert variance_inflation(np.array(alone), 1, 1.0, 1000.0) == pytest.approx(1.0, abs=0.02)
+    assert variance_inflation(np.array([25.0, 25.0]), 1, 1.0, 1000.0) == math.inf
+    frequencies, length = np.array([20.0, 21.3, 33.0]), 0.5
+    design = line_design(np.arange(500) / 1000.0, frequencies)
+    covariance = np.linalg.inv(design.T @ design) * 500 / 2
+    by_hand = np.diag(covariance)[:2].max()
+    assert variance_inflation(frequencies, 1, length, 1000.0) == pytest.approx(by_hand, rel=0.03)
+    every = np.diag(covariance)[:4].max()
+    assert variance_inflation(frequencies, 2, length, 1000.0) == pytest.approx(every, rel=0.03)
+    # as many samples as unknowns tell nothing
+    assert variance_inflation(np.array([20.0, 33.0]), 1, 0.006, 1000.0) == math.inf
+
+
+LINES = known_lines((25.0,), 22.0, 1000.0)
+
+
+def test_windows_are_as_long_as_asked_or_as_many_as_wished():
+    fixed = WindowSettings(length=0.8)
+    assert plan_windows(5000, 1000.0, LINES, fixed) == (800, 6)
+    assert plan_windows(4800, 1000.0, LINES, fixed) == (800, 6)
+    assert plan_windows(40_000, 1000.0, LINES, WindowSettings(target_count=8)) == (5000, 8)
+    length, count = plan_windows(3000, 1000.0, LINES, WindowSettings(max_inflation=1.05))
+    other, more = plan_windows(3000, 1000.0, LINES, WindowSettings(max_inflation=2.0))
+    assert length > other
+    assert count < more
+    alone = LineSet((Line("excitation", 25.0),), ())
+    assert plan_windows(3000, 1000.0, alone, WindowSettings(min_cycles=10.0, target_count=100))[0] >= 400
+    assert plan_windows(3000, 1000.0, alone, WindowSettings(min_cycles=4.0, target_count=100))[0] < 250
+
+
+H = K + 1j * OMEGAS[1] * C
+
+
+def shaken(factors, direction, stiffening=0.0, off=None):
+    """Runs of one direction, each `factors` times as hard; h changes with the logarithm of the amplitude."""
+    axis = np.array([math.cos(direction), math.sin(direction)])
+    runs, D, F = [], [], []
+    for k, factor in enumerate(factors):
+        moved = 1e-5 * factor * axis * np.exp(0.3j)
+        change = stiffening * math.log2(np.linalg.norm(moved) / 1e-5) + (0.0 if off is None else off[k])
+        runs.append(SimpleNamespace(direction=direction))
+        D.append(moved)
+        F.append((1 + change) * H @ moved)
+    return runs, D, F
+
+
+def data_of(*groups):
+    runs = [run for g in groups for run in g[0]]
+    D, F = (np.array([row for g in groups for row in g[k]]) for k in (1, 2))
+    repeated = np.repeat(np.arange(len(runs)), 3)
+    return SimpleNamespace(runs=runs, D=D[repeated], F=F[repeated], run_index=repeated)
+
+
+def test_a_stiffening_with_amplitude_is_found_exactly_and_units_do_not_matter():
+    data = data_of(shaken((1.0, 2.0), 0.2, 0.05), shaken((0.5, 1.0, 3.0), 1.1, 0.05))
+    found = amplitude_slope(data, H, np.ones(15))
+    assert found.stiffening == pytest.approx(0.05, rel=1e-9)
+    assert found.standard_error < 1e-9
+    assert found.runs == 5
+    data.D, data.F = 1e3 * data.D, 1e-2 * data.F
+    assert amplitude_slope(data, 1e-5 * H, np.ones(15)).stiffening == pytest.approx(0.05, rel=1e-9)
+
+
+def test_what_a_direction_is_off_as_a_whole_is_no_amplitude_effect():
+    data = data_of(shaken((1.0, 2.0), 0.2, 0.05, (0.2, 0.2)), shaken((1.0, 2.0, 4.0), 1.1, 0.05, (-0.1, -0.1, -0.1)))
+    assert amplitude_slope(data, H, np.ones(15)).stiffening == pytest.approx(0.05, rel=1e-6)
+    # opposite directions are one
+    both = data_of(shaken((1.0,), 0.2, 0.05), shaken((2.0,), 0.2 + math.pi, 0.05), shaken((1.0, 2.0, 4.0), 1.1, 0.05))
+    assert amplitude_slope(both, H, np.ones(15)).runs == 5
+
+
+def test_its_error_is_that_of_a_slope_within_directions():
+    off = np.array([0.01, -0.01, 0.02, -0.03, 0.01])
+    factors = (1.0, 2.0, 4.0, 8.0, 16.0)
+    found = amplitude_slope(data_of(shaken(factors, 0.4, 0.0, off)), H, np.ones(15))
+    x = np.log2(factors) - 2.0
+    slope = x @ off / (x @ x)
+    left = off - off.mean() - slope * x
+    assert found.stiffening == pytest.approx(slope, rel=1e-9)
+    assert found.standard_error == pytest.approx(math.sqrt(left @ left / 3 / (x @ x)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(MIN_RATIO * 1.01, True), (MIN_RATIO * 0.99, False)])
+def test_amplitudes_must_differ_to_tell_anything(ratio, told):
+    data = data_of(shaken((1.0, ratio), 0.2), shaken((1.0, ratio), 1.1))
+    assert (amplitude_slope(data, H, np.ones(12)) is not None) is told
+
+
+def test_too_few_runs_and_windows_without_weight_tell_nothing():
+    assert amplitude_slope(data_of(shaken((1.0, 2.0), 0.2)), H, np.ones(6)) is None
+    data = data_of(shaken((1.0, 2.0, 4.0), 0.2, 0.05), shaken((1.0, 2.0), 1.1, 0.05))
+    weights = np.where(data.run_index == 1, 0.0, 1.0)
+    assert amplitude_slope(data, H, weights).runs == 4
+    spoilt = np.where(np.arange(15) % 3 == 0, 0.0, 1.0)
+    data.F = data.F + 1e4 * (spoilt == 0)[:, None]
+    assert amplitude_slope(data, H, spoilt).stiffening == pytest.approx(0.05, rel=1e-9)
+    data.runs[0].direction = None
+    assert amplitude_slope(data, H, spoilt).runs == 4
+    assert amplitude_slope(data, np.full((2, 2), np.nan), spoilt) is None
+
+
+def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():
+    limit = float(student_t.isf(SIGNIFICANCE / 2, 4))
+    assert AmplitudeSlope(0.0101 + limit * 0.01, 0.01, 6).significant
+    assert not AmplitudeSlope(0.99 * limit * 0.01, 0.01, 6).significant
+    assert AmplitudeSlope(-1.01 * limit * 0.01, 0.01, 6).significant
+    assert not AmplitudeSlope(0.99 * NOTABLE, 1e-9, 6).significant
+    assert AmplitudeSlope(1.01 * NOTABLE, 1e-9, 2).significant
+    assert AmplitudeSlope(0.001, 1e-9, 6).condition() == ()
+    (said,) = AmplitudeSlope(-0.123, 0.004, 6).condition()
+    assert said == "nonlinear-amplitude"
+    assert "-12.3 %" in said.detail
+    assert "0.4 %" in said.detail
+
+
+def test_baseline_runs_without_an_answer_are_named_where_no_other_baseline_reaches():
+    failed = Condition("baseline-missing", "the baseline runs at 15 Hz give no answer: two directions are needed")
+    known = RigStiffness(OMEGAS[1:3], np.zeros((2, 2, 2), complex), np.zeros((2, 8, 8)))
+    assert [DryTest(conditions=(failed,)).missing(omega) for omega in OMEGAS] == [(failed,)] * len(OMEGAS)
+    assert [bool(DryTest(known, (failed,)).missing(omega)) for omega in OMEGAS] == [True, False, False, True]
+    assert DryTest().missing(OMEGAS[0]) == ()
+
+
+def test_the_bare_rig_is_linear_between_its_frequencies_and_nothing_beyond():
+    h = np.array([np.eye(2), 3 * np.eye(2)]) * (1e7 + 1e6j)
+    known = RigStiffness(np.array([100.0, 200.0]), h, np.zeros((2, 8, 8)))
+    np.testing.assert_allclose(known.at(np.array([100.0, 150.0, 201.0])), h[[0, 0, 1]] * [[[1.0]], [[2.0]], [[1.0]]])
+    np.testing.assert_array_equal(known.at(np.array([97.0, 205.0])), 0.0)

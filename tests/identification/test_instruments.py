@@ -1,0 +1,128 @@
+"""What records give away of their instruments: clocks, slower channels, accelerometers, cells that were not tared."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata import load_campaign
+from tests.rigs.campaign_file import plans_of, write_campaign
+from tests.rigs.field_conditions import Row, judge, rows
+from tests.rigs.field_rig import Device, Rig
+from tpjb_ident.check.set_points import without_static_part
+from tpjb_ident.identification.identify import identify
+from tpjb_ident.identification.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
+from tpjb_ident.identification.settings import IdentifySettings
+from tpjb_ident.phasors.compensation import SlowerChannel, slower_channel
+from tpjb_ident.results.frequency_model import chance_of
+from tpjb_ident.runs.static_load import cell_zero
+
+ONE_LOAD = plans_of(loads=(5000.0,))
+QUICK = replace(Rig(), seconds=2.0, rate=1000.0)
+
+
+def written(tmp_path, rig, plans=ONE_LOAD, seed=1):
+    path = tmp_path / "field.h5"
+    write_campaign(path, rig, plans, seed)
+    return path
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("slow", [150.0, 400.0])
+def test_a_channel_that_was_filled_up_is_told_with_its_rate(slow, held):
+    rng = np.random.default_rng(1)
+    t, own = np.arange(8000) / 2000.0, np.arange(-1, 700 * 4) / slow + 0.0007
+    values = np.sin(2 * np.pi * 25 * own) + 0.01 * rng.standard_normal(len(own))
+    filled = values[np.searchsorted(own, t, side="right") - 1] if held else np.interp(t, own, values)
+    found = slower_channel(filled, 2000.0)
+    assert found is not None
+    assert found.order == (1 if held else 2)
+    assert found.rate == pytest.approx(slow, rel=1e-4)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-3, 0.05])
+def test_a_channel_at_its_own_rate_is_not(step):
+    rng = np.random.default_rng(2)
+    t = np.arange(8000) / 2000.0
+    values = np.sin(2 * np.pi * 25 * t) + 2 * np.sin(2 * np.pi * 22 * t) + 0.01 * rng.standard_normal(len(t))
+    assert slower_channel(np.round(values / step) * step if step else values, 2000.0) is None
+
+
+def test_straight_lines_make_a_sine_smaller_by_sinc_squared():
+    assert SlowerChannel(300.0, 2000.0, 2).at(np.array([25.0]))[0] == pytest.approx(np.sinc(25 / 300) ** 2)
+    held = SlowerChannel(250.0, 2000.0, 1).at(np.array([25.0]))[0]
+    assert np.angle(held) == pytest.approx(-np.pi * 25 * (1 / 250 - 1 / 2000))
+
+
+def test_a_zero_of_the_cells_is_told_from_a_gain_by_the_loads():
+    rng = np.random.default_rng(3)
+    loads = np.repeat([2500.0, 5000.0, 8750.0], 6) * -1j
+    means = 1.01 * loads * (1 + 0.003 * rng.standard_normal(18)) + (120 - 300j)
+    found = cell_zero(means, loads)
+    assert abs(found.force - (120 - 300j)) < 40
+    assert found.conditions() == ("cells-not-tared",)
+    assert cell_zero(means, loads, stated=5.0).force == 0  # a load that is really off
+    assert cell_zero(1.01 * loads * (1 + 0.003 * rng.standard_normal(18)), loads).force == 0
+    assert cell_zero(means[:6], loads[:6]).force == 0  # one load
+
+
+def test_cells_without_static_part_are_no_cells_of_wrong_gain():
+    rng = np.random.default_rng(4)
+    assert without_static_part(1e-3 * (rng.standard_normal(12) + 1j * rng.standard_normal(12)))
+    assert not without_static_part(0.01 * (1 + 0.003 * rng.standard_normal(12)) + 0j)
+
+
+def test_chance_knows_how_well_covariances_are_known():
+    assert chance_of(30.0, 20, (np.inf,) * 3) == pytest.approx(0.0699, abs=1e-3)
+    assert chance_of(60.0, 20, (8.0,) * 3) > 100 * chance_of(60.0, 20, (np.inf,) * 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", rows(), ids=lambda r: r.name)
+def test_no_condition_of_the_battery_is_wrong_without_a_word(row: Row, tmp_path):
+    path = tmp_path / "field.h5"
+    write_campaign(path, row.rig, row.plans, 7, row.extra)
+    word, worst = judge(path, row.rig)  # a crash raises
+    assert word != "silent" or worst < 4
+
+
+@pytest.mark.slow
+def test_clocks_slower_cells_and_late_channels_are_named(tmp_path):
+    def names(**devices):
+        path = written(tmp_path, replace(QUICK, devices=devices))
+        return {str(c) for p in identify(load_campaign(path)).points for c in p.quality}
+
+    assert "clocks-differ" in names(F1=Device(rate_error=3e-4), F2=Device(rate_error=3e-4))
+    assert "slower-channels" in names(F1=Device(slow=200.0), F2=Device(slow=200.0))
+    assert "cells-and-accelerometers-out-of-phase" in names(F1=Device(lag=1e-3), F2=Device(lag=1e-3))
+    assert names() == set()
+
+
+@pytest.mark.slow
+def test_plain_is_statsmodels_on_the_r_matrix(tmp_path):
+    import h5py
+    import statsmodels.api as sm
+
+    campaign = load_campaign(written(tmp_path, QUICK))
+    points = plain_points(campaign, PlainSettings(0.5))
+    write_r_matrices(tmp_path / "r.h5", points)
+    with h5py.File(tmp_path / "r.h5") as file:
+        R, f = file["point-000/R"][()], file["point-000/f"][()]
+    X = np.block([[R.real, -R.imag], [R.imag, R.real]])[:, [0, 1, 4, 5]]
+    rows_x = np.r_[0 : len(f) : 2, len(f) : 2 * len(f) : 2]
+    y = np.concatenate([f.real, f.imag])[rows_x]
+    scale = 1e8  # of order one, as statsmodels' tolerance is absolute
+    own = sm.RLM(y, X[rows_x] * scale, M=sm.robust.norms.HuberT()).fit(maxiter=500, tol=1e-12)
+    frame = plain_frame(points, PlainSettings(0.5))
+    assert frame["kxx_N_per_m"][0] == pytest.approx(own.params[0] * scale, rel=1e-6)
+    assert frame["kxx_N_per_m_se"][0] == pytest.approx(own.bse[0] * scale, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_budget_is_the_interval(tmp_path):
+    result = identify(load_campaign(written(tmp_path, QUICK)), IdentifySettings())
+    (p,) = result.points
+    total = np.sum([np.diag(part) for part in p.budget.values()], axis=0)
+    whole = np.diag(p.stiffness.covariance) + np.diag(p.stiffness.systematic)
+    np.testing.assert_allclose(total, whole, rtol=1e-9)
+    assert result.budget_frame().groupby("coefficient")["share"].sum().to_numpy() == pytest.approx(1.0)

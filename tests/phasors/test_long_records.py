@@ -1,0 +1,85 @@
+"""Long records: read once, block by block, with the same phasors as the plain way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from tests.identification.test_identify import rig
+from tests.rigs.held_run import POINT, held_run
+from tpjb_ident.phasors.extraction import extract
+from tpjb_ident.phasors.line_fit import BLOCK, LineFitter, WaveBlocks
+from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.reading_cache import SHORT
+from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.phasors.windows import WindowSettings, line_design
+
+FREQUENCIES = np.array([25.0, 22.0, 44.0, 50.0])
+
+
+@pytest.fixture(scope="module")
+def run(campaign_of):
+    timing = {"dynamic_rate": 5000.0, "dynamic_seconds": 8.0}
+    path = campaign_of(rig([(5000.0, 25.0)], seed=4, **timing, directions=(0.3,)))
+    return load_campaign(path).of_kind("dynamic")[0]
+
+
+@pytest.mark.parametrize("length", [2 * BLOCK, 5 * BLOCK + 17, 6 * BLOCK - 1])
+def test_blocks_are_the_plain_columns(length):
+    rng = np.random.default_rng(length)
+    rows, coefficients = rng.standard_normal((3, length)), rng.standard_normal((3, 10))
+    design = line_design(np.arange(length) / 1000.0, FREQUENCIES)
+    blocks = WaveBlocks(length, 1000.0, FREQUENCIES)
+    np.testing.assert_allclose(blocks.project(rows), rows @ design, rtol=0, atol=1e-11 * length)
+    expected = rows - coefficients @ design.T
+    blocks.subtract(rows, coefficients)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)
+
+
+def test_a_kept_file_serves_many_requests_and_lets_go(run):
+    reader = run.reader
+    with reader.opened():
+        parts = [reader.read(["X1A"], i, i + 500)[0] for i in range(0, 5000, 500)]
+    np.testing.assert_array_equal(np.concatenate(parts), reader.read(["X1A"], 0, 5000)[0])
+    assert reader.opened_members == {}
+    with pytest.raises(KeyError, match="mine"), reader.opened():
+        raise KeyError("mine")  # no fault of the file
+    assert reader.opened_members == {}
+
+
+@pytest.mark.slow
+def test_a_long_run_is_read_once_and_says_the_same():
+    """Beyond SHORT samples lines are looked for in the beginning; the shaft is off its set point here."""
+
+    point = replace(POINT, shaft_speed=2 * np.pi * 22.01)
+    long = held_run(5, 10_000.0, 40.0, point)
+    assert long.length > 2 * SHORT
+    settings = PhasorSettings(windows=WindowSettings(length=2.0))
+    once = run_phasors(long, 30.0, settings)
+    # all six channels once, and the beginning for a look
+    samples = sum(len(names) * (stop - start) for names, start, stop in long.reader.asked)
+    assert samples < 6 * (long.length + SHORT + 2**15)
+    plain = extract(long, 30.0, settings, known_lines((25.0,), 22.0, long.sample_rate))
+    size = np.abs(plain.displacement.phasors[:, 0]).max()
+    np.testing.assert_allclose(once.displacement.phasors[:, 0], plain.displacement.phasors[:, 0], atol=2e-4 * size)
+    assert once.lines.frequencies[1] == pytest.approx(22.0, abs=1e-4)
+
+
+def test_a_few_outliers_of_a_long_window_are_left_out_as_by_the_robust_fit():
+    length = 8192
+    fitter = LineFitter(length, 5000.0, FREQUENCIES)
+    rng = np.random.default_rng(3)
+    time = np.arange(length) / 5000.0
+    rows = np.stack([np.cos(2 * np.pi * 25 * time), np.sin(2 * np.pi * 25 * time)]) + 0.01 * rng.standard_normal(
+        (2, length)
+    )
+    spoiled = rows.copy()
+    spoiled[0, 4000:4004] += 0.2
+    block = fitter.fit(spoiled[:, None], np.zeros(1))
+    keep = np.r_[0:3997, 4007:length]
+    exact = np.linalg.lstsq(fitter.design[keep], rows[0, keep], rcond=None)[0]
+    assert block.lost[0].tolist() == [pytest.approx(10 / length), 0.0]
+    assert abs(block.z[0, 0, 0] - (exact[0] + 1j * exact[1])) < 1e-9

@@ -1,0 +1,287 @@
+"""Lines of a run looked at once more: frequency errors, shafts that drift, lines that nobody mentioned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from rigdata.operating_point import OperatingPoint
+from tests.phasors.phasor_cases import complex_normal, vector_channels
+from tpjb_ident.phasors import found_lines
+from tpjb_ident.phasors.channel_times import Samples
+from tpjb_ident.phasors.found_lines import MAX_LINES, MIN_SHARE, REACH, unexpected_lines
+from tpjb_ident.phasors.frequency import (
+    MAX_RETUNED,
+    MAX_SLIP,
+    MAX_WINDOW_SLIP,
+    frequency_slip,
+    retuned,
+    speeds_from_runout,
+    tuned,
+)
+from tpjb_ident.phasors.line_fit import LineFitter
+from tpjb_ident.phasors.lines import known_lines
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
+from tpjb_ident.phasors.whole_record import fitted_whole
+
+RATE, LENGTH, WINDOWS = 1000.0, 0.4, 12
+START = LENGTH * np.arange(WINDOWS)
+SPAN = WINDOWS * LENGTH
+LINES = known_lines((25.0,), 22.0, RATE)
+NAMES = ["excitation", *(line.name for line in LINES.nuisance)]
+POINT = OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22.0, 2 * math.pi * 25.0)
+
+
+def block(turns, size=1.0):
+    """Phasors of all lines, each turning as `turns` says of its name [cycles at the windows' starts]."""
+    z = size * complex_normal(np.random.default_rng(1), len(NAMES), 2)
+    z /= np.linalg.norm(z, axis=1)[:, None] / size
+    phase = np.stack([np.broadcast_to(turns.get(name, 0.0), WINDOWS) for name in NAMES], axis=1)
+    return z * np.exp(2j * math.pi * phase)[:, :, None]
+
+
+def run_of(force=None, displacement=None, speeds=22.0, noise=1e-3):
+    speeds = np.broadcast_to(np.asarray(speeds, dtype=float), WINDOWS).copy()
+    z = np.concatenate([block(displacement or {}), block(force or {}, 100.0)], axis=2)
+    return in_channels(z, np.full((WINDOWS, 4), noise), START, LENGTH, speeds)
+
+
+def in_channels(z, scale, start, length, speeds):
+    """A run of probes and cells along X and Y."""
+    none, described = np.zeros(scale.shape), vector_channels(("displacement", "force"))
+    return RunPhasors("r", POINT, 0.0, LINES, start, length, described, z, none, scale, none, 30.0, speeds)
+
+
+def test_a_frequency_error_is_the_advance_of_the_phase():
+    """At any spacing of the windows, with windows missing, either way; two windows tell nothing."""
+    t = np.cumsum(np.random.default_rng(2).uniform(0.2, 0.6, 9))
+    z = np.array([1.0 + 1j, 0.3])
+    for slip in (0.013, -0.4):
+        phasors = z * np.exp(2j * math.pi * slip * t)[:, None]
+        assert frequency_slip(phasors, t, 1e-9) == pytest.approx(slip, rel=1e-9)
+        phasors[4, 1] = np.nan
+        assert frequency_slip(phasors, t, 1e-9) == pytest.approx(slip, rel=1e-9)
+        assert frequency_slip(phasors[:3], t[:3], 1e-9) == pytest.approx(slip, rel=1e-9)
+        assert frequency_slip(phasors[:2], t[:2], 1e-9) == 0.0
+    # a single window that is off does not matter
+    phasors[6] *= np.exp(1.0j)
+    assert frequency_slip(phasors, t, 1e-9) == pytest.approx(-0.4, rel=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(9.5, False), (10.5, True)])
+def test_a_line_of_ten_times_its_noise_tells_its_frequency(ratio, told):
+    phasors = np.array([3.0, 4.0j]) * np.exp(2j * math.pi * 0.01 * START)[:, None]
+    assert (frequency_slip(phasors, START, 5.0 / ratio) != 0.0) is told
+
+
+@pytest.mark.parametrize(("errors", "told"), [(3.8, False), (4.2, True)])
+def test_a_slip_is_believed_beyond_four_standard_errors_of_its_median(errors, told):
+    spread, steps = 1e-3, 12
+    slip = errors * 1.4826 * spread / math.sqrt(steps)
+    phase = np.cumsum(np.r_[0.0, slip + spread * np.resize([-1.0, 0.0, 1.0], steps)])
+    found = frequency_slip(np.exp(2j * math.pi * phase)[:, None] * [1.0, 1.0], np.arange(13.0), 1e-9)
+    assert found == pytest.approx(slip if told else 0.0, rel=1e-6)
+
+
+def test_phasors_are_turned_to_other_frequencies_as_a_new_fit_would():
+    t = np.arange(round(SPAN * RATE)) / RATE
+    true = known_lines((25.008,), 22.0, RATE)
+    wave = np.outer([2.0, -1.0], np.cos(2 * math.pi * 25.008 * t + 0.4))
+    rows = wave.reshape(2, WINDOWS, -1)
+    rows = np.concatenate([rows, rows])
+    fits = [LineFitter(400, RATE, lines.frequencies).fit(rows, START) for lines in (LINES, true)]
+    run = in_channels(fits[0].z, fits[0].scale, START, LENGTH, np.full(WINDOWS, 22.0))
+    corrected = retuned(run, true)
+    assert np.abs(fits[0].z - fits[1].z)[:, 0].max() > 0.1
+    np.testing.assert_allclose(corrected.z[:, 0], fits[1].z[:, 0], atol=2e-3)
+    np.testing.assert_array_equal(corrected.z[:, 1], fits[0].z[:, 1])
+    assert corrected.lines is true
+    for share, done in ((0.99, True), (1.01, False), (-1.01, False)):
+        other = known_lines((25.0 + share * MAX_RETUNED / LENGTH,), 22.0, RATE)
+        assert (retuned(run, other) is not None) is done
+    assert retuned(run, known_lines((25.0,), 22.0, RATE, extra=(33.0,))) is None
+
+
+def test_a_run_that_fits_needs_no_second_look():
+    assert tuned(_Rate(), run_of(), (25.0,), 22.0, PhasorSettings()) is None
+    # a slip of a hundredth of a turn over the whole run is borne, and five hundredths of the shaft's
+    turning = {"excitation": 0.99 * MAX_SLIP / SPAN * START, "1X": 4.9 * MAX_SLIP / SPAN * START}
+    calm = run_of(turning, turning)
+    assert tuned(_Rate(), calm, (25.0,), 22.0, PhasorSettings()) is None
+
+
+@dataclass
+class _Rate:
+    """What is asked of a run."""
+
+    sample_rate: float = RATE
+    length: int = round(SPAN * RATE)
+
+
+def test_a_second_fit_takes_the_frequencies_that_the_phases_show():
+    slip = 1.05 * MAX_SLIP / SPAN
+    turning = {"excitation": slip * START}
+    found = tuned(_Rate(), run_of(turning, turning), (25.0,), 22.0, PhasorSettings())
+    assert found.lines.excitation[0].frequency == pytest.approx(25.0 + slip, abs=1e-9)
+    assert found.lines.speed == 22.0
+    assert found.follow is None
+    assert found.conditions == ("excitation off set point",)
+    assert "excitation found at 25.002 Hz, set point 25 Hz" in found.conditions[0].detail
+    turning_shaft = {"1X": -5.1 * MAX_SLIP / SPAN * START}
+    shaft = tuned(_Rate(), run_of(turning_shaft, turning_shaft), (25.0,), 22.0, PhasorSettings())
+    assert shaft.lines.speed == pytest.approx(22.0 - 5.1 * MAX_SLIP / SPAN, abs=1e-9)
+    assert shaft.lines.excitation[0].frequency == 25.0
+    assert shaft.conditions == ()
+    # lines that were found before are fitted along again
+    extra = known_lines((25.0,), 22.0, RATE, extra=(71.5,))
+    wide = run_of(turning, turning)
+    more = np.pad(wide.z, ((0, 0), (0, 1), (0, 0)))
+    again = tuned(_Rate(), replace(wide, lines=extra, z=more), (25.0,), 22.0, PhasorSettings())
+    assert [line.frequency for line in again.lines.nuisance if line.name == "found"] == [71.5]
+
+
+def bent(rate):
+    """Cycles that a shaft is ahead whose speed changes evenly, by `rate` [Hz/s], through the middle of a run."""
+    middle = 0.5 * START[-1]
+    return 0.5 * rate * (START - middle) ** 2
+
+
+def test_a_shaft_that_changes_its_speed_is_followed_by_its_runout():
+    rate = 0.01
+    speeds, doubt = speeds_from_runout(run_of({}, {"1X": bent(rate)}), RATE)
+    true = 22.0 + rate * (START - 0.5 * START[-1])
+    np.testing.assert_allclose(speeds[1:-1], true[1:-1], atol=1e-9)
+    np.testing.assert_allclose(speeds[[0, -1]], true[[0, -1]] + [rate * LENGTH / 2, -rate * LENGTH / 2], atol=1e-9)
+    # error of a phasor component over its size, in radians, over the time between windows
+    assert doubt == pytest.approx(1e-3 / math.sqrt(LENGTH * RATE) / (2 * math.pi * LENGTH))
+    gap = run_of({}, {"1X": bent(rate)})
+    gap.z[5] = np.nan
+    holed, _ = speeds_from_runout(gap, RATE)
+    assert np.flatnonzero(np.isnan(holed)).tolist() == [5]
+    np.testing.assert_allclose(np.delete(holed, [0, 4, 5, 6, 11]), np.delete(true, [0, 4, 5, 6, 11]), atol=1e-9)
+
+
+@pytest.mark.parametrize(("noise", "told"), [(1.9, True), (2.1, False)])
+def test_a_runout_below_ten_times_its_noise_tells_no_speed(noise, told):
+    one = run_of({}, {}, noise=noise)
+    assert (speeds_from_runout(one, RATE) is not None) is told
+
+
+def test_where_there_is_no_runout_line_the_tachometer_is_asked():
+    coincident = known_lines((22.0,), 22.0, RATE)
+    few = replace(run_of(), lines=coincident)
+    assert speeds_from_runout(few, RATE) is None
+    short = run_of()
+    short.z[2:] = np.nan
+    assert speeds_from_runout(short, RATE) is None
+    drifting = np.linspace(21.9, 22.1, WINDOWS)
+    found = tuned(_Rate(), replace(few, speeds=drifting), (22.0,), 22.0, PhasorSettings())
+    np.testing.assert_array_equal(found.follow.at(few.start + 0.5 * few.length), drifting)
+    assert found.conditions == ("speed drifts",)
+    assert "between 21.9 and 22.1 Hz" in found.conditions[0].detail
+    none = replace(few, speeds=np.full(WINDOWS, np.nan))
+    assert tuned(_Rate(), none, (22.0,), 22.0, PhasorSettings()) is None
+
+
+@pytest.mark.parametrize(("share", "followed"), [(0.95, False), (1.05, True)])
+@pytest.mark.parametrize("noise", [1e-3, 0.5])
+def test_a_drift_counts_once_it_turns_a_window_or_is_clear_of_the_noise(share, followed, noise):
+    doubt = noise / math.sqrt(LENGTH * RATE) / (2 * math.pi * LENGTH)
+    limit = max(MAX_WINDOW_SLIP / LENGTH, 4 * doubt)
+    assert (limit > MAX_WINDOW_SLIP / LENGTH) is (noise > 0.1)
+    rate = share * 2 * limit / (START[-2] - START[0])  # the ends are half a window short on either side
+    given = run_of({}, {"1X": bent(rate)}, noise=noise)
+    found = tuned(_Rate(), given, (25.0,), 22.0, PhasorSettings())
+    assert (found is not None and found.follow is not None) is followed
+
+
+N = 4096
+NONE = np.empty(0)
+TIME = np.arange(N) / RATE
+
+
+def heard(force=(), displacement=(), noise=1e-4):
+    """Excitation of unit size, runout and mains known; `force` and `displacement` list (frequency, amplitude)."""
+    rng = np.random.default_rng(3)
+    known = np.cos(2 * math.pi * 25 * TIME + 0.3) + 0.4 * np.cos(2 * math.pi * 22 * TIME)
+    rows = []
+    for lines in (force, displacement):
+        wave = known + sum(a * np.cos(2 * math.pi * f * TIME + f) for f, a in lines)
+        values = np.stack([wave, 0.6 * wave], axis=1)
+        rows.append(values + 3.0 * TIME[:, None] + 700.0 + noise * rng.standard_normal((N, 2)))
+    force, displacement = rows
+    return np.concatenate([displacement.T, force.T])
+
+
+def fitted(rows):
+    """The record in one fit, and as a run of one window."""
+    frequencies = np.array([line.frequency for line in LINES.whole])
+    record = fitted_whole(Samples(rows, None, None), RATE, LINES, frequencies, [0, 1, 2, 3])
+    windows = record.z[None, : len(LINES.frequencies)]
+    return (record,), in_channels(windows, np.full((1, 4), 1e-3), np.zeros(1), N / RATE, np.full(1, 22.0))
+
+
+def lines_in(*args, **keywords):
+    return unexpected_lines(*fitted(heard(*args, **keywords)), NONE)
+
+
+def test_lines_that_nobody_mentioned_are_found_in_either_quantity():
+    assert lines_in() == ((), ())
+    extra, conditions = lines_in([(71.33, 0.05)], [(33.71, 0.02), (71.33, 0.05)])
+    np.testing.assert_allclose(extra, [33.71, 71.33], atol=0.01)
+    assert conditions == ("unexpected lines",)
+    assert "lines at 33.71, 71.33 Hz; fitted along" in conditions[0].detail
+
+
+@pytest.mark.parametrize(("frequency", "found"), [(98.0, True), (102.0, False), (26.5, True), (25.7, False)])
+def test_lines_are_looked_for_up_to_four_times_the_excitation_and_beside_known_ones(frequency, found):
+    """Within four bins of a known line is its own window's lobe."""
+    assert REACH * 25.0 == 100.0
+    extra, _ = lines_in([(frequency, 0.05)])
+    assert [round(f, 1) for f in extra] == ([frequency] if found else [])
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.85, False), (1.25, True)])
+def test_a_line_too_small_to_bend_the_excitation_does_not_matter(share, found):
+    extra, _ = lines_in([(61.037, share * MIN_SHARE)], noise=1e-6)
+    assert (len(extra) == 1) is found
+
+
+def test_glitches_and_slow_movements_hide_no_line_and_make_none():
+    rows = heard([(61.3, 0.02)])
+    rows[:, 1000:1003] += 5.0
+    rows += 2.0 * (TIME - 1.5) ** 3
+    extra, _ = unexpected_lines(*fitted(rows), NONE)
+    np.testing.assert_allclose(extra, [61.3], atol=0.02)
+    rows[2, 17] = np.nan
+    rows[:2] += 0.1 * np.cos(2 * math.pi * 36.4 * TIME)
+    np.testing.assert_allclose(unexpected_lines(*fitted(rows), NONE)[0], [36.4, 61.3], atol=0.02)
+    record, result = fitted(heard([], [(61.3, 0.02)]))
+    empty = replace(result, z=result.z * np.array([np.nan, np.nan, 1.0, 1.0]))
+    assert unexpected_lines(record, empty, NONE) == ((), ())
+
+
+def test_a_second_harmonic_on_the_excitation_is_told():
+    extra, conditions = lines_in([(12.5, 0.05), (80.0, 0.05)])
+    assert len(extra) == 2
+    assert conditions == ("unexpected lines", "harmonic on excitation line")
+    assert "the line at 12.5 Hz" in conditions[1].detail
+    assert lines_in([(12.6, 0.05)])[1] == ("unexpected lines",)
+
+
+def test_no_more_lines_are_taken_than_can_be_fitted_the_lowest_first():
+    many = [(f, 0.05) for f in (29.1, 33.3, 36.2, 39.9, 46.7, 54.0, 57.3, 61.9, 64.4, 70.3, 77.7, 83.2)]
+    extra, _ = lines_in(many)
+    assert len(extra) == MAX_LINES == 10
+    np.testing.assert_allclose(extra, [f for f, _ in many][:10], atol=0.03)
+
+
+def test_the_top_of_a_parabola_of_logarithms():
+    for top in (-0.4, 0.0, 0.3):
+        assert found_lines.vertex(np.exp(-((np.arange(-1, 2) - top) ** 2))) == pytest.approx(top)
+    assert found_lines.vertex(np.ones(3)) == 0.0
+    assert found_lines.vertex(np.array([2.0, 1.0, 2.0])) == 0.0
+    assert np.isfinite(found_lines.vertex(np.array([0.0, 1.0, 0.0])))

@@ -1,0 +1,247 @@
+"""A rerun goes on where a kill stopped it: finished runs are not repeated, stale ones are, tables stay the same."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigdata.campaign import load_campaign
+from rigdata.virtual_rig import write_campaign
+from tests.good_campaigns import directions, written
+from tests.identification.test_identify import rig
+from tpjb_ident.cli.commands.identify import KEPT
+from tpjb_ident.phasors.run_phasors import PhasorSettings
+from tpjb_ident.runs import run_jobs
+from tpjb_ident.runs.run_jobs import all_runs as gathered_runs
+from tpjb_ident.runs.run_store import RunStore, fingerprint
+from tpjb_ident.runtime.executors import local_workers
+
+TABLES = ("coefficients", "estimators", "windows", "frequency_fits", "budget")
+
+
+POINTS = [(2500.0, 25.0), (5000.0, 25.0)]
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """Six runs as short as they may be: what is kept of them is the same in kind."""
+    plan = {"directions": directions(3), "dynamic_seconds": 1.0}
+    return written(tmp_path_factory.mktemp("rig") / "c.h5", rig(POINTS, seed=8, **plan))
+
+
+@pytest.fixture(scope="module")
+def whole(path):
+    """What comes of all runs, done once and kept nowhere."""
+    return all_runs(load_campaign(path), PhasorSettings(), silent)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Ids of the runs that are read, one after the other."""
+    done: list[str] = []
+    plain = run_jobs.one_run
+
+    def one_run(run, *arguments):
+        done.append(run.id)
+        return plain(run, *arguments)
+
+    monkeypatch.setattr(run_jobs, "one_run", one_run)
+    return done
+
+
+def all_runs(*arguments, **named):
+    """What `FinishedRuns` gives back of every run: its digest and the phasors of its excitation lines."""
+    return [(digest.phasors, digest) for digest in gathered_runs(*arguments, **named).digests]
+
+
+def silent(text, done, total):
+    pass
+
+
+def stop_after(count):
+    def progress(text, done, total):
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def same(first, second) -> bool:
+    for (a, of_a), (b, of_b) in zip(first, second, strict=True):
+        pairs = [(getattr(a, n), getattr(b, n)) for n in ("displacement", "cell_force", "acceleration")]
+        blocks = [(getattr(x, n), getattr(y, n)) for x, y in pairs for n in ("phasors", "mean", "noise", "lost")]
+        blocks += [(a.start, b.start), (a.speeds, b.speeds)]
+        if of_a.mains is not None:
+            blocks.append((of_a.mains, of_b.mains))
+        if not all(np.array_equal(x, y, equal_nan=True) for x, y in blocks):
+            return False
+        if (of_a.mains is None) != (of_b.mains is None) or (of_a.temperatures, a.lines) != (of_b.temperatures, b.lines):
+            return False
+        if [c.sentence() for c in a.conditions] != [c.sentence() for c in b.conditions]:
+            return False
+    return True
+
+
+@pytest.mark.slow
+def test_finished_runs_are_not_repeated_and_come_back_bit_for_bit(path, whole, tmp_path, counted):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    with pytest.raises(KeyboardInterrupt):
+        all_runs(campaign, settings, stop_after(4), store=store)
+    assert len(counted) == 4
+    again = all_runs(campaign, settings, silent, store=store)
+    assert sorted(counted) == sorted(run.id for run in campaign.of_kind("dynamic"))  # each of the six once
+    assert same(again, whole)
+    counted.clear()
+    with local_workers(2) as workers:
+        assert same(all_runs(campaign, settings, silent, workers, store), whole)
+    assert counted == []
+    store.clear()
+    assert not (tmp_path / "kept").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_another_command_has_cleared_is_done_again(path, whole, tmp_path, counted, monkeypatch):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    all_runs(campaign, settings, silent, store=store)
+    counted.clear()
+    monkeypatch.setattr(RunStore, "load", lambda store, run, mark: None)
+    assert same(all_runs(campaign, settings, silent, store=store), whole)
+    assert len(counted) == len(whole)
+
+
+@pytest.mark.slow
+def test_what_has_changed_is_done_again(path, tmp_path, counted):
+    import h5py
+
+    copy = tmp_path / "copy.h5"
+    shutil.copy(path, copy)
+    store, settings = RunStore(tmp_path / "kept"), PhasorSettings()
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    counted.clear()
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    assert counted == []
+    with h5py.File(copy, "r+") as file:  # one sample of one channel of one run
+        file["runs/d-05000-25-03/X1A"][5] += 1e-3
+    all_runs(load_campaign(copy), settings, silent, store=store)
+    assert counted == ["d-05000-25-03"]
+    counted.clear()
+    campaign = load_campaign(copy)
+    all_runs(campaign, replace(settings, find_lines=False), silent, store=store)
+    assert len(counted) == 6
+    gain = replace(campaign.channels["X1A"], gain=1.01 * campaign.channels["X1A"].gain)
+    runs = tuple(replace(run, channels={**run.channels, "X1A": gain}) for run in campaign.runs)
+    counted.clear()
+    all_runs(replace(campaign, runs=runs), replace(settings, find_lines=False), silent, store=store)
+    assert len(counted) == 6
+
+
+@pytest.mark.slow
+def test_a_damaged_or_foreign_file_is_no_result(path, tmp_path, counted):
+    campaign, settings, store = load_campaign(path), PhasorSettings(), RunStore(tmp_path / "kept")
+    whole = all_runs(campaign, settings, silent, store=store)
+    files = sorted(store.folder.iterdir())
+    files[0].write_bytes(files[0].read_bytes()[:500])
+    files[1].write_bytes(b"")
+    files[2].write_text("hello")
+    shutil.copy(files[4], files[3])  # another run's
+    counted.clear()
+    assert same(all_runs(campaign, settings, silent, store=store), whole)
+    assert len(counted) == 4
+
+
+def test_csv_runs_have_fingerprints_of_their_own_bytes(tmp_path):
+    two = rig(POINTS[:1], seed=8, directions=directions(2), dynamic_seconds=1.0)
+    write_campaign(tmp_path / "folder", two, "csv-german")
+    run, other = load_campaign(tmp_path / "folder").of_kind("dynamic")[:2]
+    mark = fingerprint(run, 30.0, PhasorSettings())
+    assert mark != fingerprint(other, 30.0, PhasorSettings())
+    assert mark == fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+    file = run.reader.path
+    text = file.read_bytes()
+    last = max(i for i, byte in enumerate(text) if chr(byte).isdigit())
+    file.write_bytes(text[:last] + (b"1" if text[last : last + 1] != b"1" else b"2") + text[last + 1 :])
+    assert mark != fingerprint(load_campaign(tmp_path / "folder").run(run.id), 30.0, PhasorSettings())
+
+
+def tables(out: Path) -> list[bytes]:
+    return [(out / f"{name}.csv").read_bytes() for name in TABLES]
+
+
+def command(path: Path, out: Path, *options: str) -> list[str]:
+    return [sys.executable, "-P", "-m", "tpjb_ident", "identify", str(path), "--out", str(out), *options]
+
+
+@pytest.mark.slow
+def test_a_killed_command_goes_on_and_ends_with_the_same_tables(tmp_path):
+    path = written(tmp_path / "c.h5", rig(POINTS, seed=8))  # long enough to be killed half-way
+    subprocess.run(command(path, tmp_path / "whole"), check=True, capture_output=True)
+    assert sorted(p.name for p in (tmp_path / "whole").iterdir() if p.name.startswith(".")) == []
+    out = tmp_path / "killed"
+    process = subprocess.Popen(command(path, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 60
+    while len(list((out / KEPT).glob("*.npz"))) < 3 and time.monotonic() < until and process.poll() is None:
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (out / "coefficients.csv").exists()
+    assert len(list((out / KEPT).glob("*.npz"))) >= 3
+    subprocess.run(command(path, out, "--workers", "2"), check=True, capture_output=True)
+    assert tables(out) == tables(tmp_path / "whole")
+    assert not (out / KEPT).exists()
+
+
+def test_an_error_leaves_nothing_behind(path, tmp_path):
+    import h5py
+
+    copy = tmp_path / "copy.h5"
+    shutil.copy(path, copy)
+    with h5py.File(copy, "r+") as file:
+        for run in file["runs"]:
+            del file[f"runs/{run}/X1A"]
+    from tests.command_line import tpjb
+
+    result = tpjb("identify", copy, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "X1A" in result.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["copy.h5"]
+
+
+def without_mark(meta):
+    del meta["fingerprint"]
+
+
+def of_another_kind(meta):
+    meta["result"]["RunDigest"]["phasors"] = {"set": 5}
+
+
+def with_a_mark_that_is_none(meta):
+    meta["fingerprint"] = {"a": 1}
+
+
+def without_blocks(meta):
+    del meta["result"]["RunDigest"]["phasors"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [without_mark, of_another_kind, with_a_mark_that_is_none, without_blocks])
+def test_an_entry_that_somebody_has_changed_is_done_again(path, whole, counted, tmp_path, damage):
+    campaign, store = load_campaign(path), RunStore(tmp_path / "kept")
+    all_runs(campaign, PhasorSettings(), silent, store=store)
+    first = store._file(campaign.runs[0].id)
+    with np.load(first, allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    meta = json.loads(str(arrays.pop("meta")))
+    damage(meta)
+    np.savez(first, meta=np.array(json.dumps(meta)), **arrays)
+    counted.clear()
+    again = all_runs(campaign, PhasorSettings(), silent, store=store)
+    assert same(again, whole)

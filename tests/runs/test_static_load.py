@@ -1,0 +1,97 @@
+"""Loads that miss their set points, in size and in direction: what the cells say of every run."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.phasors.phasor_cases import place
+from tpjb_ident.runs.static_load import (
+    MAX_MISS,
+    MAX_SIDEWAYS,
+    LoadMiss,
+    load_conditions,
+    load_misses,
+    load_ratio,
+)
+
+
+def loaded(ratios, load=5000.0, direction=-90.0):
+    """A point whose cells read these multiples of the set point, as complex numbers (size, direction)."""
+    force = load * np.exp(1j * math.radians(direction)) * np.asarray(ratios, dtype=complex)
+    return SimpleNamespace(point=place(load, direction), mean_loads=np.stack([force.real, force.imag], axis=1))
+
+
+def test_a_ratio_is_size_and_angle_whatever_the_direction():
+    given = np.array([1.02, np.exp(0.01j), 0.97 * np.exp(-0.02j)])
+    for direction in (-90.0, 0.0, 54.0):
+        np.testing.assert_allclose(load_ratio(loaded(given, 3000.0, direction)), given, rtol=1e-12)
+    assert np.isnan(load_ratio(SimpleNamespace(point=place(0.0), mean_loads=np.ones((2, 2))))).all()
+
+
+def test_misses_are_relative_to_what_all_runs_share():
+    """A gain and a rotation of the cells move nothing."""
+    scatter = np.array([0.01 + 0.003j, -0.01 - 0.003j, 0.01 - 0.003j, -0.01 + 0.003j])
+    for common in (1.0, 1.3 * np.exp(0.1j), 0.55):
+        points = [loaded(common * (1 + scatter)), loaded(common * (1 - scatter), 8000.0, 30.0)]
+        (first, second), found = load_misses(points)
+        assert found == pytest.approx(complex(common))
+        np.testing.assert_allclose(first.size, scatter.real, atol=1e-12)
+        np.testing.assert_allclose(first.sideways, scatter.imag, atol=1e-12)
+        np.testing.assert_allclose(second.size, -scatter.real, atol=1e-12)
+
+
+def test_one_run_far_off_does_not_move_what_all_share():
+    (miss,), common = load_misses([loaded([0.99, 1.01, 0.99, 1.01, 1.0, 1.06])])
+    assert common == pytest.approx(1.0)
+    np.testing.assert_allclose(miss.size, [-0.01, 0.01, -0.01, 0.01, 0.0, 0.06], atol=1e-12)
+    (exact,), _ = load_misses([loaded([1.1, 1.1, 1.1, 1.6])])
+    np.testing.assert_allclose(exact.size, [0.0, 0.0, 0.0, 0.5 / 1.1], atol=1e-12)
+
+
+@pytest.mark.parametrize("common", [0.45, 2.2, 1.0j, -0.3])
+def test_cells_that_cannot_be_right_correct_nothing_but_are_told(common):
+    (miss,), found = load_misses([loaded(common * np.array([0.98, 1.0, 1.02]))])
+    np.testing.assert_array_equal(miss.size, 0.0)
+    np.testing.assert_array_equal(miss.sideways, 0.0)
+    assert found == pytest.approx(common)
+
+
+def test_runs_without_a_load_have_no_miss():
+    idle = SimpleNamespace(point=place(0.0), mean_loads=np.ones((3, 2)))
+    (none,), common = load_misses([idle])
+    assert common == 1.0
+    np.testing.assert_array_equal(none.size, np.zeros(3))
+    (beside, other), common = load_misses([idle, loaded([0.99, 1.01, np.nan])])
+    assert common == pytest.approx(1.0)
+    np.testing.assert_array_equal(beside.size, 0.0)
+    np.testing.assert_allclose(other.size, [-0.01, 0.01, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("size", "sideways", "common", "named", "figure"),
+    [
+        (0.01, 0.01, 1.0, (), ""),
+        (MAX_MISS, -MAX_SIDEWAYS, 1.005, (), ""),
+        (-0.061, 0.0, 1.0, ("static-load-off",), "6.1 %"),
+        (0.0, -0.06, 1.0, ("static-load-turned",), "3.4 deg"),
+        (0.0, 0.0, 1.02 * np.exp(0.04j), ("cells-against-set-points",), "+2.00 %"),
+        (0.0, 0.0, np.exp(-0.3j), ("static-load-turned",), "-17.2 deg"),
+        (0.0, 0.0, 1.2 * np.exp(0.3j), ("static-load-turned", "cells-against-set-points"), "+17.2 deg"),
+        (0.0, 0.0, 1.0j, ("cells-contradict-set-points",), "+90.0 deg"),
+        (0.0, 0.0, -1.0, ("cells-contradict-set-points",), "+180.0 deg"),
+        (0.0, 0.0, 0.98, ("cells-against-set-points",), "-2.00 %"),
+        (0.0, 0.0, 1.399, ("cells-against-set-points",), "+39.90 %"),
+        (0.0, 0.0, 0.69, ("cells-contradict-set-points",), "0.69 times"),
+        (0.0, 0.0, -10.0, ("cells-contradict-set-points",), "10 times"),
+    ],
+)  # fmt: skip
+def test_loads_that_are_off_by_more_than_scatter_are_named_with_their_figure(size, sideways, common, named, figure):
+    miss = LoadMiss(np.array([0.0, size]), np.array([sideways, 0.0]))
+    found = load_conditions(miss, complex(common))
+    assert found == named
+    assert figure in "".join(c.detail for c in found)
+    assert load_conditions(LoadMiss(np.zeros(0), np.zeros(0)), 1.0 + 0j) == ()

@@ -1,0 +1,67 @@
+"""What analysers make of a line's rows: H1, H2, Hv and the coherence, beside the estimate that counts.
+
+H1 = S_FD S_DD^-1 holds where only the force is noisy, H2 = S_FF S_DF^-1 where only the displacement is, Hv (total least
+squares, every channel in units of its own size) where both are alike. Bendat and Piersol, Random Data, 4th ed. 2010,
+chapter 9; Rocklin, Crowley and Vold 1985 for Hv. The slope of h over the bins of a group, and what the ends of the
+records leak, are taken off first, as they are from the responses that count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.responses import end_columns, place_in_line
+from tpjb_ident.bands.run_spectra import RunSpectra
+from tpjb_ident.estimators.r_matrix import complex_to_real_covariance
+
+#: Condition number of the motions from which they are along one line.
+_ONE_LINE = 1e8
+
+
+@dataclass(frozen=True)
+class ClassicLine:
+    """One line by the methods of analysers."""
+
+    h: dict[str, ComplexArray]  #: (2, 2) by method, N/m; none where the rows do not tell it
+    covariance: FloatArray  #: (8, 8), N^2/m^2: that of H1
+    freedom: float  #: real degrees of freedom of the noise
+    coherence: FloatArray  #: (2,): of the force along X and Y with the displacements
+    n_rows: int
+
+
+def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends: bool) -> ClassicLine:
+    """H1, H2, Hv and coherence over all rows of a line: periods, or bins of its groups."""
+    parts = [_flat(spectra, bins, ends) for bins in groups]
+    rows, taken = np.concatenate([part for part, _ in parts]), sum(columns for _, columns in parts)
+    n, (D, F) = len(rows), np.split(rows, 2, axis=1)
+    scale = np.sqrt(np.mean(np.abs(rows) ** 2, axis=0))
+    freedom = n - taken - 2
+    if freedom < 1 or not (scale > 0).all() or not np.linalg.cond(D / scale[:2]) < _ONE_LINE:
+        return ClassicLine({}, np.full((8, 8), np.nan), 1.0, np.full(2, np.nan), n)
+    inverse = np.linalg.pinv(D)
+    h1 = (inverse @ F).T
+    remaining = F - D @ h1.T
+    noise = remaining.T @ remaining.conj() / freedom
+    covariance = complex_to_real_covariance(np.kron(noise, inverse @ inverse.conj().T))
+    power = np.sum(np.abs(F) ** 2, axis=0) / max(n - taken, 1)
+    coherence = np.clip(1 - np.diag(noise).real / power, 0.0, 1.0)
+    signal = np.linalg.svd(rows / scale, full_matrices=False)[2][:2] * scale
+    h = {"h1": h1, "h2": np.linalg.solve(F.conj().T @ D, F.conj().T @ F).T}
+    h["hv"] = np.linalg.solve(signal[:, :2], signal[:, 2:]).T
+    return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
+
+
+def _flat(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:
+    """Displacement and force of all runs' rows (n, 4) without slope and leakage, and how many columns that took."""
+    rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
+    if spectra[0].period is not None:
+        return rows, 0
+    place = place_in_line(spectra[0].frequencies[bins])
+    sloped = rows[:, :2] * np.tile(place, len(spectra))[:, None]
+    leaked = end_columns(len(spectra), place)[:, : None if ends else 0]
+    basis = np.linalg.qr(np.concatenate([sloped, leaked], axis=1))[0]
+    return np.asarray(rows - basis @ (basis.conj().T @ rows)), basis.shape[1]

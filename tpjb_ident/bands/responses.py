@@ -1,0 +1,150 @@
+"""What one run says at a line: phasors of all channels, alike in what moved them, with the covariance of their noise.
+
+Of a periodic excitation the mean over the periods, whose noise the periods show. Of any other the response to an
+instrument, by the local polynomial method: over a few bins the response and what the record's ends leak into its
+transform are straight lines, the excitation is not (Pintelon, Schoukens, Vandersteen and Barbe 2010,
+doi:10.1016/j.ymssp.2009.08.003). The instrument is the command. Without one it is the displacement (all noise is then
+taken to be the force's, H1) or the force (all is the displacement's, H2): truth lies between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtri
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from tpjb_ident.bands.run_spectra import RunSpectra
+from tpjb_ident.estimate.noise import unbiased_noise
+
+#: A direction of the command with less than this share of its power is at rest.
+_AT_REST = 1e-3
+#: Part of a response that is not told from leakage and slope.
+_NOTHING = 1e-9
+#: Degrees of freedom of a noise from which it is taken by itself; below, neighbouring lines join in.
+_FREEDOM = 65.0
+#: Phase sets that show the distortion of a multi-sine, and likeness from which two are one.
+_SETS, _ALIKE = 3, 0.6
+#: A line is driven from this share of the largest on.
+_DRIVEN = 0.05
+#: Chance below which noise alone does not make a response.
+_CHANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class LineResponse:
+    """One run at one group of bins."""
+
+    z: ComplexArray  #: (k, m), SI: k responses whose noise has one covariance
+    count: float  #: that covariance is the noise of a row over this
+    residual: ComplexArray  #: (m, m): sum of what is left, times its own conjugate
+    freedom: float  #: complex degrees of freedom of the residual
+
+
+def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
+    """Response over a group of bins; `instrument` is "periods", "command", "displacement" or "force".
+
+    Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
+    shows across that is noise.
+    """
+    z = np.concatenate([run.phasors.z[:, bins] for run in runs])
+    if instrument == "periods":
+        rows = z[:, 0]
+        mean = rows.mean(axis=0)
+        remaining = rows - mean
+        return LineResponse(mean[None], float(len(rows)), _outer(remaining), float(len(rows) - 1))
+    u = np.concatenate([_source(run, instrument)[:, bins] for run in runs])
+    place = place_in_line(runs[0].frequencies[bins])
+    sloped = (u * place[None, :, None]).reshape(-1, u.shape[2])
+    columns = np.concatenate([sloped, end_columns(len(runs), place)[:, : None if ends else 0]], axis=1)
+    return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), columns)
+
+
+def place_in_line(frequencies: FloatArray) -> FloatArray:
+    """Places (n,) of a line's bins about their mean, 1 at the farthest."""
+    place = frequencies - frequencies.mean()
+    return np.asarray(place / max(float(np.abs(place).max()), 1e-300))
+
+
+def end_columns(runs: int, place: FloatArray) -> ComplexArray:
+    """What the ends of each run's record leak into its bins: straight lines over their place, (runs n, 2 runs)."""
+    return np.asarray(np.kron(np.eye(runs), np.vander(place, 2, increasing=True)), dtype=complex)
+
+
+def _source(spectra: RunSpectra, instrument: str) -> ComplexArray:
+    if instrument == "command":
+        return driven_command(spectra)
+    return spectra.D if instrument == "displacement" else spectra.F
+
+
+def driven_command(spectra: RunSpectra) -> ComplexArray:
+    """The command along the directions in which it acts (n_windows, n_bins, k): what rests would be noise alone."""
+    assert spectra.command is not None
+    flat = spectra.command.reshape(-1, 2)
+    power, along = np.linalg.eigh((flat.T @ flat.conj()).real)
+    return np.asarray(spectra.command @ along[:, power > _AT_REST * power[-1]])
+
+
+def tones(runs: Sequence[RunSpectra]) -> int:
+    """Lines of a periodic excitation that are driven, in the run with the most."""
+    sizes = [np.linalg.norm(run.D.mean(axis=0), axis=1) for run in runs]
+    return max(int(np.sum(size > _DRIVEN * size.max(initial=0.0))) for size in sizes)
+
+
+def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
+    """Whether too few runs of a periodic excitation have phases of their own for its distortion to show."""
+    means = [run.D.mean(axis=0) for run in runs]
+    waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
+    different: list[ComplexArray] = []
+    for wave in waves:
+        if all(_likeness(wave, other) < _ALIKE for other in different):
+            different.append(wave)
+    return len(different) < _SETS
+
+
+def _likeness(wave: ComplexArray, other: ComplexArray) -> float:
+    """Share in which phases (n,) differ by no more than a time, 0 to 1."""
+    product = wave * other.conj()
+    return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
+
+
+def _regressed(z: ComplexArray, u: ComplexArray, nuisance: ComplexArray) -> LineResponse:
+    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak (b, j)."""
+    basis = np.linalg.qr(nuisance)[0]
+    flat = u - basis @ (basis.conj().T @ u)
+    q, triangle = np.linalg.qr(flat)
+    told = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
+    q = q[:, told]
+    response = q.conj().T @ z
+    remaining = z - basis @ (basis.conj().T @ z) - q @ response
+    freedom = float(len(z) - basis.shape[1] - q.shape[1])
+    return LineResponse(response, 1.0, _outer(remaining), max(freedom, 0.0))
+
+
+def _outer(rows: ComplexArray) -> ComplexArray:
+    return np.asarray(rows.T @ rows.conj())
+
+
+def pooled_noise(responses: list[LineResponse]) -> tuple[list[ComplexArray], FloatArray]:
+    """Noise of a row at every group of one run with its neighbours (m, m), and its degrees of freedom (n,)."""
+    residual = np.array([r.residual for r in responses])
+    freedom = np.array([r.freedom for r in responses])
+    reach = int(np.ceil(0.5 * _FREEDOM / max(float(freedom.mean()), 1e-9))) if len(freedom) else 0
+    noises, totals = [], []
+    for k in range(len(freedom)):
+        near = slice(max(k - reach, 0), k + reach + 1)
+        total = max(float(freedom[near].sum()), 1.0)
+        noises.append(unbiased_noise(residual[near].sum(axis=0) / total, total))
+        totals.append(total)
+    return noises, np.array(totals)
+
+
+def stands_out(z: ComplexArray, noise: ComplexArray, freedom: float, present: BoolArray) -> bool:
+    """Whether responses (k, m) are more than the noise of their rows (m, m)."""
+    z, noise = z[:, present], noise[np.ix_(present, present)]
+    scale = np.sqrt(np.maximum(np.einsum("jj->j", noise).real, 1e-30 * np.max(np.abs(z) ** 2, axis=0) + 1e-300))
+    white = noise / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    share = np.einsum("kj,ji,ki->k", (z / scale).conj(), np.linalg.inv(white), z / scale).real / len(scale)
+    return bool(np.max(share, initial=0.0) > fdtri(2 * len(scale), max(2 * freedom, 1.0), 1 - _CHANCE))

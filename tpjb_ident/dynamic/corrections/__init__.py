@@ -1,1 +1,0 @@
-"""What is put right between phasors and estimate, and what that leaves uncertain."""

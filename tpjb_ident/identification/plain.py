@@ -1,0 +1,110 @@
+"""The paper's own way, plain: Eq. (13)-(15) on stated windows, solved by statsmodels' RLM, with its own errors.
+
+Every window of the stated length gives one phasor per channel by a least-squares sine of the set frequency and a mean.
+No other line is fitted, nothing is looked for, weighted or corrected; the inertia of the housing is added to the cells'
+force where there are accelerometers, as Eq. (13) wants the film's force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigdata.arrays import ComplexArray
+from rigdata.campaign import Campaign
+from tpjb_ident.bands.run_spectra import is_broadband
+from tpjb_ident.estimators.r_matrix import r_matrix
+from tpjb_ident.estimators.rlm import RlmSettings, rlm_fit
+from tpjb_ident.phasors.extraction import extract
+from tpjb_ident.phasors.lines import Line, LineSet
+from tpjb_ident.phasors.run_data import PhasorSettings
+from tpjb_ident.phasors.windows import WindowSettings
+from tpjb_ident.runs.point_data import PointData, gather
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns of ``plain.csv`` besides the point's and the coefficients'.
+_FIGURES = ("norm", "window_s", "n_records", "n_windows", "status")
+
+
+@dataclass(frozen=True)
+class PlainSettings:
+    """How the plain solution is made."""
+
+    window: float = 0.5
+    norm: str = "huber"
+
+
+@dataclass(frozen=True)
+class PlainPoint:
+    """One operating point, solved as printed."""
+
+    data: PointData = field(repr=False)
+    R: ComplexArray = field(repr=False)  #: (2 n, 4) complex, m
+    f: ComplexArray = field(repr=False)  #: (2 n,) complex, N
+    h: ComplexArray  #: (2, 2) complex, N/m
+    standard_error: np.ndarray  #: (8,), N/m: statsmodels' own, of Re and Im of h
+    status: tuple[str, ...]
+
+
+def plain_points(campaign: Campaign, settings: PlainSettings) -> list[PlainPoint]:
+    """Solve every operating point of a campaign as the paper prints it."""
+    phasors = PhasorSettings(windows=WindowSettings(length=settings.window, max_inflation=np.inf, min_cycles=1.0))
+    runs = []
+    for run in (run for run in campaign.of_kind("dynamic") if not is_broadband(run)):
+        lines = LineSet((Line("excitation", run.point.excitation_hz),), (), (), run.point.shaft_speed_hz)
+        runs.append(extract(run, campaign.housing_mass, phasors, lines))
+    return [_solved(data, settings) for data in gather(runs)]
+
+
+def _solved(data: PointData, settings: PlainSettings) -> PlainPoint:
+    D, F = data.D[data.whole], data.F[data.whole]
+    R, f = r_matrix(D, F)
+    if np.linalg.matrix_rank(D) < 2:
+        none = np.full((2, 2), np.nan + 0j)
+        return PlainPoint(data, R, f, none, np.full(8, np.nan), ("fewer-than-two-directions",))
+    # statsmodels' tolerance is absolute: the system is brought to order one, and its answer back
+    displacement, force = float(np.abs(D).max()), float(np.abs(F).max())
+    fit = rlm_fit(D / displacement, F / force, RlmSettings(settings.norm))
+    scale = force / displacement
+    error = np.sqrt(np.diag(fit.covariance)) * scale
+    return PlainPoint(data, R, f, fit.h * scale, error, tuple(str(c) for c in fit.conditions))
+
+
+def plain_frame(points: Sequence[PlainPoint], settings: PlainSettings) -> pd.DataFrame:
+    """One row per operating point: ``plain.csv``."""
+    import pandas as pd
+
+    rows = []
+    for p in points:
+        point = p.data.point
+        row: dict[str, object] = dict(zip(POINT_KEY, point.key))
+        factor = np.repeat([1.0, 1 / point.excitation], 4)
+        values = np.concatenate([p.h.real.ravel(), p.h.imag.ravel()]) * factor
+        for name, value, error in zip(COEFFICIENT_COLUMNS, values, p.standard_error * factor):
+            row[name], row[f"{name}_se"] = value, error
+        figures = (settings.norm, settings.window, len(p.data.runs), len(p.f) // 2, "; ".join(p.status) or "ok")
+        rows.append(row | dict(zip(_FIGURES, figures)))
+    columns = [c for name in COEFFICIENT_COLUMNS for c in (name, f"{name}_se")]
+    return pd.DataFrame(rows, columns=[*POINT_KEY, *columns, *_FIGURES])
+
+
+def write_r_matrices(path: Path, points: Sequence[PlainPoint]) -> None:
+    """Write R and f of Eq. (15), one group per point, with the run of every window, as HDF5."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.attrs["equation"] = "F = R h, Eq. (15): h = hxx, hxy, hyx, hyy; rows 2 k and 2 k + 1 are window k"
+        for number, p in enumerate(points):
+            group = file.create_group(f"point-{number:03d}")
+            point = p.data.point
+            group.attrs.update(zip(POINT_KEY, point.key))
+            group.attrs["runs"] = [run.run for run in p.data.runs]
+            for name, values in (("R", p.R), ("f", p.f), ("run_index", p.data.run_index[p.data.whole])):
+                group.create_dataset(name, data=values, track_times=False)

@@ -1,0 +1,216 @@
+"""Models over frequency: K-C (h = K + i omega C) and K-C-M (h = K - omega^2 M + i omega C), for sines and for bands.
+
+Chi-square says which of them the data support. A tilting-pad bearing owes neither: its pads are dynamic, and when
+K-C-M is refused too the raw H is the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc, stdtrit
+
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.near_names import unknown_name
+from tpjb_ident.errors import ArgumentError
+from tpjb_ident.estimate.shape import MODELS, over_frequency
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.results.point_result import PointResult, by_static_point
+from tpjb_ident.schema import KINDS
+
+#: A model is refused below this probability of its chi-square.
+REFUSED = 0.01
+#: Draws of a chi-square with measured covariances, and their seed; above so many degrees of freedom one is known.
+_DRAWN, _LARGE_DOF = (4000, 5), 1e4
+_FIGURES = (
+    "n_frequencies",
+    "excitation_lowest_Hz",
+    "excitation_highest_Hz",
+    "chi_square",
+    "dof",
+    "probability",
+    "largest_misfit",
+)
+_VALUES = tuple(column for kind in KINDS.values() for column in kind.columns)
+_ENDINGS = ("", "_lo", "_hi", "_se", "_dof")
+#: Columns of a model in the tables.
+MODEL_COLUMNS = (*_FIGURES, *(name + ending for name in _VALUES for ending in _ENDINGS))
+
+
+@dataclass(frozen=True)
+class FrequencyModel:
+    """One model over the frequencies of one static point; p numbers: K [N/m], C [N s/m], M [kg], entry by entry."""
+
+    model: str
+    parameters: FloatArray  #: (p,)
+    covariance: FloatArray = field(repr=False)  #: (p, p): random part
+    dof: FloatArray = field(repr=False)  #: (p,): degrees of freedom of its variances
+    systematic: FloatArray = field(repr=False)  #: (p, p): what all frequencies share
+    chi_square: float
+    spare: int
+    probability: float  #: of a chi-square this large if the model were true; NaN without spare data
+    misfit: float
+    band: tuple[float, float]  #: Hz
+    n_frequencies: int
+
+    @property
+    def refused(self) -> bool:
+        """Whether the data refuse the model."""
+        return self.spare > 0 and self.probability < REFUSED
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Random standard errors (p,); inflated by the reduced chi-square where the data refuse the model."""
+        inflation = max(self.chi_square / self.spare, 1.0) if self.refused else 1.0
+        return np.sqrt(inflation * np.diag(self.covariance))
+
+    def half_width(self, level: float = 0.95) -> FloatArray:
+        """Half the interval of every parameter: Student's t of the random part and normal of the shared one."""
+        quantile = 0.5 + 0.5 * level
+        random = stdtrit(self.dof, quantile) * self.standard_error
+        return np.hypot(random, stdtrit(np.inf, quantile) * np.sqrt(np.maximum(np.diag(self.systematic), 0.0)))
+
+    def h(self, omega: float | FloatArray) -> ComplexArray:
+        """Dynamic stiffness of the model, (2, 2) or (n, 2, 2) [N/m]; `omega` (n,) [rad/s]."""
+        K, C, M = (*self.parameters.reshape(-1, 2, 2), np.zeros((2, 2)))[:3]
+        w = np.asarray(omega, dtype=float)[..., None, None]
+        return np.asarray(K - w**2 * M + 1j * w * C)
+
+    def columns(self) -> dict[str, Any]:
+        """What the tables say of the model, under `MODEL_COLUMNS`; zero what it does not have."""
+        figures = (self.n_frequencies, *self.band, self.chi_square, self.spare, self.probability, self.misfit)
+        value, half = self.parameters, self.half_width()
+        numbers = np.zeros((len(_VALUES), len(_ENDINGS)))
+        numbers[:, -1] = np.inf
+        numbers[: len(value)] = np.stack([value, value - half, value + half, self.standard_error, self.dof], axis=1)
+        return dict(zip(MODEL_COLUMNS, (*figures, *numbers.ravel())))
+
+
+def supported(models: Mapping[str, FrequencyModel]) -> str:
+    """The simplest model that the data do not refuse; ``"raw H"`` when they refuse all."""
+    return next((name for name, model in models.items() if not model.refused), "raw H")
+
+
+def chance_of(chi_square: float, dof: int, noise_dof: Sequence[float]) -> float:
+    """Probability of a larger chi-square whose covariances are themselves measured, point by point.
+
+    A covariance from few repeats is too small as often as too large, and where it is too small its share of the
+    chi-square is huge. Each share is a chi-square over a mean square of its own; the sum is drawn, with a fixed seed.
+    A 2x2 complex covariance of nu degrees of freedom, inverted, is too large by nu / (nu - 4) on average: as a single
+    variance of nu / 2 is.
+    """
+    plain = float(chdtrc(dof, chi_square)) if dof > 0 else np.nan
+    finite = np.array([nu for nu in noise_dof if np.isfinite(nu) and nu < _LARGE_DOF])
+    if not len(finite) or not plain <= 0.5:
+        return plain
+    rng = np.random.default_rng(_DRAWN[1])
+    each = dof / len(noise_dof)
+    total = np.zeros(_DRAWN[0])
+    for nu in noise_dof:
+        share = rng.chisquare(each, _DRAWN[0])
+        half = max(nu / 2, 1.0)
+        total += share / (rng.chisquare(half, _DRAWN[0]) / half) if nu < _LARGE_DOF else share
+    above = float((total >= chi_square).mean())
+    return max(above, plain)
+
+
+def fit_over_frequency(
+    estimates: Sequence[DynamicStiffness], model: str, changes: FloatArray | None = None
+) -> FrequencyModel:
+    """Fit one model to the dynamic stiffnesses of one static point by generalised least squares.
+
+    `changes` (q, 8 n) [N/m]: what every source that the n estimates share does to their entries, mean of products.
+    """
+    if model not in MODELS:
+        raise ArgumentError(unknown_name("model", model, MODELS))
+    usable = [i for i, e in enumerate(estimates) if np.isfinite(e.h).all() and np.isfinite(e.covariance).all()]
+    chosen = [estimates[i] for i in usable]
+    omega = np.array([e.omega for e in chosen])
+    needed = MODELS[model] - 1
+    if len(np.unique(omega)) < needed:
+        raise ArgumentError(f"{model} needs {needed} frequencies with an answer, got {len(np.unique(omega))}")
+    # Natural scales keep the normal equations well conditioned: N/m, per omega, per omega^2.
+    middle = float(np.sqrt(omega.min() * omega.max()))
+    size = float(np.mean([np.abs(e.h).max() for e in chosen]))
+    design = over_frequency(model, np.zeros(len(chosen), dtype=np.intp), omega, np.array([middle])).columns
+    assert design is not None
+    y = np.array([e.vector for e in chosen]) / size
+    weight = np.linalg.inv(np.array([e.covariance for e in chosen]) / size**2)
+    weighted = design.transpose(0, 2, 1) @ weight
+    inverse = np.linalg.inv(np.einsum("nka,nal->kl", weighted, design))
+    scale = np.repeat(middle ** -np.arange(MODELS[model], dtype=float), 4)
+    gains = scale[:, None] * (inverse @ weighted)  # (n, p, 8): change of the parameters with every estimate
+    x = np.einsum("npa,na->p", gains, y)
+    residual = y - design @ (x / scale)
+    chi_square = float(np.einsum("na,nab,nb->", residual, weight, residual))
+    random = np.array([g @ e.covariance @ g.T for g, e in zip(gains, chosen)])
+    spare, noise_dof = 8 * len(chosen) - len(x), [float(np.median(e.dof)) for e in chosen]
+    lengths = np.linalg.norm(residual, axis=1) / np.linalg.norm(y, axis=1)
+    return FrequencyModel(
+        model,
+        size * x,
+        random.sum(axis=0),
+        _effective_dof(np.einsum("npp->np", random), np.array(noise_dof)),
+        _shared(gains, chosen, None if changes is None else changes.reshape(len(changes), -1, 8)[:, usable]),
+        chi_square,
+        spare,
+        chance_of(chi_square, spare, noise_dof),
+        float(lengths.max()),
+        (float(omega.min()) / (2 * np.pi), float(omega.max()) / (2 * np.pi)),
+        len(chosen),
+    )
+
+
+def _shared(gains: FloatArray, estimates: Sequence[DynamicStiffness], changes: FloatArray | None) -> FloatArray:
+    """Covariance (p, p) that systematic errors leave; `gains` (n, p, 8), `changes` (q, n, 8) of what all share."""
+    systematic = [np.zeros((8, 8)) if e.systematic is None else e.systematic for e in estimates]
+    if changes is None:
+        changes = np.zeros((1, len(estimates), 8))
+    together = np.einsum("npa,qna->qp", gains, changes)
+    covariance = together.T @ together / len(changes)
+    for n, total in enumerate(systematic):
+        # what no source explains is the point's own: of its baseline, of mains on the cells
+        own = total - changes[:, n].T @ changes[:, n] / len(changes)
+        covariance = covariance + gains[n] @ own @ gains[n].T
+    return np.asarray(covariance)
+
+
+def _effective_dof(variances: FloatArray, dof: FloatArray) -> FloatArray:
+    """Welch-Satterthwaite degrees of freedom (p,) of sums of variances (n, p) with `dof` (n,)."""
+    spread = np.sum(variances**2 / dof[:, None], axis=0)
+    total = variances.sum(axis=0) ** 2
+    return np.where(spread > 0, total / np.where(spread > 0, spread, 1.0), np.inf)
+
+
+@dataclass(frozen=True)
+class StaticFits:
+    """All models of one static point."""
+
+    points: tuple[PointResult, ...] = field(repr=False)
+    fits: dict[str, FrequencyModel]
+
+    @property
+    def supported(self) -> str:
+        """The simplest model that the data do not refuse, or ``"raw H"``."""
+        return supported(self.fits)
+
+
+def fits_over_frequency(points: Sequence[PointResult], changes: FloatArray | None = None) -> list[StaticFits]:
+    """Fit every static point that was run at two excitation frequencies or more; `changes` (q, 8 P) [N/m].
+
+    Points with mains on the excitation line take part: their intervals say what they are worth.
+    """
+    place = {id(p): i for i, p in enumerate(points)}
+    rows = None if changes is None else changes.reshape(len(changes), -1, 8)
+    fits = []
+    for members in by_static_point(points):
+        estimates = [p.stiffness for p in members]
+        if len({round(e.omega, 6) for e in estimates}) < 2:
+            continue
+        mine = None if rows is None else rows[:, [place[id(p)] for p in members]].reshape(len(rows), -1)
+        models = {model: fit_over_frequency(estimates, model, mine) for model in MODELS}
+        fits.append(StaticFits(tuple(members), models))
+    return fits

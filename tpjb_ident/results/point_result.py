@@ -1,0 +1,112 @@
+"""What a campaign says about one operating point, with everything needed to believe it or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigdata.arrays import FloatArray
+from rigdata.operating_point import OperatingPoint
+from tpjb_ident.conditions import Condition
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.results.amplitude import AmplitudeSlope
+from tpjb_ident.runs.static_load import LoadMiss
+
+
+@dataclass(frozen=True)
+class WindowVerdict:
+    """One window that lost its weight."""
+
+    run: str
+    time: float
+    weight: float
+    direction: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """Dynamic stiffness of one operating point.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+        Set points.
+    stiffness : DynamicStiffness
+        By the default method.
+    by_method : dict of str to DynamicStiffness
+    static_load_measured : float
+        Mean load that the cells show [N].
+    position, position_se : (2,) ndarray
+        Mean displacement (from the probes' zero) over the runs and its standard error [m].
+    temperatures : dict of int to float
+        Mean film temperature per pad [K].
+    n_records, n_windows : int
+    outlier_fraction : float
+        Share of windows with (nearly) no weight.
+    coherence : float
+        Smaller of the two force axes' multiple coherences with the displacements.
+    amplitude : float
+        Largest displacement amplitude of a direction [m].
+    quality : tuple of Condition
+        Everything that a reader of the numbers should know; empty when all is well.
+    rejected : tuple of WindowVerdict
+    runs : tuple of str
+    load_miss : LoadMiss or None
+        How far each run's static load was off.
+    linearity : AmplitudeSlope or None
+        Change of h with amplitude, where directions were run at several.
+    inertia_corrected : bool
+        Whether the housing's inertia was added to the cells' force.
+    clearance : float or None
+        Assembled clearance, where the campaign carries a bearing [m].
+    budget : dict of str to (8, 8) ndarray
+        Covariance of the default method's H by source [N^2/m^2]; the interval is their sum.
+    """
+
+    point: OperatingPoint
+    stiffness: DynamicStiffness
+    by_method: dict[str, DynamicStiffness] = field(repr=False)
+    static_load_measured: float
+    position: FloatArray = field(repr=False)
+    position_se: FloatArray = field(repr=False)
+    temperatures: dict[int, float] = field(repr=False)
+    n_records: int
+    n_windows: int
+    outlier_fraction: float
+    coherence: float
+    amplitude: float
+    quality: tuple[Condition, ...]
+    rejected: tuple[WindowVerdict, ...] = field(repr=False)
+    runs: tuple[str, ...] = field(repr=False)
+    load_miss: LoadMiss | None = field(default=None, repr=False)
+    linearity: AmplitudeSlope | None = field(default=None, repr=False)
+    inertia_corrected: bool = False
+    clearance: float | None = field(default=None, repr=False)
+    budget: dict[str, FloatArray] = field(default_factory=dict, repr=False)
+
+    def __str__(self) -> str:
+        flags = f" ({', '.join(str(q) for q in self.quality)})" if self.quality else ""
+        at = f"{self.point.static_load / 1e3:g} kN, {self.point.excitation_hz:g} Hz"
+        return f"{at}: {self.stiffness.direct_coefficients()}{flags}"
+
+    def __repr__(self) -> str:
+        return f"<PointResult: {self}>"
+
+
+def by_static_point(points: Sequence[PointResult]) -> list[list[PointResult]]:
+    """The points that have a stiffness, those of one load and speed together."""
+    groups: dict[tuple[object, ...], list[PointResult]] = {}
+    for p in points:
+        if np.isfinite(p.stiffness.h).all():
+            groups.setdefault(p.point.static_key, []).append(p)
+    return list(groups.values())
+
+
+def mean_position(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean position of a point's runs and its standard error (2,); `positions` (n_runs, 2) [m]."""
+    runs = len(positions)
+    error = positions.std(axis=0, ddof=1) / np.sqrt(runs) if runs > 1 else np.full(2, np.nan)
+    return positions.mean(axis=0), error

@@ -1,0 +1,272 @@
+"""Figures and flags that say how far a point's coefficients can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.estimators.estimate import MIN_COHERENCE, REJECTED_WEIGHT
+from tpjb_ident.estimators.stiffness import DynamicStiffness
+from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.results.point_result import PointResult, WindowVerdict, by_static_point
+from tpjb_ident.runs.point_data import PointData
+from tpjb_ident.terms.housing import HARMLESS, SOFT
+
+#: Share of the windows without phasors beyond which what is left may not stand for the record.
+_MAX_LOST = 0.6
+#: Share of the force that H leaves in the runs' means beyond which they have no H in common.
+_MAX_DISAGREEMENT = 0.06
+#: What a few runs show of a force of random phase may be so many times its size.
+_KNOWN_SCATTERS = 1.5
+#: Half of a probe's travel in a sweep over the clearance, least and most: a polygon reaches up to twice its clearance.
+_TRAVEL = (0.5, 2.5)
+#: Distance between two mean positions over the clearance, at most.
+_APART = 3.0
+#: Clearance times stiffness over load, at least: pivots that give let the shaft move by more than the clearance.
+_LEAST_STIFF = 0.5
+
+
+def coherence(D: ComplexArray, F: ComplexArray, h: ComplexArray, weights: FloatArray) -> float:
+    """Multiple coherence of the forces with the displacements, smaller axis.
+
+    `D`, `F` (n, 2), `h` (2, 2), `weights` (n,).
+    """
+    good = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1) & (weights > 0)
+    if not good.any() or not np.isfinite(h).all():
+        return float("nan")
+    w = weights[good, None]
+    residual = F[good] - D[good] @ h.T
+    power = (w * np.abs(F[good]) ** 2).sum(axis=0)
+    return float(np.min(1 - (w * np.abs(residual) ** 2).sum(axis=0) / power))
+
+
+def amplitude(data: PointData, weights: FloatArray) -> float:
+    """Largest displacement amplitude (major half-axis of the orbit) of any run's mean phasor [m]; `weights` (n,)."""
+    largest = 0.0
+    for i in range(len(data.runs)):
+        selected = (data.run_index == i) & (weights > 0) & np.isfinite(data.D).all(axis=1)
+        if selected.any():
+            z = np.average(data.D[selected], axis=0, weights=weights[selected])
+            sizes = np.linalg.svd(np.stack([z.real, z.imag]), compute_uv=False)
+            largest = max(largest, float(sizes[0]))
+    return largest
+
+
+def rejected_windows(data: PointData, h: ComplexArray, weights: FloatArray) -> tuple[WindowVerdict, ...]:
+    """Windows without weight, each with the reason that shows in its own numbers; `h` (2, 2) [N/m], `weights` (n,)."""
+    verdicts = []
+    answered = bool(np.isfinite(h).all())
+    for i in np.flatnonzero(weights < REJECTED_WEIGHT):
+        run = data.runs[data.run_index[i]]
+        k = int(i - np.searchsorted(data.run_index, data.run_index[i]))
+        direction = float("nan") if run.direction is None else run.direction
+        reason = _reason(data, run.displacement.lost[k], run.cell_force.lost[k], int(i), weights, answered)
+        verdicts.append(WindowVerdict(run.run, float(run.start[k]), float(weights[i]), direction, reason))
+    return tuple(verdicts)
+
+
+def _reason(data: PointData, lost_d: float, lost_f: float, i: int, weights: FloatArray, answered: bool) -> str:
+    for name, lost in (("displacement", lost_d), ("force", lost_f)):
+        if lost > 0.5:
+            return f"{100 * lost:.0f} % of the {name} samples missing or glitched"
+    if not (np.isfinite(data.D[i]).all() and np.isfinite(data.F[i]).all()):
+        return "missing values"
+    if not answered:
+        return "the point has no answer"
+    siblings = (data.run_index == data.run_index[i]) & (weights >= REJECTED_WEIGHT)
+    if not siblings.any():
+        return "whole run disagrees with the other directions"
+    moves = {"displacement": _shift(data.D[i], data.D[siblings]), "force": _shift(data.F[i], data.F[siblings])}
+    worst = max(moves, key=lambda name: moves[name])
+    return f"{worst} phasor {100 * moves[worst]:.1f} % away from its repeats"
+
+
+def _shift(z: ComplexArray, repeats: ComplexArray) -> float:
+    mean = repeats.mean(axis=0)
+    return float(np.linalg.norm(z - mean) / max(float(np.linalg.norm(mean)), np.finfo(float).tiny))
+
+
+def flags(data: PointData, stiffness: DynamicStiffness, coherence: float) -> tuple[Condition, ...]:
+    """Conditions that the point's figures give rise to."""
+    conditions = []
+    if not coherence >= MIN_COHERENCE and np.isfinite(stiffness.h).all():
+        conditions.append(Condition("low-coherence", f"coherence {coherence:.3f} < {MIN_COHERENCE}"))
+    conditions += _missing(data)
+    if len(data.runs) and data.runs[0].acceleration is None and np.isfinite(stiffness.h).all():
+        conditions.append(_inertia_left(data.runs[0].housing_mass, stiffness.omega))
+    return (*conditions, *feeds_motion(stiffness))
+
+
+def _inertia_left(mass: float, omega: float) -> Condition:
+    """What the housing's inertia may come to where nothing measures it: on soft cells."""
+    share = mass * omega**2 * SOFT * 1e-9
+    text = f"no accelerometers: the housing's inertia stays in F, {100 * share:.2g} % of it on soft cells"
+    return Condition("inertia-not-corrected" if share > HARMLESS else "inertia-negligible", text)
+
+
+def _missing(data: PointData) -> list[Condition]:
+    """Windows of the excitation without phasors, pointed out when they are many or a whole run's."""
+    complete = data.whole
+    driven = np.concatenate([_in_stretch(run) for run in data.runs])
+    empty = [run.run for i, run in enumerate(data.runs) if not complete[data.run_index == i].any()]
+    if empty:
+        return [Condition("run-without-data", f"no usable window in {', '.join(empty)}")]
+    complete = complete[driven]
+    lost = 1 - complete.mean()
+    if not lost > 0.1:
+        return []
+    text = f"{int((~complete).sum())} of {len(complete)} windows gave no phasors"
+    return [Condition("most-windows-lost" if lost > _MAX_LOST else "windows-missing", text)]
+
+
+def _in_stretch(run: RunPhasors) -> BoolArray:
+    """Windows within the part of the record that has the run's excitation (n,)."""
+    if run.span is None:
+        return np.ones(len(run.start), dtype=bool)
+    return (run.start >= run.span[0] - 1e-9) & (run.start + run.length <= run.span[1] + 1e-9)
+
+
+def feeds_motion(stiffness: DynamicStiffness) -> tuple[Condition, ...]:
+    """Say where damping, the symmetric part of Im h, is negative beyond doubt: no cross-coupled stiffness is in it."""
+    h = stiffness.h
+    if not np.isfinite(h).all():
+        return ()
+    doubt = 3 * float(stiffness.standard_error[4:].max())
+    if not np.linalg.eigvalsh((h.imag + h.imag.T) / 2)[0] < -doubt:
+        return ()
+    text = "the film would feed the motion instead of damping it: check polarity, axes and sign of forces"
+    return (Condition("negative-damping", text),)
+
+
+def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition, ...]:
+    """Point out rejected windows that gather in some directions: physics may do that, glitches do not; `weights` (n,).
+
+    A binomial test per run: more rejected windows than chance gives once in a thousand, in a run
+    with at least three of them.
+    """
+    from scipy.special import bdtrc
+
+    complete = data.whole
+    bad = (weights < REJECTED_WEIGHT) & complete
+    total = int(bad.sum())
+    named = []
+    for i, run in enumerate(data.runs):
+        selected = (data.run_index == i) & complete
+        n, hits = int(selected.sum()), int(bad[selected].sum())
+        others = (total - hits + 0.5) / (int(complete.sum()) - n + 1.0)
+        if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(others, 1.0)) < 1e-3:
+            angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
+            named.append(f"{run.run}{angle} ({hits} of {n})")
+    if not named:
+        return ()
+    text = f"rejected windows gather in {', '.join(named)}: look before discarding"
+    return (Condition("directional-rejection", text),)
+
+
+def disagreeing_runs(
+    data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0
+) -> tuple[Condition, ...]:
+    """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
+
+    `known` [N]: force of random phase that the runs hold.
+    """
+    if not np.isfinite(h).all():
+        return ()
+    good = data.whole & (weights > 0)
+    shares, sizes = [], []
+    for i in range(len(data.runs)):
+        selected = good & (data.run_index == i)
+        if selected.any():
+            # repeats of one motion, whatever phase the drive had in each
+            gram = data.D[selected].conj().T @ data.D[selected]
+            first = np.linalg.eigh(gram)[1][:, -1]
+            along = data.D[selected] @ first.conj()
+            residual = (data.F[selected] - data.D[selected] @ h.T) * np.exp(-1j * np.angle(along))[:, None]
+            sizes.append(float(np.linalg.norm(data.F[selected], axis=1).mean()))
+            shares.append(float(np.linalg.norm(residual.mean(axis=0))) / sizes[-1])
+    if len(shares) < 3:
+        return ()
+    # two runs fix H: what is left over is shared by all of them
+    share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
+    if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * known / float(np.mean(sizes))):
+        return ()
+    text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
+    return (Condition("runs-disagree", text),)
+
+
+def with_probe_doubts(
+    swept: Mapping[tuple[str, str], float], points: Sequence[PointResult], clearance: float | None
+) -> tuple[PointResult, ...]:
+    """The points, each with the doubt that the probes' readings are no lengths in this bearing, where there is one.
+
+    Coefficients alone never show a wrong scale of the probes: stiffness and damping shrink alike. The drawing's
+    clearance is a length that they can be held against, in three ways:
+
+    - in a clearance sweep a probe travels once through the clearance, and little more (`swept`: half of it by run and
+      probe [m]);
+    - the shaft does not leave the clearance between one operating point and another;
+    - a film stiffens as it is loaded, so that the load W moved the shaft by more than W / K, which the clearance must
+      hold.
+    """
+    if clearance is None or not clearance > 0:
+        return tuple(points)
+    sentences = [*_sweeps(swept, clearance), *_positions(points, clearance), *_stiffness(points, clearance)]
+    if not sentences:
+        return tuple(points)
+    cure = "is the probes' sensitivity right in the manifest?"
+    doubt = Condition(
+        "probes-contradict-clearance", f"{'; '.join(sentences)} (clearance {1e6 * clearance:.0f} um): {cure}"
+    )
+    return tuple(replace(point, quality=merged(point.quality, (doubt,))) for point in points)
+
+
+def _sweeps(swept: Mapping[tuple[str, str], float], clearance: float) -> list[str]:
+    table: dict[str, str] = {}
+    for (run, name), half in swept.items():
+        if half <= _TRAVEL[0] * clearance or half >= _TRAVEL[1] * clearance:
+            table[name] = f"{name} travels {1e6 * half:.3g} um to either side in the sweep {run}"
+    return list(table.values())
+
+
+def _positions(points: Sequence[PointResult], clearance: float) -> list[str]:
+    places = np.array([p.position for p in points if np.isfinite(p.position).all()]).reshape(-1, 2)
+    if len(places) < 2:
+        return []
+    distance = float(np.hypot(*np.ptp(places, axis=0)))
+    return [f"the shaft's mean positions lie {1e6 * distance:.3g} um apart"] if distance > _APART * clearance else []
+
+
+def _stiffness(points: Sequence[PointResult], clearance: float) -> list[str]:
+    soft_points = []
+    for load, direction, stiffness in _static_stiffness(points):
+        along = np.array([np.cos(direction), np.sin(direction)])
+        value = float(along @ stiffness @ along)
+        if load > 0 and 0 < value < _LEAST_STIFF * load / clearance:
+            soft_points.append((value * clearance / load, load, value))
+    if not soft_points:
+        return []
+    _, load, value = min(soft_points)
+    return [
+        f"{load / 1e3:g} kN on a stiffness of {value / 1e6:.3g} MN/m would move the shaft by more than "
+        f"{1e6 * load / value:.3g} um"
+    ]
+
+
+def _static_stiffness(points: Sequence[PointResult]) -> list[tuple[float, float, FloatArray]]:
+    """Load, direction and stiffness (2, 2) at rest: Re h = K - omega^2 M, extrapolated over the frequencies of a load.
+
+    With a single frequency Re h itself stands in.
+    """
+    result = []
+    for members in by_static_point(points):
+        load, direction = members[0].point.static_load, members[0].point.static_load_direction
+        square = np.array([p.stiffness.omega**2 for p in members])
+        k = np.array([p.stiffness.k.ravel() for p in members])
+        several = len(members) > 1 and np.ptp(square) > 0
+        at_rest = np.polynomial.polynomial.polyfit(square, k, 1)[0] if several else k[0]
+        result.append((load, direction, at_rest.reshape(2, 2)))
+    return result

@@ -1,0 +1,174 @@
+"""Turning all runs of a campaign to phasors: one job per run, wherever the workers are.
+
+A job carries the run's description and reads the file itself, so that little travels out and a few phasors
+travel back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rigdata.campaign import Campaign
+from rigdata.problem import Problem, RigDataError
+from rigdata.run import Run
+from tpjb_ident.check.findings import Reporter
+from tpjb_ident.check.observation import Observation, observe
+from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
+from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_phasors import PhasorSettings, run_phasors
+from tpjb_ident.phasors.shaft import shaft_phases
+from tpjb_ident.phasors.windows import RecordTooShortError
+from tpjb_ident.runs.excluded_runs import DEAD_ACCELEROMETER, ExcludedRun
+from tpjb_ident.runs.finished_runs import FinishedRuns, RunDigest, digest
+from tpjb_ident.runs.point_data import mean_temperatures, point_of
+from tpjb_ident.runs.run_store import RunStore, fingerprint
+from tpjb_ident.runtime.executors import Workers
+
+Progress = Callable[[str, int, int], None]
+
+
+def all_runs(
+    campaign: Campaign,
+    settings: PhasorSettings,
+    progress: Progress,
+    workers: Workers | None = None,
+    store: RunStore | None = None,
+) -> FinishedRuns:
+    """What every dynamic run says; one that cannot be used is left out and named."""
+    runs = campaign.of_kind("dynamic")
+    mass = campaign.housing_mass
+    progress(runs[0].id if runs else "", 0, len(runs))
+    jobs = [(_anywhere(run), mass, settings, None if store is None else store.known(run.id)) for run in runs]
+    finished: dict[int, RunDigest | ExcludedRun] = {}
+    outcomes = (workers or Workers()).outcomes(process_run, jobs)
+    for done, (index, outcome) in enumerate(outcomes, start=1):  # nothing is held back to be put in order
+        mark, result = outcome.get()
+        run = runs[index]
+        if store is not None and mark and isinstance(result, RunDigest):
+            store.keep(mark, result)
+        if store is not None and result is None:  # or cleared by another command since
+            result = store.load(run, mark)
+        finished[index] = result or one_run(run, mass, settings)
+        progress(run.id, done, len(runs))
+    found = FinishedRuns(tuple(finished[index] for index in sorted(finished)))
+    return found.without(_dead_accelerometers(found.digests))
+
+
+def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
+    """Runs with a dead accelerometer, where most of the others show that there is an acceleration."""
+    cure = "Check sensor, cable and amplifier; repeat the run"
+    dead = {}
+    for run in digests:
+        for condition in run.phasors.conditions:
+            if condition == DEAD_ACCELEROMETER:
+                dead[run.run] = Problem("error", run.seen[0].run.file, "", condition.detail, cure, run.run)
+    return dead if 2 * len(dead) < len(digests) else {}
+
+
+def process_run(
+    run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
+) -> tuple[str, RunDigest | ExcludedRun | None]:
+    """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
+
+    The fingerprint is "" where the record changed while it was read: such a result must not be kept. Where nothing
+    is kept anywhere (`known` is None) it is not asked for.
+    """
+    try:
+        if known is None:
+            return "", one_run(run, housing_mass, settings)
+        with run.opened():  # once for both
+            mark = fingerprint(run, housing_mass, settings)
+            if mark and mark == known:
+                return mark, None
+            before = _state(run)
+            result = one_run(run, housing_mass, settings)
+        return (mark if before == _state(run) else ""), result
+    except (RigDataError, RecordTooShortError) as error:
+        return "", ExcludedRun(run.id, run.point, error)
+
+
+def _state(run: Run) -> tuple[int, int] | None:
+    path = getattr(getattr(run, "reader", None), "path", None)
+    if path is None:
+        return None
+    try:
+        state = path.stat()
+    except OSError:  # it has vanished: reading says so, with a better message
+        return None
+    return state.st_size, state.st_mtime_ns
+
+
+def _anywhere(run: Run) -> Any:
+    """The run with its file's absolute path: workers may stand in another folder."""
+    reader: Any = getattr(run, "reader", None)
+    if reader is None or reader.path.is_absolute():
+        return run
+    return replace(run, reader=replace(reader, path=reader.path.absolute()))
+
+
+def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDigest:
+    """What one run says."""
+    with run.opened():
+        cached = with_kept_beginning(run)
+        try:
+            phasors = run_phasors(cached, housing_mass, settings)
+        except RecordTooShortError as error:
+            raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
+        seen = _seen(run, cached, phasors)
+        phasors, dead = _without_dead(phasors, seen[0])
+        conditions = merged(phasors.conditions, dead, _repaired(run))
+        result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
+        return digest(result, mean_temperatures(cached), run.sample_rate, seen)
+
+
+def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
+    """What the checks make of the run's beginning, at every excitation frequency that was found in it.
+
+    The observations are of the run itself, so that what the beginning holds in memory may go.
+    """
+    beginning, driven = beginning_of(kept), phasors.lines.driven
+    seen = []
+    for line, frequency in enumerate(driven):
+        alone = len(driven) == 1
+        point = replace(run.point, excitation=2 * np.pi * frequency) if alone else point_of(run.point, frequency)
+        observed = observe(replace(beginning, point=point), phasors, line)
+        own = run if alone else replace(run, point=point)
+        report = Reporter(own, observed.report.found, observed.report.doubts)
+        seen.append(replace(observed, run=own, report=report))
+    return tuple(seen)
+
+
+def _repaired(run: Run) -> tuple[Condition, ...]:
+    """What the reader had to repair in the record."""
+    problems = run.reader.problems() if hasattr(run, "reader") else ()
+    repairs = [f"{p.file}, {p.place}: {p.what}" for p in problems if p.severity == "warning"]
+    return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
+
+
+def _without_dead(phasors: RunPhasors, seen: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+    """The run without spare channels that the checks call dead; refused with a dead probe or cell.
+
+    What is said of a dead accelerometer: the run may do without.
+    """
+    dead = {finding.key: finding.problem for finding in seen.report.found if finding.key.startswith("dead ")}
+    grave, said, spare = [], [], []
+    for k, channel in enumerate(phasors.channels):
+        problem = dead.get(f"dead {channel.name}")
+        if problem is None:
+            continue
+        if problem.severity != "error":
+            spare.append(k)
+        elif channel.quantity == "acceleration":
+            said.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
+        else:
+            grave.append(problem)
+    if grave:
+        raise RigDataError(grave)
+    z, mean = phasors.z.copy(), phasors.mean.copy()
+    z[:, :, spare], mean[:, spare] = np.nan, np.nan
+    return replace(phasors, z=z, mean=mean), tuple(said)
