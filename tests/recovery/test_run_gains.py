@@ -17,7 +17,7 @@ from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 
 SHORT = replace(PLAN, locus=(), dry=())
-MISS = Noise.like_samples().set_point
+SPEED_MISS = Noise.like_samples().speed_miss
 
 
 def found(path) -> list[tuple[str | None, str]]:
@@ -46,7 +46,7 @@ def test_runs_that_each_have_a_temperature_of_their_own_are_not_blamed(campaign_
     """Stiffness scatters by 1 %, damping by 2 %, positions by 0.5 um from run to run."""
 
     def warm(point: OperatingPoint) -> float:
-        return (point.shaft_speed_hz / 22.0 - 1) / MISS.speed if point.shaft_speed > 0 else 0.0
+        return (point.shaft_speed_hz / 22.0 - 1) / SPEED_MISS if point.shaft_speed > 0 else 0.0
 
     def stiffness(point: OperatingPoint):
         share = 0.01 * warm(point)

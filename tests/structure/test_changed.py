@@ -97,7 +97,7 @@ def test_changed_deleted_and_new_files_are_listed(tmp_path):
 @pytest.mark.slow
 def test_the_graph_knows_whatever_a_command_really_imports():
     """Modules of ours that Python has loaded after the commands were imported: the graph must lead to each."""
-    entries = ("identification.identify", "compare.comparison", "diagnosis.diagnose", "cli.app")
+    entries = ("identification.identify", "compare.comparison", "diagnosis.diagnose", "cli.commands.app")
     heart = [f"tpjb_ident.{name}" for name in entries]
     code = f"import sys, {', '.join(heart)}\nprint(*sorted(m for m in sys.modules if m.split('.')[0] in {TOPS}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)

@@ -33,7 +33,7 @@ from tpjb_ident.compare.static_tests import bearing_problems
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-MISS = Noise.like_samples().set_point
+NOISE = Noise.like_samples()
 BEARING = BEARINGS / "rocker.toml"
 TEXT = BEARING.read_text("utf-8")
 #: Of that bearing, and of the virtual rig's polygon [m].
@@ -125,8 +125,8 @@ def write_wandering(path: Path, seed: int) -> None:
     size, heavy = (0.5, 1.0, 2.0)[seed % 3], bool(seed // 3 % 2)
 
     def chance(point: OperatingPoint) -> tuple[float, float]:
-        warm = (point.shaft_speed_hz / 22.0 - 1) / MISS.speed
-        turned = (point.static_load_direction + math.pi / 2) / MISS.direction
+        warm = (point.shaft_speed_hz / 22.0 - 1) / NOISE.speed_miss
+        turned = (point.static_load_direction + math.pi / 2) / NOISE.direction_miss
         return (warm * abs(warm), turned * abs(turned)) if heavy else (warm, turned)
 
     def stiffness(point: OperatingPoint) -> ComplexArray:

@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
-from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, Nuisance
+from tpjb_ident.diagnosis.forward.nuisance import OWN_NUMBERS, TOGETHER, Nuisance
 from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 from tpjb_ident.diagnosis.observations.folds import held_out
 from tpjb_ident.diagnosis.observations.model_error import model_error
@@ -20,6 +20,8 @@ from tpjb_ident.diagnosis.observations.observe import Observations
 
 #: Pads that are all uneven are tolerances, one by one.
 _TOLERANCES_ALREADY = frozenset({"uneven_pads"})
+#: Amplitude at which a tolerance is held against an effect.
+_SMALL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,18 @@ class Problem:
     def faults(self) -> tuple[Fault, ...]:
         """What may be wrong."""
         return faults_of(self.pool, self.nuisances)
+
+    def said_by(self, fault: Fault) -> dict[int, float]:
+        """Tolerances that say a fault, one or all alike, and how far each goes per amplitude; none where none does."""
+        if fault.own >= 0:
+            return {fault.own: 1.0}
+        single = TOGETHER.get(fault.name, "")
+        members = {i: n.sigma for i, n in enumerate(self.nuisances) if single and n.effect.startswith(f"{single} ")}
+        if not members:
+            return {}
+        number, parameter = OWN_NUMBERS[single], fault.candidate.parameter
+        change = number.change(parameter.from_linear(fault.candidate.neutral + _SMALL)) / _SMALL
+        return {i: change / sigma for i, sigma in members.items()}
 
     @functools.cached_property
     def held(self) -> BoolArray:

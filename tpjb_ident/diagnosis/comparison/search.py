@@ -304,10 +304,13 @@ class _Search:
                 self._propose_without(fit, fault)
 
     def _beside(self, path: Path, fit: Fit) -> Path:
-        """A path beside a fit: a tolerance's own number has its derivative there, which large faults change."""
-        if path.fault.own < 0:
+        """A path beside a fit: what tolerances say has their derivatives there, which large faults change."""
+        members = self.problem.said_by(path.fault)
+        if not members:
             return path
-        return Path(path.fault, fit.point.jacobian[:, [fit.unknowns.amplitudes + path.fault.own]])
+        first, jacobian = fit.unknowns.amplitudes, fit.point.jacobian
+        column = np.sum([share * jacobian[:, first + i] for i, share in members.items()], axis=0)
+        return Path(path.fault, column[:, None])
 
     def _propose(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> None:
         """Add a fault to a model."""

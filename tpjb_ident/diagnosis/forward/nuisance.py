@@ -60,6 +60,9 @@ OWN_NUMBERS = {
     "thermometer_offset": OwnNumber("thermometer", "K", "pad"),
 }
 
+#: Effects that do alike what others do at one place each: their tolerances together say them.
+TOGETHER = {"pivot_flexibility": "soft_pivot", "probe_gain": "one_probe_gain", "loadcell_gain": "one_cell_gain"}
+
 
 @dataclass(frozen=True)
 class Nuisance:
