@@ -127,7 +127,7 @@ class _Search:
         if leader is not None and leader.posterior.scale <= self.settings.right:
             order = [p for p in order if self._promising(p, leader)]
         if not order:
-            return None if leader is None else self._look_alike(leader)
+            return None if leader is None else self._look_alike(leader) or self._passed_over(leader)
         return self.proposals.pop(order[0].labels)
 
     def _look_alike(self, leader: Fit) -> Proposal | None:
@@ -141,6 +141,13 @@ class _Search:
             if proposal.labels not in self.fits:
                 return proposal
         return None
+
+    def _passed_over(self, leader: Fit) -> Proposal | None:
+        """A coarse start that others came before: one cause that does it all is likelier than several."""
+        waiting = [p for p in self.proposals.values() if p.coarse and p.labels not in self.fits]
+        if len(leader.faults) < 2 or not waiting:
+            return None
+        return self.proposals.pop(max(waiting, key=lambda p: p.estimate).labels)
 
     def _alike(self, fit: Fit, fault: Fault) -> list[Path]:
         """Paths of effects that a campaign could not tell from a fault at a size that it sees."""
