@@ -15,6 +15,7 @@ import numpy as np
 
 from model.setup import Setup
 from rigdata.arrays import BoolArray, FloatArray
+from tpjb_ident.diagnosis.comparison.scores import separation
 from tpjb_ident.diagnosis.forward.candidates import Candidate, one_amplitude
 from tpjb_ident.diagnosis.forward.forward import Forward, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import at_baseline
@@ -152,10 +153,9 @@ def separated(chosen: Sequence[Candidate], white: FloatArray) -> CampaignPlan:
     size = np.linalg.norm(white, axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):  # a signature of nothing has no direction: NaN
         unit = white / size
-    cosine = np.clip(unit.T @ unit, -1.0, 1.0)
-    separation = Deciding.seen * np.sqrt(1.0 - cosine**2)
-    np.fill_diagonal(separation, np.nan)
-    return CampaignPlan(tuple(chosen), size, separation)
+    apart = separation(unit.T @ unit)
+    np.fill_diagonal(apart, np.nan)
+    return CampaignPlan(tuple(chosen), size, apart)
 
 
 _DIRECT = frozenset({"kxx", "kyy", "cxx", "cyy"})

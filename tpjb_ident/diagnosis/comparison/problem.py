@@ -119,11 +119,11 @@ class Problem:
         if fault.own >= 0:
             return {fault.own: 1.0}
         single = TOGETHER.get(fault.name, "")
-        members = {i: n.sigma for i, n in enumerate(self.nuisances) if single and n.effect.startswith(f"{single} ")}
+        members = {i: n.sigma for i, n in enumerate(self.nuisances) if n.effect.startswith(f"{single} ")}
         if not members:
             return {}
-        number, parameter = OWN_NUMBERS[single], fault.candidate.parameter
-        change = number.change(parameter.from_linear(fault.candidate.neutral + _SMALL)) / _SMALL
+        value = fault.candidate.parameter.from_linear(fault.candidate.neutral + _SMALL)
+        change = OWN_NUMBERS[single].change(value) / _SMALL
         return {i: change / sigma for i, sigma in members.items()}
 
     @functools.cached_property

@@ -15,6 +15,7 @@ from scipy.special import logsumexp, ndtr
 from rigdata.arrays import FloatArray
 from tpjb_ident.diagnosis.comparison.evidence import ErrorModel, Levels, Linear
 from tpjb_ident.diagnosis.comparison.paths import Path
+from tpjb_ident.diagnosis.observations.constants import Deciding
 
 #: Scales of which straight columns give the amplitudes to look at.
 _EVERY = 4
@@ -44,6 +45,11 @@ class Strain:
             return 1.0
         farthest = float(np.max(np.abs(self.rows @ theta) / self.deviation))
         return min(1.0, len(self.rows) * 2.0 * float(ndtr(-farthest)))
+
+
+def separation(cosine: FloatArray) -> FloatArray:
+    """Standard deviations between an effect of a size that is seen and all that another one can imitate of it."""
+    return Deciding.seen * np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
 
 
 def scores(errors: ErrorModel, linear: Linear, paths: Sequence[Path], strain: Strain) -> list[Score]:

@@ -21,7 +21,7 @@ from tpjb_ident.diagnosis.comparison.evidence import Levels, Linear, posterior
 from tpjb_ident.diagnosis.comparison.fit import Fit, Point, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
-from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores
+from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separation
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.comparison.unknowns import Unknowns
 from tpjb_ident.diagnosis.forward.workers import Map
@@ -161,22 +161,17 @@ class _Search:
         )
         gram = levels.product(slice(1, levels.rest.shape[1]))[fit.posterior.leading, 1:, 1:]
         size = np.sqrt(np.maximum(np.diag(gram), 1e-12))
-        cosine = np.abs(gram / np.outer(size, size))[: own.shape[1]].max(axis=0)
-        apart = Deciding.seen * np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-        alike, start = [], own.shape[1]
-        for path in others:
-            stop = start + path.columns.shape[1]
-            if apart[start:stop].min() < Deciding.visible:
-                alike.append(path)
-            start = stop
-        return alike
+        count = own.shape[1]
+        nearest = separation(gram / np.outer(size, size))[:count].min(axis=0)
+        ends = np.cumsum([count, *(path.columns.shape[1] for path in others)])
+        return [p for p, part in zip(others, np.split(nearest, ends[:-1])[1:]) if part.min() < Deciding.visible]
 
     def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Proposal:
         """A fit with another fault in the place of one of its own."""
         faults, linear = self._without(fit, fault)
         score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, len(linear.theta))), np.zeros(0)))[0]
-        point = Point(linear.theta, self.problem.measured - linear.residual, linear.jacobian)
-        return replace(self._with(score, faults, point), solved=None)
+        predicted = self.problem.measured - linear.residual
+        return replace(self._with(score, faults, Point(linear.theta, predicted, linear.jacobian)), solved=None)
 
     @property
     def _passed(self) -> bool:
@@ -315,8 +310,8 @@ class _Search:
         members = self.problem.said_by(path.fault)
         if not members:
             return path
-        first, jacobian = fit.unknowns.amplitudes, fit.point.jacobian
-        column = np.sum([share * jacobian[:, first + i] for i, share in members.items()], axis=0)
+        own = fit.point.jacobian[:, fit.unknowns.amplitudes :]
+        column = np.sum([share * own[:, i] for i, share in members.items()], axis=0)
         return Path(path.fault, column[:, None])
 
     def _propose(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> None:
@@ -354,9 +349,8 @@ class _Search:
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
         """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
         faults = tuple(f for f in fit.faults if f is not fault)
-        point, at = fit.point, fit.unknowns.slices[fit.faults.index(fault)]
-        residual = self.problem.measured - point.prediction
-        theta, jacobian = point.theta, point.jacobian
+        linear, at = fit.linear, fit.unknowns.slices[fit.faults.index(fault)]
+        residual, theta, jacobian = linear.residual, linear.theta, linear.jacobian
         if fault.own < 0:
             residual = residual + jacobian[:, at] @ theta[at]
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
