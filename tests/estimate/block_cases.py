@@ -11,6 +11,7 @@ import numpy as np
 from rigdata.operating_point import OperatingPoint
 from tests.phasors.phasor_cases import complex_normal
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
+from tpjb_ident.estimate.sensors import CORNERS
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.load_turn import PLAUSIBLE
@@ -72,6 +73,7 @@ class Case:
     bent: float = 0.0  #: change of H by the usual motion
     bent_told: float = 0.0  #: what the harmonics let expect of it
     corner: float = 0.0  #: Hz: of cells that show no static force
+    input_corner: float = 0.0  #: Hz: of the accelerometers
     crosstalk: float = 0.0  #: share of the second cell in the first
 
 
@@ -83,7 +85,8 @@ def sensors_of(case: Case) -> tuple[Sensor, ...]:
         names += [("A1", "acceleration"), ("A2", "acceleration")]
     sensors = []
     for name, quantity in names:
-        stated = {**case.stated.get(quantity, {}), **case.stated.get(name, {})}
+        usual = {"corner_uncertainty": CORNERS.get(quantity, 0.0)}
+        stated = {**usual, **case.stated.get(quantity, {}), **case.stated.get(name, {})}
         sensors.append(Sensor(name, quantity, **stated))
     return tuple(sensors)
 
@@ -204,8 +207,9 @@ def _factor(case, sensors, omega, temperature) -> np.ndarray:
     drift = np.array([case.drift.get(sensor.name, 0.0) for sensor in sensors])
     away = temperature - temperature.mean()
     exponent = gain - 1j * omega[:, None] * (late + fast * MIDDLE) + away[:, None] * drift
-    cells = np.array([sensor.quantity == "force" for sensor in sensors])
-    return np.exp(exponent) / (1 - 2j * np.pi * case.corner / omega[:, None] * cells)
+    corners = {"force": case.corner, "acceleration": case.input_corner}
+    corner = np.array([corners.get(sensor.quantity, 0.0) for sensor in sensors])
+    return np.exp(exponent) / (1 - 2j * np.pi * corner / omega[:, None])
 
 
 def solved(rig: Rig, blocks: Blocks, truth: np.ndarray, *more, without=(), seed: int = 1) -> Solution:

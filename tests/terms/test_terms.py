@@ -10,6 +10,7 @@ import pytest
 from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved, terms_of
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
+from tpjb_ident.terms.registry import learnt_rig
 from tpjb_ident.terms.temperature import Temperature
 
 SEEDS = range(3)
@@ -113,7 +114,7 @@ def test_a_low_corner_that_nobody_states_stands_in_the_interval(seed, accelerome
     assert held(solution, truth, 2.5)
     ignored = solved(replace(rig, static=True), blocks, truth)
     assert np.abs(away(ignored, truth)).max() > 8
-    said = replace(rig, sensors=tuple(replace(s, corner_stated=True) for s in rig.sensors))
+    said = replace(rig, sensors=tuple(replace(s, corner_uncertainty=0.0) for s in rig.sensors))
     assert not any(term.parameters for term in terms_of(said, blocks) if term.name == "corner")
 
 
@@ -128,6 +129,23 @@ def test_two_frequencies_tell_the_corner_by_the_housing_s_equations(seed, corner
     assert held(solution, truth)
     term = next(t for t in terms_of(rig, blocks) if t.name == "corner")
     assert "low corner" in term.words(of(solution, "corner"))[0]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    ("hertz", "corner", "late"), [((25.0, 45.0), 1.2, 0.0), ((25.0,), 0.7, 0.0), ((25.0, 45.0), 0.0, 1e-3)]
+)
+def test_accelerometers_that_lead_have_a_corner_or_the_cells_come_late(seed, hertz, corner, late):
+    """What leads falls with frequency or grows with it; at one frequency the interval holds both."""
+    rig, blocks, truth = made(Case(hertz=hertz, input_corner=corner, late={"force": late}, noise=2e-4), seed)
+    first = solved(rig, blocks, truth)
+    learnt = learnt_rig(rig, first)
+    assert learnt is not rig
+    solution = solved(learnt, blocks, truth)
+    assert held(solution, truth)
+    assert (_LATE in solution.conditions()) == bool(late)
+    if len(hertz) > 1:
+        assert of(solution, "corner").value[0] == pytest.approx(corner, abs=0.3)
 
 
 def test_a_delay_of_the_probes_is_considered_where_cells_carry_the_housing():

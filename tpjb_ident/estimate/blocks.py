@@ -32,7 +32,8 @@ class Sensor:
     device: str = ""
     plane: float = 0.0
     temperature_coefficient_uncertainty: float = 0.0
-    corner_stated: bool = False  #: a filter that ends at a low corner, or a measured response
+    corner_uncertainty: float = 0.0  #: Hz: of a low corner that nobody states, one deviation
+    out_of_step: bool = False  #: leads what the springs under the housing make of the cells' force
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,11 @@ class Rig:
     contradicted: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
     bare: RigStiffness = field(default_factory=RigStiffness, repr=False)
     static: bool = True  #: whether the cells show the static load
+
+    @property
+    def out_of_step(self) -> bool:
+        """Whether accelerometers lead what the springs under the housing make of the cells' force."""
+        return any(sensor.out_of_step for sensor in self.sensors)
 
     def of(self, quantity: str) -> IntArray:
         """Rows of the sensors of a quantity."""

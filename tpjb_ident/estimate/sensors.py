@@ -20,6 +20,8 @@ _NOTHING = 1e-6
 #: Gain uncertainty of a sensor of more than two for which the manifest states none, as `[tolerances] probe_gain` has
 #: it: what such sensors tell of one another needs one.
 _USUAL_GAIN = 0.005
+#: Low corners that are plausible where none is stated, by quantity, one deviation [Hz]: see `terms.corner`.
+CORNERS = {"force": 0.5, "acceleration": 1.0}
 
 
 def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
@@ -41,11 +43,16 @@ def sensors_of(campaign: Campaign) -> tuple[Sensor, ...]:
                 channel.clock,
                 channel.plane,
                 channel.temperature_coefficient_uncertainty,
-                any(getattr(filtered, "side", "high") == "high" for filtered in channel.response.filters),
+                0.0 if _has_low_corner(channel) else CORNERS.get(quantity, 0.0),
             )
             for channel in alike
         ]
     return tuple(sensors)
+
+
+def _has_low_corner(channel: Channel) -> bool:
+    """Whether a filter that is stated ends at a low corner, or the response was measured."""
+    return any(getattr(filtered, "side", "high") == "high" for filtered in channel.response.filters)
 
 
 def alive(sensors: Sequence[Sensor], size: FloatArray, least: float = _NOTHING) -> BoolArray:

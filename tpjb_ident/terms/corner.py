@@ -1,8 +1,8 @@
-"""Low corner of cells that show no static force: charge leaks away, and what leaks leads the force by corner over f.
+"""Low corner of charge amplifiers and capacitor-coupled inputs: what leaks away leads the truth by corner over f.
 
-Data sheets put the corner at some tenths of a hertz (charge amplifiers 0.001 to 1 Hz, inputs coupled by a capacitor 0.5
-to 0.7 Hz): K times that lead goes into C. The housing's equations tell it from a loss in the springs, which does not
-fall with frequency.
+Data sheets put it at some tenths of a hertz up to a few (charge amplifiers 0.001 to 1 Hz, inputs coupled by a capacitor
+0.5 to 3.4 Hz). Cells that show no static force have one: K times their lead goes into C. Accelerometers are asked for
+theirs where they lead what the springs make of the cells' force; over frequencies it falls, as no delay does.
 """
 
 from __future__ import annotations
@@ -14,26 +14,28 @@ from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.term import Factor, Parameter
 
-#: Plausible corner where none is stated, one standard deviation [Hz].
-_CORNER = 0.5
-
 
 class Corner(Factor):
-    """One corner f_c of all cells whose filter is not stated: they read 1 / (1 - i f_c / f) times the truth."""
+    """One corner f_c of all sensors of a quantity whose filter is not stated: they read 1 / (1 - i f_c / f) of it."""
 
     name = "corner"
-    sentence = "the cells' low corner is {value:.2g} Hz (standard error {error:.2g} Hz)"
+    sentence = "the {p.name}' low corner is {value:.2g} Hz (standard error {error:.2g} Hz)"
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
-        self._cells = [j for j in rig.of("force") if not rig.static and not rig.sensors[j].corner_stated]
-        if self._cells:
-            self.parameters = (Parameter("cells", "Hz", _CORNER),)
+        self._rows = []
+        asked = {"cells": ("force", not rig.static), "accelerometers": ("acceleration", rig.out_of_step)}
+        for name, (quantity, applies) in asked.items():
+            rows = [j for j in rig.of(quantity) if rig.sensors[j].corner_uncertainty]
+            if rows and applies:
+                self._rows.append(rows)
+                self.parameters += (Parameter(name, "Hz", rig.sensors[rows[0]].corner_uncertainty),)
 
     def exponent(self, blocks: Blocks) -> ComplexArray:
-        """I / f in the cells' rows, per Hz."""
-        exponent = np.zeros((*blocks.z.shape, 1), complex)
-        exponent[:, self._cells, 0] = 2j * np.pi / blocks.omega[:, None]
+        """I / f in the rows of each quantity, per Hz."""
+        exponent = np.zeros((*blocks.z.shape, self.width), complex)
+        for k, rows in enumerate(self._rows):
+            exponent[:, rows, k] = 2j * np.pi / blocks.omega[:, None]
         return exponent
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:

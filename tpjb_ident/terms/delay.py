@@ -14,6 +14,9 @@ from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
 
 _MILLISECOND = 1e-3
+#: Standard errors from which cells come late, and not the accelerometers early.
+_CLEAR = 2.0
+_OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
 
 class Delay(Factor):
@@ -40,8 +43,12 @@ class Delay(Factor):
         return np.asarray(-1j * _MILLISECOND * blocks.omega[:, None, None] * self._late, complex)
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
-        """Devices that are later than stated."""
+        """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
+        if self.rig.out_of_step:
+            late = np.abs(fitted.value) > _CLEAR * fitted.deviation
+            said = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
+            return tuple(condition for condition in said if condition == _OUT_OF_STEP and late.any())
         names = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
         if not names:
             return ()
-        return (Condition("cells-and-accelerometers-out-of-phase", f"{'; '.join(self.words(fitted))}"),)
+        return (Condition(_OUT_OF_STEP, f"{'; '.join(self.words(fitted))}"),)

@@ -61,8 +61,8 @@ class Housing(Term):
                 Parameter("c_xx", "nm/N", SOFT, usual),
                 Parameter("c_yy", "nm/N", SOFT, usual),
                 Parameter("c_xy", "nm/N", across),
-                # what cells without static part lead by beyond a mount's loss is their corner's
-                Parameter("loss", "1", loss if rig.static else _LOSS / 2),
+                # what is beyond a mount's loss is then a delay's or a corner's
+                Parameter("loss", "1", _LOSS / 2 if rig.out_of_step or not rig.static else loss),
             )
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
@@ -107,8 +107,8 @@ class Housing(Term):
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
-        if self.rig.contradicted.get(self.name):
-            return self.rig.contradicted[self.name]
+        if self.rig.out_of_step:  # the delay of the cells tells whether that stays
+            return ()
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if fitted.unexplained > _UNEXPLAINED and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
@@ -149,7 +149,7 @@ class Housing(Term):
         return x, y
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
-        """Cells as uncertain in time as they come late: a spring's loss is positive, late cells make it negative."""
+        """Cells as uncertain in time as accelerometers lead them: a spring's loss is positive, late cells lower it."""
         stated = any(sensor.delay_uncertainty for sensor in sensors)
         if stated or self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
             return None
@@ -157,7 +157,8 @@ class Housing(Term):
         if not loss < -2 * error:
             return None
         late = -loss / self._omega
-        return tuple(replace(s, delay_uncertainty=late) if s.quantity == "force" else s for s in sensors)
+        changes = {"force": {"delay_uncertainty": late}, "acceleration": {"out_of_step": True}}
+        return tuple(replace(s, **changes.get(s.quantity, {})) for s in sensors)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:
