@@ -122,6 +122,16 @@ class Solver:
         self.moved = False
         self.housing_noise = HOUSING_NOISE[rig.mount]
 
+    def begun(self, solution: Solution) -> Solver:
+        """The same, from where another solve of the blocks ended; what is new to it begins at its prior."""
+        for term in self.terms:
+            fitted = solution.fitted.get(term.name)
+            if fitted is not None and len(fitted.value) == len(term.parameters):
+                (self.own if term.points else self.shared).put(term, fitted.value)
+        self.h = np.where(np.isfinite(solution.h), solution.h, self.h)
+        self.housing_noise = solution.housing_noise
+        return self
+
     def run(self) -> Solution:
         """Steps until H rests."""
         count = 0

@@ -107,12 +107,13 @@ class _Task:
     correct: bool
     kept: Solution | None  #: whose scatter, weights and shared parameters stay
 
-    def solved(self, start: ComplexArray, shape: Shape) -> Solution:
-        """One solve from a start (P, 2, 2), NaN where points take no part."""
+    def solved(self, start: ComplexArray, shape: Shape, begun: Solution | None = None) -> Solution:
+        """One solve from a start (P, 2, 2), NaN where points take no part, or from where another one ended."""
         if self.kept is not None:
             scatter = self.kept.scatter
             shape = replace(shape, scatter=scatter.kept(shape.groups, scatter.weights), held=self.kept.fitted)
-        return Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape).run()
+        solver = Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape)
+        return (solver if begun is None else solver.begun(begun)).run()
 
     def with_gains(self, deviation: FloatArray) -> _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
@@ -141,7 +142,7 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
     rig = learnt_rig(task.rig, solution)
     if rig is not task.rig:
         task = replace(task, rig=rig).with_gains(np.hypot(own, size * wide * spare))
-        solution = task.solved(start, shape)
+        solution = task.solved(start, shape, solution)
     return solution, task, size * float(spare.any())
 
 

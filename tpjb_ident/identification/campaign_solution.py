@@ -79,9 +79,9 @@ def solve_campaign(
     loads = static_loads(campaign, points)
     offsets: dict[str, float] = {}
 
-    def solved(rig: Rig, blocks: Blocks, start: ComplexArray) -> Solution:
+    def solver(rig: Rig, blocks: Blocks, start: ComplexArray) -> Solver:
         terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, offsets)])
-        return Solver(rig, blocks, terms, start, correct).run()
+        return Solver(rig, blocks, terms, start, correct)
 
     for count in range(_CLOCK_PASSES + 1):
         means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
@@ -95,7 +95,7 @@ def solve_campaign(
             sensors = sensors if devices == sensors else with_start(devices, START / rate)
         rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
         start = _starts(rig, points, means)
-        solution = solved(rig, blocks, start)
+        solution = solver(rig, blocks, start).run()
         if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
             break
         rates = Clock(rig, blocks).rates(solution.fitted[Clock.name].value)
@@ -103,12 +103,12 @@ def solve_campaign(
         task = replace(task, sensors=sensors, rates=offsets)
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        rig, solution = learnt, solved(learnt, blocks, start)
+        rig, solution = learnt, solver(learnt, blocks, start).begun(solution).run()
     pickup, fits = _mains(points, digests, rig, blocks, solution) if correct else (None, {})
     shift = np.zeros_like(blocks.z)
     if fits:
         shift = _mains_readings(rig, blocks, fits)
-        solution = solved(rig, replace(blocks, z=blocks.z - shift), start)
+        solution = solver(rig, replace(blocks, z=blocks.z - shift), start).run()
     force = force_pickup([digest.mains_force for digest in digests])
     in_cells = _in_cells(points, rig, blocks, force)
     size = float(np.linalg.norm(force))

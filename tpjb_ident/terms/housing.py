@@ -6,6 +6,7 @@ Standing on cells, a = -omega^2 C F_cell: swapped, inverted or late acceleromete
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -149,15 +150,20 @@ class Housing(Term):
         return x, y
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
-        """Cells as uncertain in time as accelerometers lead them: a spring's loss is positive, late cells lower it."""
+        """Cells as uncertain in time as accelerometers lead them: a spring's loss is positive, late cells lower it.
+
+        A floating stator tells nothing of the kind: the film's damping lets a shaft that gives lag behind its stator.
+        """
         stated = any(sensor.delay_uncertainty for sensor in sensors)
         if stated or self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
             return None
         loss, error = float(fitted.value[3]), float(fitted.deviation[3])
         if not loss < -2 * error:
             return None
-        late = -loss / self._omega
-        changes = {"force": {"delay_uncertainty": late}, "acceleration": {"out_of_step": True}}
+        changes: dict[str, dict[str, Any]] = {
+            "force": {"delay_uncertainty": -loss / self._omega},
+            "acceleration": {"out_of_step": True},
+        }
         return tuple(replace(s, **changes.get(s.quantity, {})) for s in sensors)
 
 
