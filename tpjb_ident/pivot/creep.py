@@ -21,6 +21,7 @@ from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.pivot.dry_record import DryRecord, noise_within_holds
 
+_PLAUSIBLE = 0.03  # share of the deflection that liners and joints creep: what holds hardly show is not made large
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
 # standard errors from which it is creep, by the noise, which takes creep for drift, and by how the runs differ
 _LEAST, _ALIKE = 3.0, 5.0
@@ -43,7 +44,7 @@ def without_creep(
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
         sums = np.array([_held_to_light(record, noise, times) for record in held])
         information, pull = np.maximum(sums[:, 0], 1e-300), sums[:, 1]
-        total = information.sum(axis=0)
+        total = information.sum(axis=0) + _PLAUSIBLE**-2
         share = pull.sum(axis=0) / total
         scatter = np.sum(information * (pull / information - share) ** 2, axis=0) / max(len(held) - 1, 1)
         error = np.sqrt(np.maximum(scatter, 1.0) / total)
@@ -80,6 +81,9 @@ def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> t
     used = record.blocks.hold >= 0
     blocks = record.blocks.take(used)
     level = (blocks.hold[:, None] == np.unique(blocks.hold)).astype(float)
+    load = blocks.load - level @ (level.T @ blocks.load / level.sum(axis=0))  # a load that wanders moves the pivot too
+    if np.any(load):
+        level = np.column_stack([level, load / np.abs(load).max()])
     covariance = noise.covariance(blocks.time, blocks.duration) + record.quantisation**2 * np.eye(len(blocks))
     columns = np.column_stack([blocks.deflection, _courses(record, times)[used]])
     whitened = np.linalg.solve(np.linalg.cholesky(covariance), np.column_stack([level, columns]))

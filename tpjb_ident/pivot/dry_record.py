@@ -38,6 +38,9 @@ _AROUND = 0.35  # [Hz] in which the mains is looked for
 _SMOOTH = 0.1  # [s]: whole periods of either, so that taking off the running mean leaves the pick-up whole
 _NOISE_FROM, _NOISE_TO = 1.0, 4.0  # [Hz] off the mains, where noise is measured
 _SHORTEST = 3.0  # [s] of record
+_FREE = 10.0  # times the compliance of the upper loads: no contact gives so much at a hundredth of the load
+_NOTABLE_WAY = 0.1  # of the deflection at the largest load: a shorter free way is left to the contact loss of the laws
+_NEAR = 0.05  # of the largest load, within which a free way ends
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,7 @@ class DryRecord:
     displacement_direction: PadDirection = field(default_factory=PadDirection)
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)  #: of readings, where more than two tell a vector
     creep: float = 0.0  #: share of the deflection that crept and was taken off
+    free_load: float = 0.0  #: N: load up to which the shaft had not reached its pad
 
 
 def read_dry_run(run: Run, angle: float | None, settings: PivotSettings) -> DryRecord:
@@ -104,13 +108,35 @@ def read_dry_run(run: Run, angle: float | None, settings: PivotSettings) -> DryR
         raise _refusal(run, "displacement", what, "Check the channels of this run")
     holds = find_holds(samples.time, samples.along)
     blocks = cut_blocks(samples, holds, settings.block)
+    loose = before_contact(blocks)
+    free_load = float(np.max(blocks.load[loose], initial=0.0))
+    blocks = blocks.take(~loose)
+    holds = holds if (blocks.hold >= 0).any() else ()
     if len(blocks) < _FEWEST_BLOCKS:
         what = f"gives only {len(blocks)} usable averages of {settings.block:g} s"
         raise _refusal(run, "record", what, "Record for longer, or set a shorter block")
     good = np.ones(len(blocks), dtype=bool)
     step = _quantisation(samples.displacement)
     direction, slopes = load_direction(blocks), spare_slopes(run, pad_axes(angle)[:1], settings.longest_glitch)
-    return DryRecord(run, run.pad or 0, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes)
+    return DryRecord(
+        run, run.pad or 0, angle, holds, blocks, good, lost, step, pickup, direction, slopes=slopes, free_load=free_load
+    )
+
+
+def before_contact(blocks: Blocks) -> BoolArray:
+    """Blocks (m,) in which the shaft still travels freely to its pad: small loads move it by far more than any pivot.
+
+    A way that closes over some tenths of the load is left to the law's contact loss.
+    """
+    largest = float(np.max(blocks.load, initial=0.0))
+    upper = blocks.load >= 0.3 * largest
+    if np.unique(blocks.load[upper]).size < 3 or not largest > 0.0:
+        return np.zeros(len(blocks), dtype=bool)
+    compliance = abs(float(np.polyfit(blocks.load[upper], blocks.deflection[upper], 1)[0]))
+    more = blocks.load[None, :] - blocks.load[:, None]
+    way = blocks.deflection[None, :] - blocks.deflection[:, None]
+    near = (more >= 0.0) & (more < _NEAR * largest)
+    return np.asarray((near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1))
 
 
 def _push(load: FloatArray) -> FloatArray | None:

@@ -251,7 +251,7 @@ def assemble_curve(
     fits = tuple(_widened(fit) for fit in likely[0])
     law, first = fits[0], records[0]
     loads = [record.blocks.load[record.good] for record in records]
-    onset = contact_onset(law, settings.contact_tolerance)
+    onset = max(contact_onset(law, settings.contact_tolerance), *(record.free_load for record in records))
     steps = _all_steps(records, law, noise)
     curve = PivotCurve(
         pad=first.pad,

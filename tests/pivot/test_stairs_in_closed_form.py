@@ -1,0 +1,123 @@
+"""Dry tests in closed form that owe nothing to the virtual rig: free ways, loads that wander, noise, ramps."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+import pytest
+
+import tpjb_ident as ti
+
+ANGLES = (-90.0, -18.0, 54.0, 126.0, 198.0)
+UPPER = (54.0, 126.0)
+CLEARANCE = 80e-6
+AT = np.array([2000.0, 3000.0, 5000.0])
+HEAD = """schema = "tpjb-rig/1"
+id = "stairs"
+bearing = "none.toml"
+[acquisition]
+sample_rate = "500 Hz"
+[channels.PX]
+quantity = "displacement"
+axis = "45 deg"
+unit = "um"
+[channels.PY]
+quantity = "displacement"
+axis = "135 deg"
+unit = "um"
+[channels.FX]
+quantity = "force"
+axis = "0 deg"
+unit = "N"
+[channels.FY]
+quantity = "force"
+axis = "90 deg"
+unit = "N"
+"""
+
+
+@dataclass(frozen=True)
+class Stairs:
+    """A load in steps toward each pad, from none at all."""
+
+    hold: float = 0.8  #: [s]
+    wander: float = 0.0  #: of the load within its holds, share
+    leak: float = 0.0  #: of the load over a hold, share
+    noise: float = 5e-8  #: of a probe's sample [m]
+    way: float = 25e-6  #: that the shaft travels to an upper pad within some ten newtons [m]
+    held: bool = True
+
+
+def deflection(pad: int, load: np.ndarray) -> np.ndarray:
+    """A stiff part and a soft one that stiffens [m]; pads differ."""
+    return (0.8 + 0.1 * pad) * (load / 9e8 + 1e-8 * np.sqrt(load))
+
+
+def stiffness(pad: int, load: np.ndarray) -> np.ndarray:
+    """DW / d delta [N/m]."""
+    return 1 / ((0.8 + 0.1 * pad) * (1 / 9e8 + 0.5e-8 / np.sqrt(load)))
+
+
+def course(stairs: Stairs, rng: np.random.Generator) -> np.ndarray:
+    """Load over time [N], 500 samples a second."""
+    levels = [0.0, 250.0, 500.0, *np.arange(1000.0, 6001.0, 500.0)]
+    time = np.arange(round(500 * stairs.hold)) / 500
+    parts = [np.zeros(len(time))]
+    for below, above in itertools.pairwise(levels):
+        swing = stairs.wander * np.sin(2 * np.pi * 0.37 * time + rng.uniform(0, 6.28))
+        hold = above * (1 + swing - stairs.leak * time / stairs.hold)
+        parts += [np.linspace(below, above, 150), hold] if stairs.held else [np.linspace(below, above, 400)]
+    return np.concatenate(parts)
+
+
+def write(path, stairs: Stairs, seed: int) -> None:
+    """Five runs, one a pad."""
+    rng = np.random.default_rng(seed)
+    text = HEAD
+    with h5py.File(path, "w") as file:
+        for pad, angle in enumerate(ANGLES, start=1):
+            load = course(stairs, rng)
+            travelled = np.minimum(load / 40.0, 1.0) if angle in UPPER else 1.0
+            place = CLEARANCE + deflection(pad, load) - stairs.way * (1 - travelled)
+            toward = np.radians(angle + rng.standard_normal())
+            unit = np.array([[np.cos(toward)], [np.sin(toward)]])
+            probes = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2) @ (unit * place)
+            probes += stairs.noise * rng.standard_normal(probes.shape)
+            cells = unit * load + 4.0 * rng.standard_normal(probes.shape)
+            text += f'[[runs]]\nid = "p-{pad}"\nfile = "p-{pad}.csv"\nkind = "dry_pivot"\npad = {pad}\n'
+            text += f'static_load_direction = "{angle:g} deg"\n'
+            group = file.create_group(f"runs/p-{pad}")
+            for name, values in zip(("PX", "PY", "FX", "FY"), (*(1e6 * probes), *cells)):
+                group.create_dataset(name, data=values)
+        file.attrs["manifest"] = text
+
+
+@pytest.mark.parametrize(
+    ("stairs", "within"),
+    [
+        (Stairs(), 0.02),
+        (Stairs(way=60e-6), 0.02),
+        (Stairs(hold=2.0, wander=0.02), 0.02),
+        (Stairs(hold=1.5, leak=0.03), 0.02),
+        (Stairs(noise=4e-7), 0.08),
+    ],
+)
+def test_curves_are_the_pivots_and_nothing_creeps(tmp_path, stairs, within):
+    write(tmp_path / "stairs.h5", stairs, 7)
+    curves = ti.fit_pivots(ti.load_campaign(tmp_path / "stairs.h5"), np.radians(ANGLES))
+    for curve in curves:
+        np.testing.assert_allclose(curve.stiffness(AT), stiffness(curve.pad, AT), rtol=within)
+        assert "deflection-creeps" not in curve.status
+        assert curve.valid_from < 1500.0
+        assert ("contact-incomplete" in curve.status) or curve.angle not in np.radians(UPPER)
+
+
+def test_a_ramp_behind_a_free_way_has_no_holds(tmp_path):
+    write(tmp_path / "stairs.h5", Stairs(held=False), 7)
+    curves = ti.fit_pivots(ti.load_campaign(tmp_path / "stairs.h5"), np.radians(ANGLES))
+    for curve in curves[2:4]:
+        assert "no-holds" in curve.status
+        np.testing.assert_allclose(curve.stiffness(AT), stiffness(curve.pad, AT), rtol=0.05)
