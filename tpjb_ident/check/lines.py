@@ -107,4 +107,5 @@ def band_lines(run: Run, level: RecordLines, values: FloatArray, force: Sequence
     power = np.sum(np.abs(spectrum[:, force]) ** 2, axis=1)
     chosen = [part[np.argmax(power[part])] for part in np.array_split(inside, _BAND_LINES)]
     floor = np.median(np.abs(spectrum[above]), axis=0)
-    return RecordLines(level.mean, floor, level.scatter, 2 * np.pi * frequency[chosen], spectrum[chosen])
+    omega = np.asarray(2 * np.pi * frequency[chosen], dtype=float)
+    return RecordLines(level.mean, floor, level.scatter, omega, spectrum[chosen])

@@ -213,9 +213,9 @@ def _regression(table: PhasorTable, fit: TableFit, scatter: bool, variance: floa
     # all residuals alike: two real ones per spare complex one; both parts of a row share their scale
     residual, weights = table.F - table.D @ fit.h.T, fit.weights[:, None]
     spare = max(float(weights.sum()) - 2.0, 1e-12)
-    scatter = (weights * residual).T @ residual.conj() / spare
+    noise = (weights * residual).T @ residual.conj() / spare
     inverse = np.linalg.inv((weights * table.D.conj()).T @ table.D)
-    covariance = complex_to_real_covariance(np.asarray(np.kron(scatter, inverse), dtype=complex))
+    covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse), dtype=complex))
     factor = 1.0 if "no-robust-start" in fit.conditions else variance
     return replace(fit, covariance=factor * covariance, dof=np.full(8, max(2.0 * spare, 1.0)))
 

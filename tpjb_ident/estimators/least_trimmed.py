@@ -54,7 +54,7 @@ class Regression:
 
         Windows alone in their direction cannot be held against a fit that has none of them.
         """
-        leverage = _squares(self._x.conj(), np.linalg.inv(self._sums(weights)[0]))
+        leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
         return np.asarray(1 / (1 + np.maximum(leverage, 0.0)))
 
     def residual(self, B: ComplexArray) -> ComplexArray:
@@ -77,7 +77,7 @@ def scatter(rows: ComplexArray, weights: FloatArray) -> ComplexArray:
 def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:
     """2 r^H S^-1 r of every window, (..., n), from residuals (..., q, n) and their scatter S (..., q, q)."""
     # a scatter that is all but singular makes rounding large, of either sign
-    return np.maximum(2 * _squares(rows, np.linalg.inv(inner)), 0.0)
+    return np.maximum(2 * _squares(rows, np.asarray(np.linalg.inv(inner), dtype=complex)), 0.0)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _core_size(regression: Regression, share: float) -> int:
     return int(share * regression.n + 0.5 * (2 + regression.q + 1))
 
 
-def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """Fits through pairs of windows, their residuals, and the windows' distances from them."""
     chosen = np.zeros((len(pairs), regression.n))
     np.put_along_axis(chosen, pairs, 1.0, axis=1)
@@ -148,7 +148,7 @@ def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, 
 
 
 def _concentrated(
-    regression: Regression, seeds: tuple[ComplexArray, FloatArray, FloatArray], share: float, repeats: float
+    regression: Regression, seeds: tuple[ComplexArray, ComplexArray, FloatArray], share: float, repeats: float
 ) -> tuple[FloatArray, bool]:
     """Weights (n,) of the core of the best of many concentrated two-window starts, and whether it fits exactly."""
     h = _core_size(regression, share)
