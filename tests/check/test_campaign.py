@@ -24,9 +24,8 @@ from tests.rigs.held_run import HeldReader, channels, run_of
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, other_line, steady_level
-from tpjb_ident.check.response import definiteness, mirrored
 from tpjb_ident.check.signals import check_signal, is_spare
-from tpjb_ident.check.wiring import guess_wiring, name_fault, repairs
+from tpjb_ident.check.wiring import definiteness, explanation, indefiniteness, plane_of, pointing, repairs
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.bad_samples import robust_fit
@@ -148,26 +147,23 @@ def test_the_strongest_line_that_nobody_mentioned():
     assert other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)) == pytest.approx(31.0, abs=0.1)
     data = {name: np.sin(2 * np.pi * 25 * time) + row for name, row in zip(described, noise, strict=True)}
     assert math.isnan(other_line(run_phasors(run_of(HeldReader(data, 1000.0), described), 0.0)))
-    assert math.isnan(other_line(None))
 
 
 @pytest.mark.parametrize("index", range(4))
 def test_wiring_faults_are_named(index):
     words, fault = list(repairs(PROBES))[index]
-    stiffness = np.array([[3.0, 0.2], [-0.3, 4.5]])
     # H' = H inv(M): what the readings after the fault make of the stiffness; every fault is its own repair.
-    measured = stiffness @ np.linalg.inv(mirrored(PROBES, fault))
+    measured = np.array([[3.0, 0.2], [-0.3, 4.5]]) @ np.linalg.inv(fault)
     assert definiteness(measured) < 0.05
-    hint = name_fault(PROBES, lambda repair: definiteness(measured @ np.linalg.inv(mirrored(PROBES, repair))))
+    hint = explanation(repairs(PROBES), lambda repair: indefiniteness(measured @ np.linalg.inv(repair)), 7.0)
     assert hint == f"; as if {words}"
 
 
 def test_wiring_guess_from_one_direction():
-    load = np.array([0.0, -1.0])
-    readings = np.array([np.cos(c.axis) * load[0] + np.sin(c.axis) * load[1] for c in PROBES])
-    wrong = readings * [-1.0, 1.0]
-    assert "A had the wrong sign" in guess_wiring(PROBES, wrong, load)
-    assert guess_wiring(PROBES[:1], wrong[:1], load) == ""
+    readings = np.array([-np.sin(c.axis) for c in PROBES])
+    wrong = plane_of(PROBES) @ (readings * [-1.0, 1.0])
+    assert "A had the wrong sign" in explanation(repairs(PROBES), pointing(wrong, -90.0, 8.0), 8.0, alike=2)
+    assert explanation(repairs(PROBES[:1]), pointing(wrong, -90.0, 8.0), 8.0, alike=2) == ""
 
 
 def make_run(name: str, kind: str = "dynamic") -> Run:

@@ -14,7 +14,8 @@ from rigdata.operating_point import OperatingPoint
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
 from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
 from tpjb_ident.check.campaign import check_campaign
-from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, _weight, check_magnitudes
+from tpjb_ident.check.findings import Reporter
+from tpjb_ident.check.magnitudes import Sizes, check_magnitudes, check_sizes, check_weight
 from tpjb_ident.check.observation import observe
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
@@ -41,12 +42,19 @@ def random_rig(rng: np.random.Generator, demo) -> Sizes:
     return Sizes(run, motion, force, film, acceleration, static, travel)
 
 
+def judged(check, sizes, *more):
+    """Keys and severities of what one check says of the sizes of a run."""
+    report = Reporter(sizes.run)
+    check(report, *more or (sizes,))
+    return [(finding.key, finding.problem.severity) for finding in report.found]
+
+
 def test_rigs_of_every_size_pass():
     demo = load_campaign(DEMO).of_kind("dynamic")[0]
     rng = np.random.default_rng(1)
     for _ in range(3000):
         sizes = random_rig(rng, demo)
-        assert [*_probes(sizes), *_film(sizes), *_housing(sizes)] == [], sizes
+        assert judged(check_sizes, sizes) == [], sizes
 
 
 @pytest.mark.slow
@@ -54,9 +62,9 @@ def test_rigs_of_every_size_pass():
 def test_a_stator_too_heavy_for_its_loads_is_an_error_where_its_inertia_decides(mass, acceleration, severity):
     run = load_campaign(DEMO).of_kind("dynamic")[0]
     rig = Sizes(run, 1e-6, 2000.0, 2000.0, acceleration, run.point.static_load, {})
-    assert [finding[1] for finding in _weight([rig], mass, 5000.0)] == [severity]
-    assert [*_weight([rig], 30.0, 5000.0)] == []
-    assert [finding[1] for finding in _weight([replace(rig, static=0.0)], mass, 5000.0)] == ["warning"]
+    assert judged(check_weight, rig, [rig], mass, 5000.0) == [("weight", severity)]
+    assert judged(check_weight, rig, [rig], 30.0, 5000.0) == []
+    assert judged(check_weight, rig, [replace(rig, static=0.0)], mass, 5000.0) == [("weight", "warning")]
 
 
 @pytest.mark.slow
@@ -83,8 +91,7 @@ def test_each_bound_at_its_place(changes, key, severity):
     run = replace(demo, point=OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 157.0796))
     good = Sizes(run, 5e-6, 1e3, 1e3, 0.02, 5000.0, {"X1A": 5e-6, "X1B": 5e-6})
     sizes = replace(good, **changes)
-    found = [*_probes(sizes), *_film(sizes), *_housing(sizes)]
-    assert [(f[0], f[1]) for f in found] == ([] if key is None else [(key, severity)])
+    assert judged(check_sizes, sizes) == ([] if key is None else [(key, severity)])
 
 
 @pytest.mark.slow

@@ -36,9 +36,7 @@ def seen(described, rows, noise, excitation="sine", hertz=40.0):
     run = replace(run, point=OperatingPoint(5000.0, excitation=2 * np.pi * hertz), excitation_kind=excitation)
     omega, table = np.array([o for o, _ in rows]), np.array([z for _, z in rows])
     floor = noise * np.abs(table).max(axis=0)
-    lines = RecordLines(0 * floor, table[0], floor, floor)
-    empty = np.empty((3, 0)), np.nan, np.empty((0, 0)), np.nan, "", Reporter(run)
-    return Observation(run, described, lines, *empty, band=table, omega=omega)
+    return Observation(run, Reporter(run), described, RecordLines(0 * floor, floor, floor, omega, table))
 
 
 def campaign(described, runs, mount=None):
@@ -177,10 +175,10 @@ def test_planes_of_probes_are_held_against_each_other_over_a_band(gain):
         values *= np.array([1, 1, gain, 1, 1e6, 1e6])[:, None]
         size = values.std(axis=1, keepdims=True)
         values += size * (0.01 * rng.standard_normal(values.shape) + np.cos(2 * np.pi * 22 * t + np.arange(6)[:, None]))
-        run = SimpleNamespace(band=(12.0, 90.0), sample_rate=rate)
-        rows, floor, hertz = band_lines(run, values.T, [4, 5], [22.0])
-        observation = seen(described, list(zip(2 * np.pi * hertz, rows)), 0.0, "random")
-        runs.append(replace(observation, lines=replace(observation.lines, floor=floor)))
+        observation = seen(described, [(1.0, values[:, 0] + 0j)], 0.0, "random")
+        run = replace(observation.run, band=(12.0, 90.0), point=OperatingPoint(5000.0, 0.0, 2 * np.pi * 22.0))
+        run = replace(run, reader=HeldReader({}, rate))
+        runs.append(replace(observation, lines=band_lines(run, RecordLines.none(6), values.T, [4, 5])))
     conditions, _ = found((campaign(described, runs), runs))
     assert list(conditions) == ([] if gain == 1.0 else ["probe-gains-differ"])
     if conditions:

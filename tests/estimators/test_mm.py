@@ -46,7 +46,7 @@ def test_no_entry_is_left_to_move_by_more_than_the_tolerance(scale):
         X = X * [1.0, 1 / scale]
         fit = mm_fit(X, Y, label, tolerance=1e-4)
         regression = Regression(X, Y)
-        distance = distance2(regression.terms(fit.coefficients), fit.scatter)
+        distance = distance2(regression.residual(fit.coefficients), fit.scatter)
         again = regression.fit(bisquare_weight(np.sqrt(distance), efficiency_constant(4)))
         assert np.abs(again - fit.coefficients).max() < 1e-4 * np.abs(fit.coefficients).max()
     assert fit.iterations < 12
@@ -86,7 +86,9 @@ def test_the_first_scatter_is_that_of_the_noise():
         start = robust_start(Regression(X, Y), np.arange(n) % 6, 1)
         both.append(start.scatter)
         single.append(robust_start(Regression(X, Y[:, :1]), np.arange(n) % 6, 1).scatter[0, 0].real)
-        share.append(np.mean(distance2(Regression(X, Y).terms(start.coefficients), start.scatter) < chi2.ppf(0.99, 4)))
+        share.append(
+            np.mean(distance2(Regression(X, Y).residual(start.coefficients), start.scatter) < chi2.ppf(0.99, 4))
+        )
     found = np.mean(both, axis=0)
     # a core of few windows is picked for lying close together: some per cent less
     assert 0.88 < np.trace(found).real / 1.5 < 1.03
@@ -159,7 +161,7 @@ def test_two_runs_that_fit_by_themselves_are_no_core():
     X = complex_normal(rng, 6, 2)[label] + 0.005 * complex_normal(rng, 120, 2)
     Y = X @ H.T + 0.3 * complex_normal(rng, 6, 2)[label] + 0.01 * complex_normal(rng, 120, 2)
     start = robust_start(Regression(X, Y), label, 1)
-    accepted = distance2(Regression(X, Y).terms(start.coefficients), start.scatter) < chi2.ppf(0.99, 4)
+    accepted = distance2(Regression(X, Y).residual(start.coefficients), start.scatter) < chi2.ppf(0.99, 4)
     assert len(np.unique(label[accepted])) >= 3
     assert np.trace(start.scatter).real > 5 * 2 * 0.01**2
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from rigdata.campaign import Campaign
 from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
+from rigdata.survey.exports import records_below
 from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import Finding, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
@@ -71,23 +72,26 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     And what contradicts the description of the rig in all runs: identification finds that by itself.
     """
     observations = [replace(observation, report=observation.report.copy()) for observation in observations]
-    of_kind = {k: [s for s in observations if s.run.kind == k] for k in ("dynamic", "dry_pivot", "locus", "clearance")}
-    dynamic = of_kind["dynamic"]
+
+    def of_kind(kind: str) -> list[Observation]:
+        return [observation for observation in observations if observation.run.kind == kind]
+
     # what is judged by one line of excitation says nothing of runs that are excited over a band
-    of_kind["dynamic"] = [s for s in dynamic if s.run.excitation_kind == "sine"]
+    dynamic = of_kind("dynamic")
+    sines = [observation for observation in dynamic if observation.run.excitation_kind == "sine"]
     for observation in observations:
         check_speed(observation)
     static = check_static_loads(observations)
     check_positions(observations)
     check_magnitudes(observations, campaign.housing_mass)
-    check_excitation(of_kind["dynamic"], campaign.housing_mass)
+    check_excitation(sines, campaign.housing_mass)
     _spread_doubts(observations)
-    check_dry(of_kind["dry_pivot"])
+    check_dry(of_kind("dry_pivot"))
     _spread_doubts(observations)
-    check_responses(of_kind["dynamic"], campaign.housing_mass, of_kind["clearance"])
-    check_rotation(of_kind["dynamic"])
-    check_sweeps(of_kind["clearance"])
-    check_locus(of_kind["locus"])
+    check_responses(sines, campaign.housing_mass, of_kind("clearance"))
+    check_rotation(sines)
+    check_sweeps(of_kind("clearance"))
+    check_locus(of_kind("locus"))
     _check_duplicates(observations)
     fit = rig_fit(campaign, dynamic, static)
     if fit is None:
@@ -113,16 +117,11 @@ def _spread_doubts(observations: Sequence[Observation]) -> None:
 def _check_duplicates(observations: Sequence[Observation]) -> None:
     first: dict[str, Observation] = {}
     for observation in observations:
-        earlier = first.setdefault(observation.digest, observation) if observation.digest else observation
-        if earlier.run.id == observation.run.id:  # itself, or another excitation in its record
+        earlier = first.setdefault(observation.digest, observation).run
+        if not observation.digest or earlier.id == observation.run.id:  # itself, or another excitation in its record
             continue
-        if _shared_record(observation.run, earlier.run):
-            text = f"shares its record with run {earlier.run.id}, at another excitation frequency"
-            observation.report.say("shared", "note", "", text, "Nothing, if both lines were excited at once")
-            continue
-        text = f"holds the very samples of run {earlier.run.id} ({earlier.run.file})"
-        cure = "One of the two is a copy: find the right file, or delete the run"
-        observation.report.say("duplicate", "error", "", text, cure)
+        kind = "shared" if _shared_record(observation.run, earlier) else "duplicate"
+        observation.report.ask(kind, other=earlier.id, file=earlier.file)
 
 
 def _shared_record(first: Run, second: Run) -> bool:
@@ -137,43 +136,32 @@ def _sorted(problems: Sequence[Problem]) -> list[Problem]:
 
 def _leftovers(campaign: Campaign) -> list[Problem]:
     """Note records without a run: forgotten in the manifest, or left from another campaign."""
-    if campaign.path.is_dir():
-        names = _files(campaign)
-        place, noun = campaign.path.name, "file"
-    else:
-        names = _groups(campaign)
-        place, noun = f"{campaign.path.name}:/runs", "group"
+    noun, read = ("file", _files) if campaign.path.is_dir() else ("group", _groups)
+    try:
+        names = read(campaign)
+    except RigDataError:  # the runs themselves say so
+        return []
     if not names:
         return []
     more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
-    listed = ", ".join(ascii(n)[1:-1][:60] for n in names[:_LISTED])
+    listed = ", ".join(ascii(name)[1:-1][:60] for name in names[:_LISTED])
     text = f"no run names the {noun}{'' if len(names) == 1 else 's'} {listed}{more}"
-    return [Problem("note", place, "", text, "Add them to the manifest, or nothing if they are not wanted")]
+    return [
+        Problem("note", campaign.path.name, "", text, "Add them to the manifest, or nothing if they are not wanted")
+    ]
 
 
 def _files(campaign: Campaign) -> list[str]:
-    known = {p.resolve() for p in campaign.files.values()}
-    records = [p for n, p in campaign.files.items() if n not in {"campaign.toml", campaign.bearing_name}]
-    suffixes = {p.suffix.lower() for p in records}
-    unlisted: list[Path] = []
-    for folder in sorted({p.parent for p in records}):
-        try:
-            beside = list(itertools.islice(folder.iterdir(), _MAX_LOOKED_AT))
-        except OSError:  # the folder is not there: the runs themselves say so
-            continue
-        unlisted += [p for p in beside if p.suffix.lower() in suffixes and p.resolve() not in known and p.is_file()]
-    return sorted(p.name for p in unlisted)
+    known = {path.resolve() for path in campaign.files.values()}
+    return [path.name for path in records_below(campaign.path) if path.resolve() not in known]
 
 
 def _groups(campaign: Campaign) -> list[str]:
     from rigdata.readers.hdf5.guards import resolve
     from rigdata.readers.hdf5.reader import open_readonly
 
-    known = {run.id for run in campaign.runs}
-    try:
-        with open_readonly(campaign.path, campaign.path.name) as handle:
-            runs = resolve(handle, "runs", campaign.path.name)
-            names = [] if runs is None else [str(n) for n in itertools.islice(runs, _MAX_LOOKED_AT)]
-    except RigDataError:  # the runs themselves say so
-        return []
-    return sorted(set(names) - known)
+    file = campaign.path.name
+    with open_readonly(campaign.path, file) as handle:
+        runs = resolve(handle, "runs", file)
+        names = {str(name) for name in itertools.islice(runs or (), _MAX_LOOKED_AT)}
+    return sorted(names - {run.id for run in campaign.runs})

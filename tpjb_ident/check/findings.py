@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from rigdata.problem import Problem, Severity
 from rigdata.run import Run
+from tpjb_ident.check.questions import QUESTIONS
 
 _LISTED = 4
 #: How the key of a finding begins that one channel reads too much or too little in one run.
@@ -33,6 +35,29 @@ class Reporter:
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
         return Reporter(self.run, list(self.found), set(self.doubts))
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of all findings."""
+        return [finding.key for finding in self.found]
+
+    def ask(
+        self, kind: str, size: float = 1.0, *names: str, hint: str = "", grave: Severity = "error", **words: Any
+    ) -> str:
+        """Note what a question of the table finds; its severity, "" where `size` is within the limits.
+
+        `names` of channels, `hint`: the fault that would explain it, `grave`: what an error counts as.
+        """
+        question = QUESTIONS[kind]
+        levels: tuple[Severity, ...] = ("note", "warning", grave)
+        passed = [level for level, limit in zip(levels, question.limits) if size > limit]
+        if not passed:
+            return ""
+        words |= {"names": " and ".join(names), "size": size}
+        place, text = question.place.format(**words), question.text.format(**words) + hint
+        key = f"{kind} {words['names']}".rstrip() + hint
+        self.say(key, passed[-1], place, text, question.cure, names if question.of_channels else ())
+        return passed[-1]
 
     def say(self, key: str, severity: Severity, place: str, what: str, cure: str, channels: Sequence[str] = ()) -> None:
         """Note a finding; `key` is the same for equal findings in other runs, `channels` whose nature it is."""
@@ -61,15 +86,13 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
     """Tell a finding once that a third (three at least) of the runs of its kinds share."""
     kind_of = {run.id: run.kind for run in runs}
     merged: list[Problem] = []
-    for findings_alike in _alike(findings):
-        group = [finding.problem for finding in findings_alike]
-        concerned = list(dict.fromkeys(p.run for p in group if p.run))
+    for group in _alike(findings):
+        concerned = list(dict.fromkeys(f.problem.run for f in group if f.problem.run))
         kinds = {kind_of[r] for r in concerned}
-        alike = sum(run.kind in kinds for run in runs)
-        if not _is_shared(len(concerned), alike):
-            merged.extend(group)
+        if not _is_shared(len(concerned), sum(run.kind in kinds for run in runs)):
+            merged.extend(finding.problem for finding in group)
             continue
-        first = group[0]
+        first = group[0].problem
         listed = ", ".join(concerned[:_LISTED]) + (", ..." if len(concerned) > _LISTED else "")
         text = f"{first.what}; and so in {len(concerned)} runs ({listed})"
         merged.append(Problem(first.severity, file, first.place, text, first.cure))
@@ -95,12 +118,12 @@ def reach(reports: Sequence[Reporter]) -> None:
     kinds: dict[str, list[Reporter]] = {}
     for report in reports:
         kinds.setdefault(report.run.kind, []).append(report)
-    for kind, alike in kinds.items():
-        of_channels = [f for report in alike for f in report.found if f.channels and kind != "dynamic"]
-        for group in _alike(of_channels):
+    dynamic = kinds.pop("dynamic", [])
+    for alike in kinds.values():
+        for group in _alike(f for report in alike for f in report.found if f.channels):
             if len(group) < len(alike) and not _is_shared(len(group), len(alike)):
                 continue
-            for report in kinds.get("dynamic", ()):
+            for report in dynamic:
                 if set(group[0].channels) & set(report.run.channels):
                     report.found.append(Finding(group[0].problem, group[0].key))
 
@@ -108,17 +131,16 @@ def reach(reports: Sequence[Reporter]) -> None:
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     """Sort the findings of runs of one kind."""
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
-    result = Verdicts()
     for report in reports:
         for finding in report.found:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
+    result = Verdicts()
     alike = len({report.run.id for report in reports})
     for (key, severity), concerned in groups.items():
         for run, problem in concerned.items():
-            if key.startswith(RUN_GAIN) and severity == "warning":
-                result.run_gains.setdefault(run, []).append(problem)
-            elif severity == "warning":
-                result.doubtful.setdefault(run, []).append(problem)
+            if severity == "warning":
+                warnings = result.run_gains if key.startswith(RUN_GAIN) else result.doubtful
+                warnings.setdefault(run, []).append(problem)
             elif severity == "error" and _is_shared(len(concerned), alike):
                 result.shared.setdefault(run, []).append(problem)
             elif severity == "error":

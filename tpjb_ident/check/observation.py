@@ -1,4 +1,4 @@
-"""What one pass over a run's samples leaves for the checks that compare runs."""
+"""What one pass over a run's samples leaves for the checks that compare runs, of whatever kind."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import VECTOR_QUANTITIES, Channel
 from rigdata.channel_statistics import ChannelStatistics
-from rigdata.manifest.fields import MAINS_FREQUENCIES
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, other_line, steady_level
 from tpjb_ident.check.rotation import shaft_force
 from tpjb_ident.check.signals import check_clock, check_signal, needed
+from tpjb_ident.check.wiring import plane_of
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.phasors.bad_samples import white_noise
 from tpjb_ident.phasors.reading_cache import with_kept_beginning
@@ -40,28 +40,20 @@ _SPREAD = 8192
 
 @dataclass(frozen=True)
 class Observation:
-    """One run, seen once."""
+    """One run, seen once: m vector channels that show something, none where it cannot be read."""
 
     run: Run
-    channels: tuple[Channel, ...]
-    lines: RecordLines | None = field(repr=False)
-    spread: FloatArray = field(repr=False)  #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
-    other_line: float
-    #: (n, m): thinned to a few thousand, SI; kept of clearance runs only
-    samples: FloatArray = field(repr=False)
-    speed: float
-    digest: str
     report: Reporter = field(repr=False)
-    band: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex), repr=False)  #: (k, m) complex
-    omega: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)  #: (k,), rad/s: of `band`
+    channels: tuple[Channel, ...] = ()
+    lines: RecordLines = field(default_factory=lambda: RecordLines.none(0), repr=False)
+    #: (3, m): 2 %, 50 % and 98 % quantiles of `channels`, SI
+    spread: FloatArray = field(default_factory=lambda: np.empty((3, 0)), repr=False)
+    #: (n, m): thinned to a few thousand, SI; kept of clearance runs only
+    samples: FloatArray = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    digest: str = ""
+    speed: float = math.nan
+    other_line: float = math.nan
     shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
-
-    @property
-    def phasors(self) -> list[tuple[float, ComplexArray]]:
-        """Frequency [rad/s] and phasors (m,) of `channels` at every line of the excitation that is looked at, SI."""
-        if self.run.excitation_kind != "sine" or self.lines is None:
-            return list(zip(self.omega.tolist(), self.band))
-        return [(self.run.point.excitation, self.lines.phasor)]
 
     def pick(self, quantity: str) -> list[int]:
         """Places of the channels of `quantity` in `channels`."""
@@ -70,6 +62,33 @@ class Observation:
     def of(self, quantity: str) -> list[Channel]:
         """Channels of `quantity`."""
         return [c for c in self.channels if c.quantity == quantity]
+
+    def names(self, quantity: str) -> list[str]:
+        """Names of the channels of `quantity`."""
+        return [c.name for c in self.of(quantity)]
+
+    def mean(self, quantity: str) -> FloatArray:
+        """X, Y of a quantity's mean (2,); NaN where its channels do not tell it."""
+        return np.asarray(plane_of(self.of(quantity)) @ self.lines.mean[self.pick(quantity)] + self._unknown(quantity))
+
+    def line(self, quantity: str) -> ComplexArray:
+        """X, Y of a quantity at the excitation line (2,); NaN where its channels do not tell it."""
+        phasor = self.lines.phasor[self.pick(quantity)]
+        return np.asarray(plane_of(self.of(quantity)) @ phasor + self._unknown(quantity))
+
+    def _unknown(self, quantity: str) -> float:
+        """NaN, to be added to a vector that no channel tells."""
+        return 0.0 if self.pick(quantity) else math.nan
+
+    def film_force(self, mass: float) -> ComplexArray:
+        """Force phasor of the film on the housing, F_cell + m_h a_h (2,) [N]; of the cells alone where a is unknown."""
+        return np.asarray(self.line("force") + np.nan_to_num(mass * self.line("acceleration")))
+
+    def shows(self, quantity: str) -> bool:
+        """Whether a channel of a quantity shows the excitation line above its noise."""
+        places = self.pick(quantity)
+        size = np.abs(self.lines.phasor[places])
+        return bool(np.any((size > 8 * self.lines.floor[places]) & (size > 0)))
 
 
 def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Observation:
@@ -83,66 +102,46 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         report.take(run.reader.problems())
     except RigDataError as error:
         report.take(error.problems)
-        return _blind(run, report)
-    time = _usable_time(report, run, length)
+        return Observation(run, report)
+    timed = _is_timed(report, run, length)
     statistics, first, digest = _scan(report, cached, length)
-    readable = {n: run.channels[n] for n in first}
-    if not readable:
-        return _blind(run, report)
-    live = tuple(c for n, c in readable.items() if c.quantity in VECTOR_QUANTITIES and not _is_dead(statistics[n]))
+    alive = [run.channels[name] for name in first if statistics[name].values and not statistics[name].constant]
+    live = tuple(channel for channel in alive if channel.quantity in VECTOR_QUANTITIES)
     used = np.stack([first[c.name] for c in live], axis=1) if live else np.empty((length, 0))
-    if phasors is None and time is not None and run.kind == "dynamic" and run.excitation_kind == "sine":
+    lines, timed = RecordLines.none(len(live)), timed and bool(live)
+    if phasors is None and timed and run.kind == "dynamic" and run.excitation_kind == "sine":
         phasors = _phasors(report, cached)
-    lines = _lines(run, live, used[:_FITTED], phasors, line) if time is not None and live else None
-    noise_free = _is_noise_free(run, live, used, lines)
+    if timed:
+        lines = _lines(run, live, used[:_FITTED], phasors, line)
+    noise_free = bool(first) and _is_noise_free(run, live, used, lines)
     if noise_free:
-        report.say(NO_NOISE, "note", "", "the readings show no noise", "Nothing, if the data are computed")
-    alive = [c for name, c in readable.items() if not _is_dead(statistics[name])]
-    for name, channel in readable.items():
-        check_signal(report, channel, statistics[name], noise_free, alive)
-    if time is None or not live:
-        return replace(_blind(run, report), digest=digest, speed=_mean_speed(readable, first))
-    thin = slice(None, None, max(1, len(time) // _DECIMATED))
-    band, omega, lines = _over_band(run, live, used[:_FITTED], lines)
-    places = range(len(phasors.lines.excitation)) if phasors is not None else ()
-    astray = [k for k in places if phasors is not None and not _near_set_point(run, phasors, k)]
-    return Observation(
-        run=run,
-        channels=live,
-        lines=lines,
-        spread=_spread(used),
-        other_line=other_line(phasors, astray),
-        samples=used[thin] if run.kind == "clearance" else np.empty((0, len(live))),
-        speed=_mean_speed(readable, first),
-        digest=digest,
-        report=report,
-        band=band,
-        omega=omega,
-        shaft_force=shaft_force(phasors),
-    )
+        report.ask(NO_NOISE)
+    for name in first:
+        check_signal(report, run.channels[name], statistics[name], noise_free, alive)
+    speeds = [first[n] for n, c in run.channels.items() if n in first and c.quantity == "speed"]
+    speed = next((float(np.nanmedian(values)) for values in speeds if np.isfinite(values).any()), math.nan)
+    seen = Observation(run, report, digest=digest, speed=speed)
+    if not timed:
+        return seen
+    thin = slice(None, None, max(1, min(length, _BLOCK) // _DECIMATED))
+    seen = replace(seen, channels=live, lines=lines, spread=_spread(used))
+    if run.kind == "clearance":
+        seen = replace(seen, samples=used[thin])
+    if phasors is None:
+        return seen
+    astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
+    return replace(seen, other_line=other_line(phasors, astray), shaft_force=shaft_force(phasors))
 
 
-def _over_band(
-    run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None
-) -> tuple[ComplexArray, FloatArray, RecordLines | None]:
-    """Phasors at some lines of a band, their frequencies [rad/s], and the run's lines with what noise makes of one."""
-    if run.excitation_kind == "sine" or lines is None:
-        return np.empty((0, len(live)), complex), np.empty(0), lines
-    turning = [run.point.shaft_speed_hz] if run.point.shaft_speed > 0 else []
-    force = [i for i, c in enumerate(live) if c.quantity == "force"]
-    rows, floor, frequencies = band_lines(run, used, force, [*turning, *MAINS_FREQUENCIES])
-    first = rows[0] if len(rows) else np.full(len(live), np.nan + 0j)
-    return rows, 2 * np.pi * frequencies, replace(lines, phasor=first, floor=floor)
-
-
-def _usable_time(report: Reporter, run: Run, length: int) -> FloatArray | None:
+def _is_timed(report: Reporter, run: Run, length: int) -> bool:
+    """Whether the run's times can be used; what is wrong with them is reported."""
     try:
         time = run.time(0, min(length, _BLOCK))
         check_clock(report, time)
     except RigDataError as error:
         report.take(error.problems)
-        return None
-    return time if len(time) > 2 else None
+        return False
+    return len(time) > 2
 
 
 def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelStatistics], dict[str, FloatArray], str]:
@@ -168,7 +167,7 @@ def _scan(report: Reporter, run: Run, length: int) -> tuple[dict[str, ChannelSta
 def _read_block(
     report: Reporter, run: Run, channels: Mapping[str, Channel], start: int, stop: int
 ) -> dict[str, FloatArray]:
-    """Read one block; a channel that fails is reported, by what the run needs, and left out."""
+    """Read one block; a channel that fails is reported, milder where the run can do without it, and left out."""
     try:
         return dict(zip(channels, run.reader.read(list(channels), start, stop)))
     except RigDataError:
@@ -177,40 +176,26 @@ def _read_block(
         try:
             (blocks[name],) = run.reader.read([name], start, stop)
         except RigDataError as error:
-            report.take(error.problems if needed(run, channel) else [_milder(p) for p in error.problems])
+            severity: Severity = "error" if needed(run, channel) else "warning"
+            report.take([replace(problem, severity=severity) for problem in error.problems])
     return blocks
 
 
-def _blind(run: Run, report: Reporter) -> Observation:
-    return Observation(run, (), None, np.empty((3, 0)), math.nan, np.empty((0, 0)), math.nan, "", report)
-
-
-def _milder(problem: Problem) -> Problem:
-    """A fault of a channel that the run can do without."""
-    return replace(problem, severity="warning" if problem.severity == "error" else problem.severity)
-
-
-def _is_dead(statistics: ChannelStatistics) -> bool:
-    return statistics.values == 0 or statistics.constant
-
-
-def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines | None) -> bool:
+def _is_noise_free(run: Run, live: Sequence[Channel], used: FloatArray, lines: RecordLines) -> bool:
     """Whether noise stays below the converter's steps, as in records computed without noise."""
     main = [i for i, c in enumerate(live) if c.quantity in {"displacement", "force"}]
-    if not main:
-        return run.kind != "dynamic"
     for index in main:
         column = used[:_SPREAD, index]
         column = column[np.isfinite(column)]
         if len(column) < 10:
             return False
         # away from steady running nothing fits, but noise shows in the bends from sample to sample
-        fitted = lines is not None and run.kind in {"dynamic", "locus"}
-        noise = float(lines.scatter[index]) if fitted and lines is not None else white_noise(column)
+        scatter = float(lines.scatter[index])
+        noise = scatter if run.kind in {"dynamic", "locus"} and np.isfinite(lines.mean).any() else white_noise(column)
         steps = np.diff(np.unique(column[:4000]))
         if not noise <= max(0.7 * float(np.min(steps, initial=np.inf)), 1e-7 * float(np.ptp(column))):
             return False
-    return True
+    return bool(main) or run.kind != "dynamic"
 
 
 def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
@@ -218,7 +203,7 @@ def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
     try:
         return run_phasors(run, 0.0)
     except RecordTooShortError as error:
-        report.say("too short", "warning", "time", f"is too short: {error}", "Record longer")
+        report.ask("too short", error=error)
     except (RigDataError, TpjbError):  # the checks of the channels say what is wrong with them
         pass
     return None
@@ -226,14 +211,18 @@ def _phasors(report: Reporter, run: Run) -> RunPhasors | None:
 
 def _lines(
     run: Run, channels: Sequence[Channel], values: FloatArray, phasors: RunPhasors | None, line: int
-) -> RecordLines | None:
+) -> RecordLines:
+    """Excitation line of a sine, nothing where it is not near its set point; level of other running tests."""
     if phasors is not None:
         lines = excitation_line(phasors, line, channels)
-        return lines if _near_set_point(run, phasors, line) else replace(lines, phasor=np.zeros_like(lines.phasor))
-    if run.kind == "locus" or (run.kind == "dynamic" and run.excitation_kind != "sine"):
-        speed = run.point.shaft_speed_hz
-        return steady_level(values, run.sample_rate, [speed, 2 * speed, 50.0])
-    return None
+        return lines if _near_set_point(run, phasors, line) else replace(lines, rows=np.zeros_like(lines.rows))
+    is_band = run.kind == "dynamic" and run.excitation_kind != "sine"
+    if not is_band and run.kind != "locus":
+        return RecordLines.none(len(channels))
+    speed = run.point.shaft_speed_hz
+    level = steady_level(values, run.sample_rate, [speed, 2 * speed, 50.0])
+    force = [i for i, c in enumerate(channels) if c.quantity == "force"]
+    return band_lines(run, level, values, force) if is_band else level
 
 
 def _near_set_point(run: Run, phasors: RunPhasors, line: int) -> bool:
@@ -250,10 +239,3 @@ def _spread(values: FloatArray) -> FloatArray:
         if len(finite_values):
             spread[:, index] = np.quantile(finite_values, [0.02, 0.5, 0.98])
     return spread
-
-
-def _mean_speed(channels: Mapping[str, Channel], first: Mapping[str, FloatArray]) -> float:
-    for name, channel in channels.items():
-        if channel.quantity == "speed" and np.isfinite(first[name]).any():
-            return float(np.nanmedian(first[name]))
-    return math.nan

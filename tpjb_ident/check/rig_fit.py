@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
 from tpjb_ident.check.observation import Observation
-from tpjb_ident.check.set_points import excited
-from tpjb_ident.check.wiring import repairs
+from tpjb_ident.check.questions import far
+from tpjb_ident.check.wiring import explanation, repairs
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.sensors import alive, axes_of, found_mount, sensors_of
@@ -50,52 +50,43 @@ class RigFit:
 
 def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True) -> RigFit | None:
     """Fit the terms to all lines of dynamic runs; None where they are too few; `static`: cells show the static load."""
-    clear = [o for o in runs if "force" not in o.report.doubts and excited(o)]
-    lines = [(observation, omega, row) for observation in clear for omega, row in observation.phasors]
-    if len(lines) < _MIN_BLOCKS:
+    clear = [run for run in runs if "force" not in run.report.doubts and run.shows("force")]
+    seen = tuple(run for run in clear for _ in run.lines.omega)
+    if len(seen) < _MIN_BLOCKS:
         return None
     sensors = sensors_of(campaign)
-    blocks = _blocks(sensors, lines)
+    blocks = _blocks(sensors, clear)
     mass = float(np.nan_to_num(campaign.housing_mass))
     rig = Rig(sensors, mass, mount=found_mount(sensors, blocks, campaign.mount, 1.0), static=static)
     force = vector(rig, blocks, "force") + mass * np.nan_to_num(vector(rig, blocks, "acceleration"))
     shape, start = free_force(vector(rig, blocks, "displacement"), force)
-    shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
-    terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
-    solution = Solver(rig, blocks, terms, start, False, shape).run()
-    return RigFit(tuple(observation for observation, _, _ in lines), rig, blocks, solution)
+    shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
+    terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
+    return RigFit(seen, rig, blocks, Solver(rig, blocks, terms, start, False, shape).run())
 
 
-def _blocks(sensors: Sequence[Sensor], lines: Sequence[tuple[Observation, float, ComplexArray]]) -> Blocks:
+def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
     """A block a line, each of a point of its own, without a load: nothing of the film is shared."""
     rows: list[dict[str, object]] = []
-    for b, (observation, omega, values) in enumerate(lines):
-        floor = np.abs(values) if observation.lines is None else observation.lines.floor
-        places = [_place(observation, sensor.name) for sensor in sensors]
-        z = np.array([np.nan if k is None else values[k] for k in places], dtype=complex)
-        noise = np.array([np.nan if k is None else floor[k] for k in places])
-        present = np.isfinite(z) & np.isfinite(noise)
-        rows.append(
-            {
-                "point": b,
-                "run": b,
-                "omega": omega,
-                "z": np.where(present, z, 0.0),
-                "present": present,
-                "along": axes_of([None if k is None else observation.channels[k] for k in places]),
-                "noise": np.diag(np.where(present, noise, 0.0) ** 2),
-                "dof": _FREEDOM,
-            }
-        )
-    points = [replace(observation.run.point, static_load=0.0) for observation, _, _ in lines]
-    blocks = stacked(points, [observation.run.id for observation, _, _ in lines], len(sensors), rows)
+    points, names = [], []
+    for observation in runs:
+        channels = {channel.name: k for k, channel in enumerate(observation.channels)}
+        places = np.array([channels.get(sensor.name, -1) for sensor in sensors])
+        floor = np.append(observation.lines.floor, np.nan)[places]
+        along = axes_of([observation.channels[k] if k >= 0 else None for k in places])
+        for omega, line in zip(observation.lines.omega, observation.lines.rows):
+            z = np.append(line, np.nan)[places]
+            present = np.isfinite(z) & np.isfinite(floor)
+            noise = np.diag(np.where(present, floor, 0.0) ** 2)
+            b = len(rows)
+            row = {"point": b, "run": b, "omega": omega, "z": np.where(present, z, 0.0), "present": present}
+            rows.append(row | {"along": along, "noise": noise, "dof": _FREEDOM})
+            points.append(replace(observation.run.point, static_load=0.0))
+            names.append(observation.run.id)
+    blocks = stacked(points, names, len(sensors), rows)
     return replace(blocks, present=blocks.present & alive(sensors, np.abs(blocks.z).max(axis=0), _DEAD))
-
-
-def _place(observation: Observation, name: str) -> int | None:
-    return next((k for k, channel in enumerate(observation.channels) if channel.name == name), None)
 
 
 def check_accelerometers(fit: RigFit) -> None:
@@ -105,29 +96,26 @@ def check_accelerometers(fit: RigFit) -> None:
     if len(rows) != 2 or housing is None:
         return
     moved = housing.acceleration(fit.blocks, fit.solution.fitted[housing.name])
-    foretold = np.einsum("nja,na->nj", fit.blocks.along[:, rows], moved)
-    shown = fit.blocks.z[:, rows]
-    size = np.linalg.norm(shown, axis=1)
+    inverse = np.linalg.pinv(fit.blocks.along[:, rows])
+    shown = np.einsum("naj,nj->na", inverse, fit.blocks.z[:, rows])
+    size = np.linalg.norm(fit.blocks.z[:, rows], axis=1)
     noise = np.sqrt(np.einsum("njj->n", fit.blocks.noise[:, rows][:, :, rows]).real)
-    judged = np.flatnonzero(np.isfinite(foretold).all(axis=1) & (size > _CLEAR * noise))
-    if len(judged) < _MIN_BLOCKS:
-        return
-    off = np.linalg.norm(shown - foretold, axis=1) / np.maximum(size, 1e-300)
-    allowed = max(_OFF, _MANY * float(np.median(off[judged])))
-    for b in judged[off[judged] > allowed]:
-        _tell(fit.seen[b], shown[b], foretold[b])
+    judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (size > _CLEAR * noise))
+    off = _off(shown, moved)[judged]
+    for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:
+        _tell(fit.seen[b], shown[b], moved[b])
 
 
-def _tell(observation: Observation, shown: ComplexArray, foretold: ComplexArray) -> None:
-    channels = observation.of("acceleration")
-    tried = sorted((_misfit(matrix @ shown, foretold), words) for words, matrix in repairs(channels, scales=True))
-    misfit = _misfit(shown, foretold)
-    hint = f"; as if {tried[0][1]}" if tried[0][0] < min(misfit / 3, tried[1][0] / 2) else ""
-    text = f"differs by {misfit:.0%} from what the housing's mount and the other runs foretell{hint}"
-    cure = "Check polarity, cables and sensitivity of the accelerometers in this run"
-    place = f"channels {' and '.join(channel.name for channel in channels)}"
-    observation.report.say("housing", "warning", place, text, cure)
+def _tell(observation: Observation, shown: ComplexArray, expected: ComplexArray) -> None:
+    def misfit(repair: FloatArray) -> float:
+        return float(_off(repair @ shown, expected))
+
+    size = misfit(np.eye(2))
+    hint = explanation(repairs(observation.of("acceleration"), scales=True), misfit, size / 3)
+    observation.report.ask("housing", size, *observation.names("acceleration"), hint=hint)
 
 
-def _misfit(shown: ComplexArray, foretold: ComplexArray) -> float:
-    return float(np.linalg.norm(shown - foretold) / np.linalg.norm(foretold))
+def _off(shown: ComplexArray, expected: ComplexArray) -> FloatArray:
+    """Distance of vectors (.., 2) from what is expected, as a share of that."""
+    distance = np.linalg.norm(shown - expected, axis=-1)
+    return np.asarray(distance / np.maximum(np.linalg.norm(expected, axis=-1), 1e-300))

@@ -26,10 +26,8 @@ _CLEAR = 8.0
 _ONE_WAY, _AGREED, _LEAST_RUNS = 1.5, 0.9, 3
 
 
-def shaft_force(phasors: RunPhasors | None) -> float:
+def shaft_force(phasors: RunPhasors) -> float:
     """Logarithm of the 1X force's counter-clockwise part over its clockwise one; NaN where neither is clear."""
-    if phasors is None:
-        return math.nan
     place = phasors.lines.place("1X")
     if place is None:
         return math.nan
@@ -37,30 +35,19 @@ def shaft_force(phasors: RunPhasors | None) -> float:
     force = force[np.isfinite(force).all(axis=1)]
     if len(force) < 2:
         return math.nan
-    parts, errors = [], []
-    for sign in (1j, -1j):
-        part = np.abs(force[:, 0] + sign * force[:, 1])
-        parts.append(float(part.mean()))
-        errors.append(float(part.std()) / math.sqrt(len(part)))
-    if not max(parts) > _CLEAR * max(errors):
+    parts = np.abs(force[:, :1] + np.array([1j, -1j]) * force[:, 1:])
+    forward, backward = parts.mean(axis=0)
+    if not max(forward, backward) > _CLEAR * parts.std(axis=0).max() / math.sqrt(len(force)):
         return math.nan
-    return math.log(parts[0] / max(parts[1], 1e-3 * parts[0]))
+    return math.log(forward / max(backward, 1e-3 * forward))
 
 
 def check_rotation(runs: Sequence[Observation]) -> None:
     """Warn where the 1X force clearly goes round against the stated sense."""
-    for rotation in ROTATIONS:
-        alike = [r for r in runs if r.run.point.rotation == rotation and "force" not in r.report.doubts]
-        sense = -1.0 if rotation == ROTATIONS[1] else 1.0
+    for stated, other, sense in ((*ROTATIONS, 1.0), (*ROTATIONS[::-1], -1.0)):
+        alike = [r for r in runs if r.run.point.rotation == stated and "force" not in r.report.doubts]
         clear = [r for r in alike if abs(r.shaft_force) > math.log(_ONE_WAY)]
         against = [r for r in clear if sense * r.shaft_force < 0.0]
-        if len(against) < _LEAST_RUNS or len(against) < _AGREED * len(clear):
-            continue
-        other = ROTATIONS[rotation == ROTATIONS[0]]
-        text = f"shows a force at running speed that goes round {other}, but the shaft is said to turn {rotation}"
-        cure = (
-            "Check rotation in [shaft] or the runs; if it is right, left and right are exchanged: the sign of a cell "
-            "or probe along X, or two exchanged cells or probes"
-        )
-        for observation in against:
-            observation.report.say("rotation", "warning", "force at running speed", text, cure)
+        if len(against) >= max(_LEAST_RUNS, _AGREED * len(clear)):
+            for observation in against:
+                observation.report.ask("rotation", other=other, stated=stated)

@@ -5,29 +5,29 @@ Two probes and two cells serve all runs of a point. If one of them reads g times
 the run against the others, by generalised least squares: noise is what the others scatter by, and beside it stands
 what honest runs differ by: a bearing that answers a little softer or less damped in one run, a load that misses its set
 point and moves the shaft as well. A gain is named where phasors and means together leave no room for chance, the
-phasors show it by themselves, the means do not contradict it, and nothing else in the run is strange.
+phasors show it by themselves, the means do not contradict it, and nothing else in the run is strange. Where no
+clearance run tells what a probe reads at the centre its mean may have moved by anything: then the phasors decide.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtr
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.check.point_readings import PointReadings, leverage, one_by_one
+from tpjb_ident.check.point_runs import PointRuns
 
 #: Stiffness, damping and static load of one run may differ from the others' by this share, one standard deviation:
 #: oil gets warmer, loads are set by hand.
 _HONEST = 0.01
 #: Least scatter that runs are credited with: phasors and mean loads as a share, mean positions [m].
 _LEAST_PHASOR, _LEAST_LOAD, _LEAST_POSITION = 1e-4, 1e-3, 10e-9
-#: How well the zero of a probe, and so its distance from there, is known from a clearance run.
-_LEVER_KNOWN = 0.25
-#: Probability of naming anything in an operating point without fault.
-_CHANCE = 1e-4
+#: Probability at which chance is no explanation any more, for all runs of an operating point.
+CHANCE = 1e-4
 #: The phasors must show the gain themselves, with this probability of chance at most.
 _PHASORS_SHOW = 0.05
 #: Rest that a lone gain may leave, per equation in units of its covariance: 1 % of honest runs leave more.
@@ -40,33 +40,22 @@ _LEAST, _MOST_PART = 0.01, 0.9
 _AS_WELL = 2 * math.log(1e3)
 #: An explanation that lets the mean move freely must leave this much less: ln of the equations, times one more unknown.
 _FREE = 2.0
+#: How well the zero of a probe, and so its distance from there, is known from a clearance run.
+_LEVER_KNOWN = 0.25
+#: Shift of a probe's mean that may have moved by anything [m].
+_ANYTHING = 1.0
 
 
-@dataclass(frozen=True)
-class WrongGain:
+class WrongGain(NamedTuple):
     """A gain that one channel has in one run only; channels that explain the run as well, the likeliest first."""
 
-    run: int
     channels: tuple[int, ...]
     gain: float
     error: float
-    means: bool
     chance: float
 
-    def words(self, names: Sequence[str]) -> str:
-        """What it looks like; `names` are those of probes and cells."""
-        off = self.gain - 1
-        others = [names[i] for i in self.channels[1:]]
-        instead = f" (or {' or '.join(others)} another gain)" if others else ""
-        by = "phasor and mean say so" if self.means else "its phasor says so, its mean cannot"
-        return (
-            f"reads {abs(off):.1%} too {'much' if off > 0 else 'little'} (standard error {self.error:.1%}) beside the "
-            f"other runs at this operating point{instead}; {by}"
-        )
 
-
-@dataclass(frozen=True)
-class Difference:
+class Difference(NamedTuple):
     """How one run differs from what the others foretell, with its covariance."""
 
     rest: FloatArray  #: (m,)
@@ -80,160 +69,119 @@ class Difference:
         return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining)) / len(remaining)
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """An estimate of 1 - 1/g."""
+class Evidence(NamedTuple):
+    """An estimate of 1 - 1/g, and the probability of so large a one where there is none."""
 
     part: float = 0.0
-    information: float = 0.0
-    doubt: float = 0.0  #: variance of its relative variance, over two
-
-    def chance(self) -> float:
-        """Probability of so large a part where there is none, two-sided (Welch, Satterthwaite)."""
-        if self.information <= 0:
-            return 1.0
-        from scipy.special import stdtr
-
-        freedom = self.information**-2 / max(self.doubt, 1e-300)
-        # the t distribution of infinite freedom is the normal one, which stdtr takes as a large number
-        return float(2 * stdtr(min(freedom, 1e9), -abs(self.part) * np.sqrt(self.information)))
+    error: float = math.inf
+    chance: float = 1.0
 
 
 def evidence(differences: Sequence[Difference], patterns: Sequence[FloatArray]) -> Evidence:
-    """The part of the patterns that independent differences show together; of nothing where no pattern shows."""
+    """The part of the patterns that independent differences show together; of nothing where no pattern shows.
+
+    The chance is two-sided, by Student's t with the freedom of Welch and Satterthwaite.
+    """
     weights = [np.linalg.solve(d.noise + d.honest, pattern) for d, pattern in zip(differences, patterns)]
     information = sum(float(pattern @ w) for pattern, w in zip(patterns, weights))
     if not information > 0:
         return Evidence()
     part = sum(float(w @ d.rest) for d, w in zip(differences, weights)) / information
-    doubt = sum(float(w @ d.noise @ w) ** 2 / d.spare for d, w in zip(differences, weights)) / information**4
-    return Evidence(part, information, doubt)
+    doubt = sum(float(w @ d.noise @ w) ** 2 / d.spare for d, w in zip(differences, weights)) / information**2
+    freedom = min(1 / max(doubt, 1e-300), 1e9)  # infinite freedom is the normal distribution
+    chance = float(2 * stdtr(freedom, -abs(part) * math.sqrt(information)))
+    return Evidence(part, 1 / math.sqrt(information), chance)
 
 
-def wrong_gains(readings: PointReadings, known: Collection[int] = ()) -> list[WrongGain]:
-    """Find runs with one wrong gain, the clearest first; `known` are runs that stand apart anyway."""
-    gains: list[WrongGain] = []
+def wrong_gains(runs: PointRuns, known: Collection[int] = ()) -> dict[int, WrongGain]:
+    """Runs with one wrong gain; `known` are runs that stand apart anyway."""
 
-    def clearest(remaining: list[int]) -> int | None:
-        tried = [gain_of_run(readings, i, [j for j in remaining if j != i]) for i in remaining]
-        best = min((t for t in tried if t is not None), key=lambda t: t.chance, default=None)
+    def oddness(run: int, others: list[int]) -> float:
+        gain = gain_of_run(runs, run, others)
         # each run is tried with two cells and two probes, a probe with two zeros
-        if best is None or best.chance > _CHANCE / (6 * len(remaining)):
-            return None
-        gains.append(best)
-        return best.run
+        return 0.0 if gain is None else CHANCE / (6 * (len(others) + 1)) / max(gain.chance, 1e-300)
 
-    one_by_one(len(readings), known, clearest)
-    return gains
+    wrong = runs.apart(known, oddness)
+    gains = {run: gain_of_run(runs, run, runs.others(wrong)) for run in sorted(wrong.difference(known))}
+    return {run: gain for run, gain in gains.items() if gain is not None}
 
 
-def gain_of_run(readings: PointReadings, run: int, agreeing: Sequence[int]) -> WrongGain | None:
-    """The gain of one channel that explains `run` best beside the `agreeing` runs; None where no single one does.
+def gain_of_run(runs: PointRuns, run: int, others: Sequence[int]) -> WrongGain | None:
+    """The gain of one channel that explains `run` best beside the others; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
     """
-    tried = sorted(_explanations(readings, run, agreeing), key=lambda t: t.left)
-    if not tried or abs(tried[0].by.part) < _LEAST:
+    tried = sorted(_explanations(runs, run, others))
+    if not tried or abs(tried[0][2].part) < _LEAST:
         return None
-    best = tried[0]
-    alike = dict.fromkeys(t.channel for t in tried if t.left < best.left + _AS_WELL)
-    gain = 1 / (1 - best.by.part)
-    error = gain**2 / float(np.sqrt(best.by.information))
-    return WrongGain(run, tuple(alike), gain, error, best.means, best.by.chance())
+    least, _, best = tried[0]
+    alike = dict.fromkeys(channel for left, channel, _ in tried if left < least + _AS_WELL)
+    gain = 1 / (1 - best.part)
+    return WrongGain(tuple(alike), gain, gain**2 * best.error, best.chance)
 
 
-@dataclass(frozen=True)
-class _Explanation:
-    """One channel's; `left` is the sum of squares that it leaves, over all equations."""
-
-    channel: int
-    by: Evidence
-    means: bool
-    left: float
-
-
-def _explanations(readings: PointReadings, run: int, agreeing: Sequence[int]) -> Iterator[_Explanation]:
-    """Explanations of `run` by one channel's gain that nothing in it contradicts."""
-    stiffness = readings.stiffness(agreeing)
-    dynamic = None if stiffness is None else dynamic_difference(readings, run, agreeing, stiffness)
+def _explanations(runs: PointRuns, run: int, others: Sequence[int]) -> Iterator[tuple[float, int, Evidence]]:
+    """Explanations of `run` by one channel's gain that nothing in it contradicts, with the squares that they leave."""
+    stiffness = runs.stiffness(others)
+    dynamic = None if stiffness is None else dynamic_difference(runs, run, others, stiffness)
     if stiffness is None or dynamic is None:
         return
-    static = static_difference(readings, run, agreeing, stiffness)
-    for channel in range(4):
-        pattern = _dynamic_pattern(readings, run, channel, stiffness)
+    static = static_difference(runs, run, others, stiffness)
+    for channel, pattern in enumerate(_patterns(runs, run, stiffness)):
         shown = evidence([dynamic], [pattern])
-        if shown.chance() > _PHASORS_SHOW or shown.part > _MOST_PART:
+        if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
             continue
-        for lever, slack in _levers(readings, run, channel, shown.part):
-            joint, means, left = _with_means(static, channel, (lever, slack), (dynamic, pattern, shown))
-            misfit = dynamic.misfit(pattern, joint.part)
-            if max(left, misfit) <= _STRANGE:
-                free = _FREE if lever is None else 0.0
-                yield _Explanation(channel, joint, means, len(pattern) * (left + misfit) + free)
+        own = np.diag(np.arange(4) == channel).astype(float)
+        for lever, slack in _levers(runs, run, channel, shown.part):
+            means = static._replace(honest=static.honest + slack**2 * own)
+            by_mean = evidence([means], [lever * own[channel]])
+            apart = abs(by_mean.part - shown.part) / math.hypot(by_mean.error, shown.error)
+            joint = evidence([dynamic, means], [pattern, lever * own[channel]])
+            left = dynamic.misfit(pattern, joint.part), means.misfit(lever * own[channel], joint.part)
+            if apart <= _AGREE and max(left) <= _STRANGE:
+                yield len(pattern) * sum(left) + (_FREE if slack == _ANYTHING else 0.0), channel, joint
 
 
-def _levers(readings: PointReadings, run: int, channel: int, part: float) -> Iterator[tuple[float | None, float]]:
-    """Readings that a gain would multiply in the mean, with the uncertainty of the shift; None where not known.
+def _levers(runs: PointRuns, run: int, channel: int, part: float) -> list[tuple[float, float]]:
+    """Readings that a gain would multiply in the mean, with the uncertainty of the shift.
 
     A probe's gain may count from the bearing's centre, or, as that of an amplifier, from 0 V.
     """
+    mean = float(runs.means[run, channel])
     if channel >= 2:
-        yield float(readings.cell_means[run, channel - 2]), 0.0
-        return
-    mean, zero = float(readings.probe_means[run, channel]), readings.centre[channel]
-    yield mean, 0.0
-    yield (None, 0.0) if zero is None else (mean - zero, abs(_LEVER_KNOWN * (mean - zero) * part))
+        return [(mean, 0.0)]
+    lever = mean - runs.centre[channel]
+    return [(mean, 0.0), (lever, abs(_LEVER_KNOWN * lever * part)) if np.isfinite(lever) else (0.0, _ANYTHING)]
 
 
-def _with_means(
-    static: Difference | None,
-    channel: int,
-    lever_and_slack: tuple[float | None, float],
-    phasors: tuple[Difference, FloatArray, Evidence],
-) -> tuple[Evidence, bool, float]:
-    """Evidence of phasors and means, whether the means show it too, and what they leave: infinite in contradiction."""
-    (lever, slack), (dynamic, pattern, shown) = lever_and_slack, phasors
-    if static is None:
-        return shown, False, 0.0
-    own = np.arange(4) == channel
-    widened = Difference(static.rest, static.noise, static.honest + slack**2 * np.diag(own), static.spare)
-    multiplied = np.where(own, 1.0 if lever is None else lever, 0.0)
-    by_mean = evidence([widened], [multiplied])
-    if lever is None or by_mean.information <= 0:
-        # the mean may have moved by anything
-        return shown, False, widened.misfit(multiplied, by_mean.part)
-    apart = abs(by_mean.part - shown.part) / np.sqrt(1 / by_mean.information + 1 / shown.information)
-    joint = evidence([dynamic, widened], [pattern, multiplied])
-    left = widened.misfit(multiplied, joint.part) if apart <= _AGREE else np.inf
-    return joint, by_mean.chance() < _PHASORS_SHOW, left
+def _patterns(runs: PointRuns, run: int, stiffness: ComplexArray) -> list[FloatArray]:
+    """What every channel contributes to force minus H times displacement, as `_stacked`."""
+    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]
+    return [_stacked(force) for force in forces.T]
 
 
-def dynamic_difference(
-    readings: PointReadings, run: int, agreeing: Sequence[int], stiffness: ComplexArray
-) -> Difference | None:
-    """Force of `run` minus H (2, 2) [N/m] of the `agreeing` runs times its displacement: Re X, Re Y, Im X, Im Y [N].
+def dynamic_difference(runs: PointRuns, run: int, others: Sequence[int], stiffness: ComplexArray) -> Difference | None:
+    """Force of `run` minus H (2, 2) [N/m] of the others times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     None where they leave no scatter.
     """
-    spare = 2 * (2 * len(agreeing) - 4)
-    rows = list(agreeing)
-    displacement, force = readings.displacement, readings.force
-    size = float(np.linalg.norm(displacement[run]))
-    if spare < 4 or not size > 0:
+    spare = 2 * (2 * len(others) - 4)
+    D, rest = runs.displacement, runs.force - runs.displacement @ stiffness.T
+    sizes = np.linalg.norm(D, axis=1)
+    if spare < 4 or not sizes[run] > 0:
         return None
-    sizes = np.linalg.norm(displacement[rows], axis=1)[:, None]
-    rest = force[rows] - displacement[rows] @ stiffness.T
-    variance = float(np.sum(np.abs(rest / sizes) ** 2)) / spare * size**2
-    variance *= 1 + leverage(displacement[rows] / sizes, displacement[run] / size)
-    variance += (_LEAST_PHASOR * float(np.linalg.norm(force[run]))) ** 2
+    rows = list(others)
+    unit, own = D[rows] / sizes[rows, None], D[run] / sizes[run]
+    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own)))
+    scatter = float(np.sum(np.abs(rest[rows] / sizes[rows, None]) ** 2)) / spare
+    variance = scatter * sizes[run] ** 2 * (1 + leverage)
+    variance += (_LEAST_PHASOR * float(np.linalg.norm(runs.force[run]))) ** 2
     # by which share of stiffness and of damping the others differ; the matrix took 8 of their 4 n equations along
-    shares = [
-        np.linalg.lstsq(_changes(stiffness, d), _stacked(r), rcond=None)[0] for d, r in zip(displacement[rows], rest)
-    ]
+    shares = [np.linalg.lstsq(_changes(stiffness, D[j]), _stacked(rest[j]), rcond=None)[0] for j in rows]
     wander = np.mean(np.square(shares), axis=0) * len(rows) / (len(rows) - 2)
-    changes = _changes(stiffness, displacement[run])
+    changes = _changes(stiffness, D[run])
     honest = changes @ np.diag(_HONEST**2 + wander) @ changes.T
-    return Difference(_stacked(force[run] - stiffness @ displacement[run]), variance * np.eye(4), honest, spare)
+    return Difference(_stacked(rest[run]), variance * np.eye(4), honest, spare)
 
 
 def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
@@ -241,40 +189,29 @@ def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
     return np.stack([_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)], axis=1)
 
 
-def static_difference(
-    readings: PointReadings, run: int, agreeing: Sequence[int], stiffness: ComplexArray
-) -> Difference | None:
-    """Mean readings of `run` minus those of the `agreeing` runs: probe, probe [m], cell, cell [N].
+def static_difference(runs: PointRuns, run: int, others: Sequence[int], stiffness: ComplexArray) -> Difference:
+    """Mean readings of `run` minus those of the others: probe, probe [m], cell, cell [N].
 
     A load that misses its set point shows in the cells and, over the stiffness (2, 2) [N/m], in the probes; what
-    positions wander by besides is their scatter. None where the stiffness cannot carry a load.
+    positions wander by besides is their scatter. Means tell nothing where the stiffness cannot carry a load.
     """
-    if len(agreeing) < 2 or np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
-        return None
+    means = runs.means[list(others)]
+    rest = runs.means[run] - means.mean(axis=0)
+    if np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
+        return Difference(rest, np.zeros((4, 4)), 1e30 * np.eye(4), 1)
     compliance = np.linalg.inv(stiffness.real)
-    rows = list(agreeing)
-    loads, places = readings.cell_means @ readings.cell_plane.T, readings.probe_means @ readings.probe_plane.T
-    misses = loads[rows] - loads[rows].mean(axis=0)
-    wander = places[rows] - places[rows].mean(axis=0) - misses @ compliance.T
-    spare = 2 * (len(agreeing) - 1)
-    size = float(np.linalg.norm(loads[rows].mean(axis=0)))
-    to_probes, to_cells = np.linalg.inv(readings.probe_plane), np.linalg.inv(readings.cell_plane)
+    loads, places = means[:, 2:] @ runs.cell_plane.T, means[:, :2] @ runs.probe_plane.T
+    misses = loads - loads.mean(axis=0)
+    wander = places - places.mean(axis=0) - misses @ compliance.T
+    spare = 2 * (len(means) - 1)
+    size = float(np.linalg.norm(loads.mean(axis=0)))
+    to_probes, to_cells = np.linalg.inv(runs.probe_plane), np.linalg.inv(runs.cell_plane)
     by_load = np.vstack([to_probes @ compliance, to_cells])
     by_place = np.vstack([to_probes, np.zeros((2, 2))])
-    more = 1 + 1 / len(agreeing)
-    load_variance, place_variance = (float(np.sum(x**2)) / spare for x in (misses, wander))
-    noise = more * (load_variance * by_load @ by_load.T + place_variance * by_place @ by_place.T)
+    squares = [float(np.sum(x**2)) / spare * y @ y.T for x, y in ((misses, by_load), (wander, by_place))]
     least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
     honest = (_HONEST * size) ** 2 * by_load @ by_load.T + least
-    means = np.concatenate([readings.probe_means, readings.cell_means], axis=1)
-    return Difference(means[run] - means[rows].mean(axis=0), noise, honest, spare)
-
-
-def _dynamic_pattern(readings: PointReadings, run: int, channel: int, stiffness: ComplexArray) -> FloatArray:
-    """What a channel (probes 0 and 1, cells 2 and 3) contributes to force minus H times displacement, as `_stacked`."""
-    if channel < 2:
-        return _stacked(-stiffness @ readings.probe_plane[:, channel] * readings.probes[run, channel])
-    return _stacked(readings.cell_plane[:, channel - 2] * readings.cells[run, channel - 2])
+    return Difference(rest, (1 + 1 / len(means)) * (squares[0] + squares[1]), honest, spare)
 
 
 def _stacked(vector: ComplexArray) -> FloatArray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -12,41 +11,64 @@ from rigdata.calibration import Channel
 from rigdata.vector import inverse_directions
 
 
+def plane_of(channels: Sequence[Channel]) -> FloatArray:
+    """Matrix (2, m) from one reading per channel to X, Y."""
+    return inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
+
+
 def repairs(channels: Sequence[Channel], scales: bool = False) -> Iterator[tuple[str, FloatArray]]:
-    """Every simple mending of two channels' readings, as a matrix on them, with the fault in words."""
-    first, second = (c.name for c in channels)
-    yield f"{first} and {second} were swapped", np.array([[0.0, 1.0], [1.0, 0.0]])
-    yield f"{first} had the wrong sign", np.diag([-1.0, 1.0])
-    yield f"{second} had the wrong sign", np.diag([1.0, -1.0])
-    yield f"{first} and {second} both had the wrong sign", -np.eye(2)
-    if scales:
-        for factor, word in ((0.1, "ten times too large"), (10.0, "ten times too small")):
-            yield f"{first} read {word}", np.diag([factor, 1.0])
-            yield f"{second} read {word}", np.diag([1.0, factor])
-
-
-def guess_wiring(channels: Sequence[Channel], readings: FloatArray, wanted: FloatArray, within: float = 8.0) -> str:
-    """Say which fault would turn the readings into the direction `wanted`; "" where not just one would.
-
-    `readings` (m,), `wanted` (2,).
-    """
-    if len(channels) != 2 or not np.all(np.isfinite(readings)):
-        return ""
-    inverse = inverse_directions(tuple(float(c.axis or 0.0) for c in channels))
-    explanations = []
-    for words, matrix in repairs(channels):
-        vector = inverse @ matrix @ readings
-        size = float(np.hypot(*vector))
-        if size > 0 and float(vector @ wanted) > math.cos(math.radians(within)) * size:
-            explanations.append(words)
-    # With the load along one cell's axis a wrong sign of the other one changes nothing: simplest first.
-    return f"; as if {explanations[0]}" if explanations and len(explanations) < 3 else ""
-
-
-def name_fault(channels: Sequence[Channel], quality: Callable[[FloatArray], float]) -> str:
-    """Name the fault of two channels whose mending is clearly the best; "" where none is."""
+    """Every simple mending of two channels' readings, as a matrix on X and Y, with the fault in words."""
     if len(channels) != 2:
-        return ""
-    tried = sorted(((quality(matrix), words) for words, matrix in repairs(channels)), reverse=True)
-    best, second = tried[0], tried[1]
-    return f"; as if {best[1]}" if best[0] > 0.15 and best[0] > 2 * second[0] else ""
+        return
+    first, second = (c.name for c in channels)
+    faults = [
+        (f"{first} and {second} were swapped", np.array([[0.0, 1.0], [1.0, 0.0]])),
+        (f"{first} had the wrong sign", np.diag([-1.0, 1.0])),
+        (f"{second} had the wrong sign", np.diag([1.0, -1.0])),
+        (f"{first} and {second} both had the wrong sign", -np.eye(2)),
+    ]
+    for factor, size in ((0.1, "large"), (10.0, "small")) if scales else ():
+        faults.append((f"{first} read ten times too {size}", np.diag([factor, 1.0])))
+        faults.append((f"{second} read ten times too {size}", np.diag([1.0, factor])))
+    plane = plane_of(channels)
+    for words, matrix in faults:
+        yield words, np.asarray(plane @ matrix @ np.linalg.inv(plane))
+
+
+def explanation(
+    tried: Iterable[tuple[str, FloatArray]], misfit: Callable[[FloatArray], float], limit: float, alike: int = 1
+) -> str:
+    """The fault whose mending leaves the least misfit; "" where none leaves less than `limit`.
+
+    Where more than `alike` of them leave no more than twice the least, none is named: else the simplest, the first.
+    """
+    left = [(misfit(matrix), words) for words, matrix in tried]
+    least = min((size for size, _ in left), default=np.inf)
+    close = [words for size, words in left if size < limit and size <= 2 * least]
+    return f"; as if {close[0]}" if 0 < len(close) <= alike else ""
+
+
+def angle_between(first: float, second: float, period: float = 360.0) -> float:
+    """Smallest angle between two directions [deg]."""
+    return abs((first - second + period / 2) % period - period / 2)
+
+
+def pointing(vector: FloatArray, wanted: float, within: float) -> Callable[[FloatArray], float]:
+    """Angle [deg] between a vector (2,) that is mended and a direction [deg]; all `within` of it count alike."""
+
+    def misfit(repair: FloatArray) -> float:
+        mended = repair @ vector
+        return max(within / 2, angle_between(float(np.degrees(np.arctan2(mended[1], mended[0]))), wanted))
+
+    return misfit
+
+
+def definiteness(matrix: FloatArray) -> float:
+    """Least over greatest eigenvalue of the symmetric part; 1 is isotropic, not above 0 impossible."""
+    low, high = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return float(low / high) if high > 0 else -1.0
+
+
+def indefiniteness(matrix: FloatArray) -> float:
+    """One over `definiteness`; infinite where a matrix is impossible."""
+    return 1 / max(definiteness(matrix), 1e-9)

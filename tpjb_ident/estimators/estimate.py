@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import FloatArray
 from rigdata.near_names import unknown_name
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.errors import ArgumentError
@@ -180,10 +180,6 @@ def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFi
     return replace(plain, conditions=merged(plain.conditions, (Condition("no-repeats", text),)))
 
 
-def _iv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
-    return instrumental_fit(table, scatter)[0]
-
-
 def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[TableFit, PhasorTable]:
     """Robust instrumental variables: reference channels against noise on the displacements.
 
@@ -214,19 +210,14 @@ def _regression(table: PhasorTable, fit: TableFit, scatter: bool, variance: floa
     if solved is not None:
         covariance = variance * solved.covariance
         return replace(fit, covariance=covariance, dof=solved.dof, chi_square=solved.chi_square)
-    covariance, dof = _homoscedastic(table.D, table.F - table.D @ fit.h.T, fit.weights)
-    plain = "no-robust-start" in fit.conditions
-    return replace(fit, covariance=(1.0 if plain else variance) * covariance, dof=dof)
-
-
-def _homoscedastic(D: ComplexArray, residual: ComplexArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance (8, 8) and dof (8,) of a weighted regression; `D`, `residual` (n, 2), `weights` (n,)."""
+    # all residuals alike: two real ones per spare complex one; both parts of a row share their scale
+    residual, weights = table.F - table.D @ fit.h.T, fit.weights[:, None]
     spare = max(float(weights.sum()) - 2.0, 1e-12)
-    scatter = (weights[:, None] * residual).T @ residual.conj() / spare
-    inverse = np.linalg.inv((weights[:, None] * D.conj()).T @ D)
-    # Two real residuals per spare complex one; both parts of a row share its scale.
-    covariance = complex_to_real_covariance(np.asarray(np.kron(scatter, inverse), dtype=complex))
-    return covariance, np.full(8, max(2.0 * spare, 1.0))
+    noise = (weights * residual).T @ residual.conj() / spare
+    inverse = np.linalg.inv((weights * table.D.conj()).T @ table.D)
+    covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse), dtype=complex))
+    factor = 1.0 if "no-robust-start" in fit.conditions else variance
+    return replace(fit, covariance=factor * covariance, dof=np.full(8, max(2.0 * spare, 1.0)))
 
 
 def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> DynamicStiffness:
@@ -274,7 +265,7 @@ SOLVERS: dict[str, Callable[[PhasorTable, RlmSettings, bool], TableFit]] = {
     "rlm": _rlm,
     "mm": _mm,
     "mm-eiv": _mm_eiv,
-    "iv": _iv,
+    "iv": lambda table, settings, scatter: instrumental_fit(table, scatter)[0],
 }
 METHODS = tuple(SOLVERS)
 

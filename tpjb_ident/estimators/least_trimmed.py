@@ -1,13 +1,11 @@
 """The high-breakdown start of the joint regression: least trimmed squares by concentration steps.
 
 Many two-window starts are concentrated on the windows nearest to them (multivariate least trimmed squares,
-Agullo, Croux & Van Aelst 2008). Normal equations, residual scatters and distances of all starts at once are
-products with two tables of window by window terms, which is what makes this quick.
+Agullo, Croux & Van Aelst 2008), all starts at once.
 """
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,97 +30,54 @@ class Regression:
     def __init__(self, X: ComplexArray, Y: ComplexArray) -> None:
         self.X, self.Y = X, Y
         self.n, self.q = Y.shape
-        moments = (X.conj()[:, :, None] * Y[:, None, :]).reshape(self.n, -1)
-        cross = X[:, 0].conj() * X[:, 1]
-        power = X.real**2 + X.imag**2
-        self._terms = np.concatenate(
-            [power, cross.real[:, None], cross.imag[:, None], moments.real, moments.imag], axis=1
-        )
+        moments = X.conj()[:, :, None] * np.concatenate([X, Y], axis=1)[:, None, :]
+        self._moments = moments.reshape(self.n, -1).view(float)
         self._x, self._y = np.ascontiguousarray(X.T), np.ascontiguousarray(Y.T)
         #: Scatter of the forces themselves: any equivariant metric does for a first ordering, this one is at hand.
         #: A little of every component keeps it regular where some follow from the others exactly.
-        self.metric = scatter(products(self._y), np.ones(self.n), self.q)
+        self.metric = scatter(self._y, np.ones(self.n))
         self.metric += _METRIC_FLOOR * float(np.trace(self.metric).real) / self.q * np.eye(self.q)
 
+    def _sums(self, weights: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Normal equations (..., 2, 2) and right-hand sides (..., 2, q); never singular; `weights` (..., n)."""
+        sums = (weights @ self._moments).view(complex).reshape(*weights.shape[:-1], 2, 2 + self.q)
+        normal, least = sums[..., :2], np.finfo(float).tiny
+        size = np.einsum("...ii->...", normal).real[..., None, None]
+        return normal * (1 + 1e-14 * np.eye(2)) + (1e-28 * size + least) * np.eye(2), sums[..., 2:]
+
     def fit(self, weights: FloatArray) -> ComplexArray:
-        """Weighted least squares, (..., n) -> (..., q, 2), by Cramer's rule; a singular system gives large numbers."""
-        sums = weights @ self._terms
-        a, d, b, det = (part[..., None] for part in _normal(sums))
-        half = (sums.shape[-1] - 4) // 2
-        moment = (sums[..., 4 : 4 + half] + 1j * sums[..., 4 + half :]).reshape(*sums.shape[:-1], 2, self.q)
-        B = np.empty((*sums.shape[:-1], self.q, 2), dtype=complex)
-        B[..., 0] = (d * moment[..., 0, :] - b * moment[..., 1, :]) / det
-        B[..., 1] = (a * moment[..., 1, :] - b.conj() * moment[..., 0, :]) / det
-        return B
+        """Weighted least squares, (..., n) -> (..., q, 2); a singular system gives large numbers."""
+        return np.asarray(np.linalg.solve(*self._sums(weights)).swapaxes(-1, -2))
 
     def told(self, weights: FloatArray) -> FloatArray:
         """Share of noise in the variance of every window's residual, (..., n): what B is not told there is the rest.
 
         Windows alone in their direction cannot be held against a fit that has none of them.
         """
-        a, d, b, det = _normal(weights @ self._terms[:, :4])
-        inverse = np.stack([d, a, -2 * b.real, -2 * b.imag], axis=-1) / det[..., None]
-        return np.asarray(1 / (1 + np.maximum(inverse @ self._terms[:, :4].T, 0.0)))
+        leverage = _squares(self._x.conj(), np.asarray(np.linalg.inv(self._sums(weights)[0]), dtype=complex))
+        return np.asarray(1 / (1 + np.maximum(leverage, 0.0)))
 
     def residual(self, B: ComplexArray) -> ComplexArray:
-        """Y - X B', (n, q); `B` (q, 2)."""
-        return np.asarray(self.Y - self.X @ B.T)
-
-    def terms(self, B: ComplexArray) -> FloatArray:
-        """`products` of the residual, (..., q^2, n); `B` (..., q, 2)."""
-        return products(self._y - B @ self._x)
+        """Y - X B' of every window, (..., q, n); `B` (..., q, 2)."""
+        return np.asarray(self._y - B @ self._x)
 
 
-def _normal(sums: FloatArray) -> tuple[FloatArray, FloatArray, ComplexArray, FloatArray]:
-    """Entries xx, yy, xy of the normal equations, and their determinant, never zero; `sums` (..., 4 or more)."""
-    a, d, b = sums[..., 0], sums[..., 1], sums[..., 2] + 1j * sums[..., 3]
-    least = 1e-14 * a * d + 1e-28 * (a + d) ** 2 + np.finfo(float).tiny
-    return a, d, b, np.maximum(a * d - (b.real**2 + b.imag**2), least)
+def _squares(rows: ComplexArray, matrix: ComplexArray) -> FloatArray:
+    """r^H A r of every window, (..., n); `rows` (..., q, n), `matrix` (..., q, q)."""
+    moved = matrix @ rows
+    return np.asarray((rows.real * moved.real + rows.imag * moved.imag).sum(axis=-2))
 
 
-@functools.cache
-def _pairs(q: int) -> tuple[IntArray, IntArray]:
-    """Indices a < b."""
-    return np.triu_indices(q, 1)
+def scatter(rows: ComplexArray, weights: FloatArray) -> ComplexArray:
+    """Weighted mean of r r^H, (..., q, q); `rows` (..., q, n), `weights` (..., n)."""
+    weighted = weights[..., None, :] * rows
+    return np.asarray(weighted @ rows.conj().swapaxes(-1, -2) / weights.sum(axis=-1)[..., None, None])
 
 
-def products(rows: ComplexArray) -> FloatArray:
-    """Terms of r r^H as reals, (..., q, n) -> (..., q^2, n): |r_a|^2, then Re and Im of conj(r_a) r_b for a < b."""
-    q = rows.shape[-2]
-    first, second = _pairs(q)
-    pairs = rows[..., first, :].conj() * rows[..., second, :]
-    result = np.empty((*rows.shape[:-2], q * q, rows.shape[-1]))
-    np.square(rows.real, out=result[..., :q, :])
-    result[..., :q, :] += np.square(rows.imag)
-    result[..., q : q + len(first), :] = pairs.real
-    result[..., q + len(first) :, :] = pairs.imag
-    return result
-
-
-def scatter(terms: FloatArray, weights: FloatArray, q: int) -> ComplexArray:
-    """Weighted mean of r r^H, (..., q, q), from `products`; `terms` (..., q^2, n), `weights` (..., n)."""
-    sums = (terms @ weights[..., None])[..., 0] / weights.sum(axis=-1)[..., None]
-    first, second = _pairs(q)
-    result = np.zeros((*sums.shape[:-1], q, q), dtype=complex)
-    np.einsum("...ii->...i", result)[...] = sums[..., :q]
-    pairs = sums[..., q : q + len(first)] + 1j * sums[..., q + len(first) :]
-    result[..., second, first] = pairs
-    result[..., first, second] = pairs.conj()
-    return result
-
-
-def distance2(terms: FloatArray, inner: ComplexArray) -> FloatArray:
-    """2 r^H S^-1 r of every window, (..., n), from `products` and the scatter S.
-
-    `terms` (..., q^2, n), `inner` (..., q, q).
-    """
-    inverse = np.linalg.inv(inner)
-    q = inner.shape[-1]
-    first, second = _pairs(q)
-    pairs = inverse[..., first, second]
-    factors = np.concatenate([2 * np.einsum("...ii->...i", inverse).real, 4 * pairs.real, -4 * pairs.imag], axis=-1)
+def distance2(rows: ComplexArray, inner: ComplexArray) -> FloatArray:
+    """2 r^H S^-1 r of every window, (..., n), from residuals (..., q, n) and their scatter S (..., q, q)."""
     # a scatter that is all but singular makes rounding large, of either sign
-    return np.maximum((factors[..., None, :] @ terms)[..., 0, :], 0.0)
+    return np.maximum(2 * _squares(rows, np.asarray(np.linalg.inv(inner), dtype=complex)), 0.0)
 
 
 @dataclass(frozen=True)
@@ -146,14 +101,14 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
     repeats = len(direction) / len(np.unique(direction))
     half, exact = _concentrated(regression, seeds, 0.5, repeats)
     if exact:
-        return InitialFit(regression.fit(half), np.zeros((regression.q, regression.q), dtype=complex), True)
+        return InitialFit(regression.fit(half), np.zeros((regression.q), dtype=complex), True)
     majority = InitialFit(*_reweighted(regression, half, 0.5))
     few, exact = _concentrated(regression, seeds, _SMALL_CORE, repeats)
     if exact:
         return majority
     core = InitialFit(*_reweighted(regression, few, _SMALL_CORE))
     limit = trimming_limits(2 * regression.q)[0]
-    accepted = distance2(regression.terms(core.coefficients), core.scatter) <= limit
+    accepted = distance2(regression.residual(core.coefficients), core.scatter) <= limit
     everywhere = len(np.unique(direction[accepted])) == len(np.unique(direction))
     tighter = _log_det(core.scatter) < _log_det(majority.scatter) - np.log(4.0**regression.q)
     return core if everywhere and tighter else majority
@@ -183,38 +138,37 @@ def _core_size(regression: Regression, share: float) -> int:
     return int(share * regression.n + 0.5 * (2 + regression.q + 1))
 
 
-def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Fits through pairs of windows, the terms of their residuals, and the windows' distances from them."""
+def _first_fits(regression: Regression, pairs: IntArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+    """Fits through pairs of windows, their residuals, and the windows' distances from them."""
     chosen = np.zeros((len(pairs), regression.n))
     np.put_along_axis(chosen, pairs, 1.0, axis=1)
     B = regression.fit(chosen)
-    terms = regression.terms(B)
-    spread = np.broadcast_to(regression.metric, (len(B), regression.q, regression.q))
-    return B, terms, regression.told(chosen) * distance2(terms, spread)
+    rows = regression.residual(B)
+    return B, rows, regression.told(chosen) * distance2(rows, regression.metric)
 
 
 def _concentrated(
-    regression: Regression, seeds: tuple[ComplexArray, FloatArray, FloatArray], share: float, repeats: float
+    regression: Regression, seeds: tuple[ComplexArray, ComplexArray, FloatArray], share: float, repeats: float
 ) -> tuple[FloatArray, bool]:
     """Weights (n,) of the core of the best of many concentrated two-window starts, and whether it fits exactly."""
     h = _core_size(regression, share)
-    B, terms, distance = seeds
+    B, rows, distance = seeds
     for step in range(_STEPS):
         previous = B
         weights = _nearest(distance, h)
         told = regression.told(weights / repeats)  # windows of one direction may be off alike: they tell H once
         B = regression.fit(weights)
-        terms = regression.terms(B)
-        spread = _regular(scatter(terms, weights, regression.q), regression.metric)
+        rows = regression.residual(B)
+        spread = _regular(scatter(rows, weights), regression.metric)
         exact = _fits_exactly(spread, regression.Y) & (told.min(axis=-1) > _UNDETERMINED)
         if exact.any():
             return weights[int(np.argmax(exact))], True
         if step == 1:
             best = np.argsort(_log_det(spread), kind="stable")[:_KEPT]
-            B, spread, terms, weights, told = B[best], spread[best], terms[best], weights[best], told[best]
+            B, spread, rows, weights, told = B[best], spread[best], rows[best], weights[best], told[best]
         elif np.array_equal(B, previous):
             break  # every start keeps the same windows
-        distance = told * distance2(terms, spread)
+        distance = told * distance2(rows, spread)
     return weights[int(np.argmin(_log_det(spread)))], False
 
 
@@ -246,17 +200,17 @@ def _reweighted(regression: Regression, core: FloatArray, share: float) -> tuple
     n, q, metric = regression.n, regression.q, regression.metric
     h = _core_size(regression, share)
     B, told = regression.fit(core), regression.told(core)
-    terms = regression.terms(B)
-    spread = _regular(scatter(terms, np.ones(n), q), metric)
+    rows = regression.residual(B)
+    spread = _regular(scatter(rows, np.ones(n)), metric)
     # The core's own scatter is self-consistent after a few looks at which windows it holds.
     for _ in range(4):
-        spread = _regular(scatter(terms, _nearest(told * distance2(terms, spread), h), q), metric)
+        spread = _regular(scatter(rows, _nearest(told * distance2(rows, spread), h)), metric)
     spread = spread / half_shrinkage(2 * q, h / n)
     lower, upper, shrinkage = trimming_limits(2 * q)
     for _ in range(2):
-        weights = trimming_weight(told * distance2(terms, spread), lower, upper)
+        weights = trimming_weight(told * distance2(rows, spread), lower, upper)
         B, told = regression.fit(weights), regression.told(weights)
-        terms = regression.terms(B)
+        rows = regression.residual(B)
         freedom = (weights.sum() - 2) / weights.sum()
-        spread = _regular(scatter(terms, weights, q) / (shrinkage * freedom), metric)
+        spread = _regular(scatter(rows, weights) / (shrinkage * freedom), metric)
     return B, spread

@@ -42,28 +42,28 @@ class RobustFit:
 def mm_fit(X: ComplexArray, Y: ComplexArray, direction: IntArray, seed: int = 1, tolerance: float = 1e-12) -> RobustFit:
     """Robust multivariate complex regression of Y on X; `X` (n, 2), `Y` (n, q), `direction` (n,)."""
     n, q = len(Y), Y.shape[1]
-    if n < max(_MIN_WINDOWS, 2 * (q + 1) + 2):
-        return _least_squares_only(X, Y)
     regression = Regression(X, Y)
+    if n < max(_MIN_WINDOWS, 2 * (q + 1) + 2):
+        text = f"{n} windows are too few for a robust fit; least squares was used"
+        return _plain_fit(regression, np.ones(n), Condition("no-robust-start", text))
     subset = evenly_chosen(direction, MANY_WINDOWS)
     first = regression if len(subset) == n else Regression(X[subset], Y[subset])
     start = robust_start(first, direction[subset], seed)
     if start.exact:
-        return _exact_fit(regression, start.coefficients)
+        size = np.linalg.norm(regression.residual(start.coefficients), axis=0)
+        good = size <= 1e-9 * np.median(np.linalg.norm(Y, axis=1))
+        text = f"{int(good.sum())} of {n} windows fit exactly; the others got no weight"
+        return _plain_fit(regression, good.astype(float), Condition("zero-scale", text))
     B, scatter = start.coefficients, start.scatter
     constant = efficiency_constant(2 * q)
-    steps, change = 0, np.inf
-    weights = bisquare_weight(np.sqrt(distance2(regression.terms(B), scatter)), constant)
-    while change > tolerance and steps < _MAX_ITERATIONS:
-        steps += 1
-        B_new = regression.fit(weights)
-        weights = bisquare_weight(np.sqrt(distance2(regression.terms(B_new), scatter)), constant)
-        change = float(np.abs(B_new - B).max() / np.abs(B).max())
-        B = B_new
-    conditions: tuple[Condition, ...] = ()
-    if steps == _MAX_ITERATIONS:
-        conditions = (Condition("iteration-limit", f"MM regression not settled after {steps} steps"),)
-    return RobustFit(B, scatter, weights, steps, conditions)
+    weights = bisquare_weight(np.sqrt(distance2(regression.residual(B), scatter)), constant)
+    for steps in range(1, _MAX_ITERATIONS):
+        before, B = B, regression.fit(weights)
+        weights = bisquare_weight(np.sqrt(distance2(regression.residual(B), scatter)), constant)
+        if np.abs(B - before).max() <= tolerance * np.abs(before).max():
+            return RobustFit(B, scatter, weights, steps, ())
+    unsettled = Condition("iteration-limit", f"MM regression not settled after {_MAX_ITERATIONS} steps")
+    return RobustFit(B, scatter, weights, _MAX_ITERATIONS, (unsettled,))
 
 
 def within_directions(weights: FloatArray, direction: IntArray) -> FloatArray:
@@ -77,24 +77,9 @@ def within_directions(weights: FloatArray, direction: IntArray) -> FloatArray:
     return np.where((share < _ACCEPTED)[direction], 1.0, weights)
 
 
-def _exact_fit(regression: Regression, B: ComplexArray) -> RobustFit:
-    """More than half of the windows fit without residual: they count, the others do not."""
-    size = np.linalg.norm(regression.residual(B), axis=1)
-    good = size <= 1e-9 * np.median(np.linalg.norm(regression.Y, axis=1))
-    weights = good.astype(float)
+def _plain_fit(regression: Regression, weights: FloatArray, condition: Condition) -> RobustFit:
+    """Least squares of some windows, the others without weight."""
     B = regression.fit(weights)
-    condition = Condition(
-        "zero-scale", f"{int(good.sum())} of {len(good)} windows fit exactly; the others got no weight"
-    )
-    return RobustFit(B, np.zeros((regression.q, regression.q), dtype=complex), weights, 0, (condition,))
-
-
-def _least_squares_only(X: ComplexArray, Y: ComplexArray) -> RobustFit:
-    n = len(Y)
-    weights = np.ones(n)
-    regression = Regression(X, Y)
-    B = regression.fit(weights)
-    residual = regression.residual(B)
-    scatter = residual.T @ residual.conj() / max(n - X.shape[1], 1)
-    condition = Condition("no-robust-start", f"{n} windows are too few for a robust fit; least squares was used")
-    return RobustFit(B, scatter, weights, 0, (condition,))
+    residual = weights * regression.residual(B)
+    spread = residual @ residual.conj().T / max(float(weights.sum()) - 2.0, 1.0)
+    return RobustFit(B, spread, weights, 0, (condition,))

@@ -80,38 +80,35 @@ def solve_rlm(design: FloatArray, response: FloatArray, settings: RlmSettings | 
             "RLM solves real systems; complex data would come back with false standard errors. "
             "Stack real and imaginary parts first (tpjb_ident.estimators.r_matrix.real_rows)"
         )
-    fit = _fit(design, response, settings)
-    conditions: list[Condition] = []
-    if fit.iterations >= settings.max_iterations:
-        conditions.append(Condition("iteration-limit", f"RLM stopped after {fit.iterations} iterations"))
-    size = float(np.abs(response).max(initial=0.0))
-    if not fit.scale > 1e-14 * size:
-        conditions.append(Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist"))
-    return replace(fit, conditions=tuple(conditions))
-
-
-def _fit(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
     if settings.quick and settings.norm in _WEIGHTS and settings.scale == "mad":
-        return _reweighted(design, response, settings)
+        fit = _reweighted(design, response, settings)
+    else:
+        fit = _statsmodels(design, response, settings)
+    if fit.iterations >= settings.max_iterations:
+        stopped = Condition("iteration-limit", f"RLM stopped after {fit.iterations} iterations")
+        fit = replace(fit, conditions=(stopped,))
+    if not fit.scale > 1e-14 * float(np.abs(response).max(initial=0.0)):
+        exact = Condition("zero-scale", "more than half of the rows fit exactly; no standard errors exist")
+        fit = replace(fit, conditions=(*fit.conditions, exact))
+    return fit
+
+
+def _statsmodels(design: FloatArray, response: FloatArray, settings: RlmSettings) -> RlmSolution:
+    from statsmodels.robust import norms
     from statsmodels.robust.robust_linear_model import RLM
 
-    fit = RLM(response, design, M=_norm(settings.norm)).fit(
+    if settings.norm not in NORMS:
+        raise ArgumentError(unknown_name("norm", settings.norm, NORMS))
+    own: dict[str, Callable[[], Any]] = {
+        "student": lambda: norms.StudentT(c=1.0, df=4.0),
+        "mquantile": lambda: norms.MQuantileNorm(0.5, norms.HuberT()),  # the symmetric one, which estimates H
+    }
+    norm = own.get(settings.norm, getattr(norms, NORMS[settings.norm]))()
+    fit = RLM(response, design, M=norm).fit(
         maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=settings.scale
     )
     params, weights, covariance = (np.asarray(values) for values in (fit.params, fit.weights, fit.bcov_scaled))
     return RlmSolution(params, weights, float(fit.scale), int(fit.fit_history["iteration"]), covariance)
-
-
-def _norm(name: str) -> Any:
-    from statsmodels.robust import norms
-
-    if name not in NORMS:
-        raise ArgumentError(unknown_name("norm", name, NORMS))
-    if name == "student":
-        return norms.StudentT(c=1.0, df=4.0)
-    if name == "mquantile":  # the symmetric one; others estimate quantiles, not H
-        return norms.MQuantileNorm(0.5, norms.HuberT())
-    return getattr(norms, NORMS[name])()
 
 
 def rlm_fit(D: ComplexArray, F: ComplexArray, settings: RlmSettings | None = None) -> TableFit:
