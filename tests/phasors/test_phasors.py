@@ -9,7 +9,7 @@ import pytest
 
 from rigdata.problem import RigDataError
 from tpjb_ident.phasors import line_fit, run_phasors
-from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSettings, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
 from tpjb_ident.phasors.windows import (
@@ -83,7 +83,9 @@ def test_uneven_times_are_fitted_where_they_are():
     values = np.stack(
         [sum((z[a] * np.exp(2j * np.pi * f * t)).real for f, z in TRUE.items()) for a in range(2)], axis=1
     )
-    block = fit_uneven(values[keep].T, t[keep], np.array(list(TRUE)), 0.0)
+    own = t[keep]
+    fitter = LineFitter(len(own), RATE, np.array(list(TRUE)), time=own)
+    block = fitter.fit(values[keep].T[:, None], own[:1])
     np.testing.assert_allclose(block.z[0, 0], TRUE[25.0], atol=1e-9)
 
 

@@ -115,12 +115,12 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         cut = resampled(samples, period, settings.band[1])
         length = round(period)
         clean = without_disturbances(cut, lines, length)
-    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower)
+    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower, settings.delays)
     phasors = replace(phasors, conditions=merged(samples.conditions, conditions, _clock_conditions(clocks)))
     command = None if clean.command is None else _bins(clean.command, length, _places(clean.rate, length, settings))
     width = LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD
     return RunSpectra(
-        phasors.advanced(settings.delays),
+        phasors,
         command,
         bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
         lines,

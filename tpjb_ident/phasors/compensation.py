@@ -7,20 +7,18 @@ splines. The line itself comes out smaller (and late, where values are held) by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import find_peaks
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.calibration import Channel
 from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import Problem, RigDataError, refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import device_readers
-from tpjb_ident.phasors.lines import LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude, noise_floor
 
@@ -188,27 +186,23 @@ def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ..
     return (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
 
 
-def compensated(result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
-    """The run's phasors as channels without filters and delays would have given them."""
-    gains = channel_gains(run, result.channels, slower, result.lines)
-    return result if gains is None else result.divided(gains)
+def compensated(
+    result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
+) -> RunPhasors:
+    """The run's phasors as channels without filters, filling and delays would have given them.
 
-
-def channel_gains(
-    run: Run, channels: Sequence[Channel], slower: Mapping[str, SlowerChannel], lines: LineSet
-) -> ComplexArray | None:
-    """What channels made of a sine of size one at every line, (n_whole_lines, n_channels); None where nothing."""
-    if not any(c.response or c.name in slower for c in channels):
-        return None
-    frequencies = lines.whole_frequencies
-    gains = np.ones((len(frequencies), len(channels)), dtype=complex)
-    for k, channel in enumerate(channels):
+    `delays` [s]: of whole quantities.
+    """
+    frequencies = result.lines.whole_frequencies
+    gains = np.ones((len(frequencies), len(result.channels)), dtype=complex)
+    for k, channel in enumerate(result.channels):
+        gains[:, k] = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
         if channel.response:
             gain = channel.response.at(frequencies)
-            gains[:, k] *= _reached(gain, frequencies, len(lines.excitation), run, channel.name)
+            gains[:, k] *= _reached(gain, frequencies, len(result.lines.excitation), run, channel.name)
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    return gains
+    return result if np.all(gains == 1.0) else result.divided(gains)
 
 
 def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run, name: str) -> ComplexArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -102,26 +101,11 @@ class RunPhasors:
             noise[rows] = np.sqrt(scale[rows][:, members] ** 2 @ (inverse**2).T)
         return PhasorBlock(phasors, means, noise, self.lost[:, places].max(axis=1, initial=0.0))
 
-    def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
-        """The run without delays of whole quantities."""
-        return self.divided(self._late(delays)) if any(delays.values()) else self
-
-    def _late(self, delays: Mapping[str, float]) -> ComplexArray:
-        late = np.array([delays.get(c.quantity, 0.0) for c in self.channels])
-        return np.exp(-2j * np.pi * np.multiply.outer(self.lines.whole_frequencies, late))
-
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
         residual = tuple(bins / gain for bins, gain in zip(self.residual, gains))
         record = self.record / gains if len(self.record) else self.record
         return replace(self, z=self.z / gains[: self.z.shape[1]], record=record, residual=residual)
-
-    def with_record(
-        self, record: ComplexArray, residual: tuple[ComplexArray, ...], delays: Mapping[str, float]
-    ) -> RunPhasors:
-        """The run with phasors and residual of its whole record, without delays of whole quantities."""
-        late = self._late(delays)
-        return replace(self, record=record / late, residual=tuple(bins / gain for bins, gain in zip(residual, late)))
 
     def oil_force(self, line: int | slice = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""

@@ -44,7 +44,7 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
     conditions = merged(result.conditions, slower_condition(slower))
-    return compensated(replace(result, conditions=conditions, device=device), run, slower)
+    return compensated(replace(result, conditions=conditions, device=device), run, slower, settings.delays)
 
 
 def _inspected(run: Run, housing_mass: float, settings: PhasorSettings) -> _Inspection:
@@ -114,8 +114,9 @@ class _Inspection:
             self._add_near()
         channels, lines = len(self.result.channels), self.result.lines
         residual = tuple(residual_beside(self.records, i, channels) for i in range(len(lines.excitation)))
-        result = replace(self.result, conditions=self.conditions + lines.conditions)
-        self.result = result.with_record(record_phasors(self.records, channels), residual, settings.delays)
+        record = record_phasors(self.records, channels)
+        conditions = self.conditions + lines.conditions
+        self.result = replace(self.result, conditions=conditions, record=record, residual=residual)
 
     def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate
