@@ -11,7 +11,6 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.run import Run
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.line_means import channel_phasors
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Lines of a band that are looked at, the strongest of as many parts of it.
@@ -39,7 +38,7 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
     places = [known[channels[k].name] for k in rows]
     table = np.full((3, len(channels)), np.nan)
     phasor = np.full(len(channels), np.nan + 0j)
-    phasor[rows] = channel_phasors(phasors, line)[places]
+    phasor[rows] = phasors.record[line, places]
     floor = np.abs(phasors.residual[line])
     for values, windows in zip(table, (phasors.mean, floor, phasors.scale)):
         for k, place in zip(rows, places):

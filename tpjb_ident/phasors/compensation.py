@@ -14,8 +14,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.channel_statistics import ChannelStatistics
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import device_readers
@@ -32,10 +31,6 @@ _NO_BEND = 0.01
 _RHYTHM = 0.8
 #: and how far their number may be off.
 _COUNT_OFF = 0.25
-#: Samples from the start that are looked at.
-_LOOK = 2**14
-#: A channel with more of its samples at a limit than this is of no use.
-_CLIPPED = 0.05
 #: An image stands this many times above the noise of its channel,
 _CLEAR = 8.0
 #: and has at least this share of its line.
@@ -218,14 +213,12 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run,
 def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | None:
     """Tell whether a channel was filled up, from the beginning of its readings; `readings` (n,).
 
-    Logger programs write groups of different rates into one table by interpolation. A sine comes out of that smaller
-    (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as
-    a filter is. What gives such a channel away is that its bends (or steps) come in a strict rhythm.
+    Logger programs write groups of different rates into one table by interpolation. What gives such a channel away is
+    that its bends (or steps) come in a strict rhythm.
     """
-    values = readings[:_RHYTHM_LOOK]
-    if len(values) < 200 or not np.isfinite(values).all():
+    if len(readings) < 200 or not np.isfinite(readings).all():
         return None
-    for held, changes in ((True, np.abs(np.diff(values))), (False, np.abs(np.diff(values, 2)))):
+    for held, changes in ((True, np.abs(np.diff(readings))), (False, np.abs(np.diff(readings, 2)))):
         usual = 2 * float(changes.mean())
         bent = changes > _NO_BEND * usual
         if not usual > 0 or bent.mean() > 1 - _STRAIGHT:
@@ -271,38 +264,12 @@ def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
 
 
 def inspect_readings(run: Run) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
-    """Channels that were sampled slower than the export, by name, and what to say of them.
-
-    What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
-    limits, or sampled slower than the others.
-    """
-    slower = {name: slower_channel(values, run.sample_rate) for name, values in unclipped_readings(run).items()}
-    named = {name: channel for name, channel in slower.items() if channel is not None}
-    return named, slower_condition(named)
-
-
-def unclipped_readings(run: Run) -> dict[str, FloatArray]:
-    """Readings of a run's beginning by channel; refused is one driven into its limits: what was cut off is lost."""
-    readings: dict[str, FloatArray] = {}
-    clipped: list[Problem] = []
+    """Channels that were sampled slower than the export, by name, and what to say of them."""
+    slower: dict[str, SlowerChannel] = {}
     for reader in device_readers(run):
-        rows = reader.read(0, min(reader.length, _LOOK)).rows
+        rows = reader.read(0, min(reader.length, _RHYTHM_LOOK)).rows
         for channel, values in zip(reader.channels, rows):
-            readings[channel.name] = values
-            if channel.quantity != "acceleration":
-                clipped += _clipped(run, channel.name, (values - channel.zero) / channel.slope)
-    if clipped:
-        raise RigDataError(clipped)
-    return readings
-
-
-def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:
-    statistics = ChannelStatistics()
-    statistics.add(values)
-    share = 0.0 if statistics.constant else statistics.clipped_share()
-    if share <= _CLIPPED:
-        return []
-    unit = run.channels[name].unit
-    text = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"
-    cure = "Widen the channel's range and repeat the run; what was cut off cannot be had back"
-    return [Problem("error", run.file, f"channel {name}", text, cure, run.id)]
+            filling = slower_channel(values, run.sample_rate)
+            if filling is not None:
+                slower[channel.name] = filling
+    return slower, slower_condition(slower)

@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition, unclipped_readings
+from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
@@ -35,7 +35,6 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         cure = "Excite with sines, or leave the run out"
         raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    unclipped_readings(run)
     inspection = _inspected(run, housing_mass, settings)
     result, slower = inspection.result, inspection.slower
     if inspection.run.length < run.length:

@@ -13,8 +13,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.phasors.line_fit import usual_scale
-from tpjb_ident.phasors.line_means import complex_median
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, complex_median
 
 #: Windows of a stretch, at least.
 _LEAST = 3
