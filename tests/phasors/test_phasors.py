@@ -157,7 +157,7 @@ def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
 def test_a_time_column_in_the_wrong_unit_is_named_with_file_and_cure():
     """Milliseconds called seconds make a record of one sample a second."""
     run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, length=4000)
-    inspection = object.__new__(run_phasors._Inspection)
-    inspection.run, inspection.settings = run, PhasorSettings()
+    fit = object.__new__(run_phasors._RunFit)
+    fit.run, fit.settings = run, PhasorSettings()
     with pytest.raises(RigDataError, match=r"r1.csv, time: 1 samples per second .* 35 Hz.*ms called s"):
-        inspection._lines((35.0,), 20.0, ())
+        fit._lines((35.0,), 20.0, ())

@@ -9,9 +9,9 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.phasors.bad_samples import SCALE_LIMIT
+from tpjb_ident.phasors.bad_samples import SCALE_LIMIT, usual_scale
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
-from tpjb_ident.phasors.line_fit import LineFitter, WindowFit, usual_scale
+from tpjb_ident.phasors.line_fit import LineFitter, WindowFit
 from tpjb_ident.phasors.lines import LineSet
 from tpjb_ident.phasors.run_data import QUANTITIES, PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, window_speeds

@@ -13,8 +13,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.line_fit import usual_scale
+from tpjb_ident.phasors.bad_samples import robust_deviation, usual_scale
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse
@@ -191,8 +190,12 @@ def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, flo
     advances by what the shaft is ahead of the frequency fitted.
     """
     line = result.lines.place("1X")
-    advance = None if line is None else _line_advance(result, line, rate, result.pick("displacement"))
-    if line is None or advance is None:
+    if line is None:
+        return None
+    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
+    z = result.displacement.phasors[:, line]
+    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
+    if advance is None:
         return None
     speeds = np.full(len(result.start), np.nan)
     steps = np.concatenate([advance.steps[:1], advance.steps, advance.steps[-1:]])

@@ -18,6 +18,7 @@ from tpjb_ident.phasors.bad_samples import (
     is_present,
     robust_deviation,
     robust_fit,
+    usual_scale,
     with_flanks,
 )
 from tpjb_ident.phasors.windows import line_design
@@ -198,15 +199,3 @@ def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> Floa
     told = frequencies * duration >= apart.min(initial=np.inf)
     weights[: 2 * len(frequencies)][np.repeat(told, 2)] = 0.0
     return weights
-
-
-def usual_scale(scale: FloatArray) -> FloatArray:
-    """Median over the windows with a scale; infinite where none has; `scale` (n_windows, q)."""
-    if len(scale) and np.isfinite(scale).all():
-        return np.asarray(np.median(scale, axis=0))
-    usual = np.full(scale.shape[1], np.inf)
-    for k, column in enumerate(scale.T):
-        finite_values = column[np.isfinite(column)]
-        if len(finite_values):
-            usual[k] = np.median(finite_values)
-    return usual

@@ -13,6 +13,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.phasors.bad_samples import usual_scale
 from tpjb_ident.phasors.lines import LineSet, LineSettings
 from tpjb_ident.phasors.windows import WindowSettings
 
@@ -145,3 +146,8 @@ def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | Non
 def complex_median(z: ComplexArray) -> ComplexArray:
     """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
     return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))
+
+
+def phasor_noise(run: RunPhasors, rate: float) -> FloatArray:
+    """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
+    return np.maximum(2 * usual_scale(run.scale) / np.sqrt(run.length * rate), np.finfo(float).tiny)
