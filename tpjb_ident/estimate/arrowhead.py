@@ -74,12 +74,13 @@ class Sums:
             np.zeros(parameters),
         )
 
-    def add(self, point: IntArray, r: FloatArray, J_h: FloatArray, J_t: FloatArray) -> None:
-        """Add weighted rows of blocks: `point` (n,), `r` (n, k), `J_h` (n, k, numbers), `J_t` (n, k, q)."""
-        transposed = J_h.transpose(0, 2, 1)
-        np.add.at(self.A, point, transposed @ J_h)
+    def add(self, point: IntArray, weight: FloatArray, r: FloatArray, J: FloatArray, J_t: FloatArray) -> None:
+        """Add rows of blocks: `point`, root of the `weight` (n,), `r` (n, k), `J` (n, k, numbers), `J_t` (n, k, q)."""
+        r, J, J_t = r * weight[:, None], J * weight[:, None, None], J_t * weight[:, None, None]
+        transposed = J.transpose(0, 2, 1)
+        np.add.at(self.A, point, transposed @ J)
         np.add.at(self.E, point, transposed @ J_t)
-        np.add.at(self.g_h, point, np.einsum("nka,nk->na", J_h, r))
+        np.add.at(self.g_h, point, np.einsum("nka,nk->na", J, r))
         flat = J_t.reshape(J_t.shape[0] * J_t.shape[1], J_t.shape[2])
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
