@@ -69,7 +69,7 @@ class _RunFit:
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
         speed, self.conditions = shaft_speed(run)
         self._fit(self._lines(self.driven, speed, ()), None)
-        self.slower = filled_channels(self.records, self.result)
+        self.slower = filled_channels(run)
         if settings.find_lines:
             self._add_unexpected(speed)
         better = tuned(run, self.result, self.driven, speed, settings)
