@@ -116,7 +116,7 @@ class RunPhasors:
 
 
 def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
-    """X and Y (.., 2) of components (.., m) along unit vectors (m, 2), by least squares over those that have a value.
+    """X and Y (.., 2) of components (.., m) along unit vectors (.., m, 2), by least squares over those with a value.
 
     NaN where they span no plane.
     """
