@@ -56,7 +56,8 @@ def trimming_limits(dimension: int) -> tuple[float, float, float]:
     # the weight as a polynomial of the squared distance: 1 - 3 v^2 + 2 v^3 with v from 0 to 1 between the limits
     v = np.polynomial.Polynomial([-lower, 1.0]) / (upper - lower)
     moments = [_moment(dimension, k, lower) for k in range(2)]
-    for k, coefficient in enumerate((1 - 3 * v**2 + 2 * v**3).coef):
+    weight: list[float] = (1 - 3 * v**2 + 2 * v**3).coef.tolist()
+    for k, coefficient in enumerate(weight):
         for n in range(2):
             moments[n] += coefficient * (_moment(dimension, k + n, upper) - _moment(dimension, k + n, lower))
     return lower, upper, moments[1] / (dimension * moments[0])

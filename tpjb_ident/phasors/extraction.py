@@ -37,7 +37,7 @@ def extract(
     channels.sort(key=lambda described: QUANTITIES.index(described[0].quantity))
     length, count = plan_windows(run.length, run.sample_rate, lines, settings.windows)
     seconds = length / run.sample_rate
-    middles = (np.arange(count) + 0.5) * length / run.sample_rate
+    middles = np.asarray((np.arange(count) + 0.5) * length / run.sample_rate, dtype=float)
     speeds = np.full(count, np.nan) if follow is None else follow.at(middles)
     fit = WindowFit.empty(count, len(lines.frequencies), len(channels))
     firsts, start, tachometer = length * np.arange(count), np.empty(0), np.full(count, np.nan)
