@@ -14,8 +14,11 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.vector import plane_vector
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.run_data import plane_vector
+
+#: Quantities of the equation, in the order of its rows.
+QUANTITIES = ("displacement", "force", "acceleration")
 
 
 @dataclass(frozen=True)

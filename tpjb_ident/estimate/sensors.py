@@ -9,8 +9,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
-from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, vector
-from tpjb_ident.phasors.run_data import QUANTITIES
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, vector
 
 #: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
 _FLOATS = 0.3

@@ -11,11 +11,10 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Sensor, stacked
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Sensor, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
-from tpjb_ident.phasors.run_data import QUANTITIES
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import LoadMiss
 

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import directions
+from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.bad_samples import usual_scale
@@ -18,8 +18,6 @@ from tpjb_ident.phasors.lines import LineSet, LineSettings
 from tpjb_ident.phasors.windows import WindowSettings
 
 QUANTITIES = ("displacement", "force", "acceleration")
-#: Square of the sine of an angle (3 deg) below which two directions count as one.
-_COLLINEAR = 2.5e-3
 
 
 @dataclass(frozen=True)
@@ -115,21 +113,6 @@ class RunPhasors:
     def oil_force(self, line: int | slice = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
         return self.film_force(self.z[:, line])
-
-
-def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
-    """X and Y (.., 2) of components (.., m) along unit vectors (.., m, 2), by least squares over those with a value.
-
-    NaN where they span no plane.
-    """
-    present = np.isfinite(values)
-    seen = np.where(present[..., None], along, 0.0)
-    gram = np.swapaxes(seen, -1, -2) @ seen
-    moment = np.swapaxes(seen, -1, -2) @ np.where(present, values, 0.0)[..., None]
-    spanned = np.linalg.det(gram) > _COLLINEAR
-    vectors = np.full((*values.shape[:-1], 2), np.nan + 0j)
-    vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., 0]
-    return vectors
 
 
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
