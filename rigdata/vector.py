@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 
 #: Two directions whose sine is not above this (3 deg) count as one.
@@ -51,6 +51,21 @@ def vector_rows(channels: Sequence[Channel], readings: Sequence[FloatArray]) -> 
         if np.count_nonzero(pattern) >= 2:
             rows[:, samples] = inverse_directions(tuple(axes[pattern].tolist())) @ values[np.ix_(pattern, samples)]
     return rows
+
+
+def plane_vector(along: FloatArray, values: ComplexArray) -> ComplexArray:
+    """X and Y (.., 2) of components (.., m) along unit vectors (.., m, 2), by least squares over those with a value.
+
+    NaN where they span no plane.
+    """
+    present = np.isfinite(values)
+    seen = np.where(present[..., None], along, 0.0)
+    gram = np.swapaxes(seen, -1, -2) @ seen
+    moment = np.swapaxes(seen, -1, -2) @ np.where(present, values, 0.0)[..., None]
+    spanned = np.linalg.det(gram) > _COLLINEAR_SINE**2
+    vectors = np.full((*values.shape[:-1], 2), np.nan + 0j)
+    vectors[spanned] = np.linalg.solve(gram[spanned], moment[spanned])[..., 0]
+    return vectors
 
 
 def zero_uncertainty(channels: Iterable[Channel], quantity: str) -> FloatArray:

@@ -25,7 +25,7 @@ def problem(seed, weak=()):
 def taken(point, r, J_h, J_t):
     sums = Sums.empty(POINTS, PARAMETERS)
     for places in (slice(0, 5), slice(5, 12)):
-        sums.add(point[places], r[places], J_h[places], J_t[places])
+        sums.add(point[places], np.ones(len(point[places])), r[places], J_h[places], J_t[places])
     return sums
 
 
@@ -108,13 +108,13 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
     never = np.zeros((POINTS, OWN), dtype=bool)
     own = Prior(distance, rng.uniform(0.2, 2.0, (POINTS, OWN)), never, never)
     sums = Sums.empty(POINTS, PARAMETERS, NUMBERS + OWN)
-    sums.add(point, r, np.concatenate([J_h, J_own], axis=2), J_t)
+    sums.add(point, np.ones(len(point)), r, np.concatenate([J_h, J_own], axis=2), J_t)
     found = step(sums, shared(to_prior, precision), own)
     everywhere = np.zeros((BLOCKS, ROWS, POINTS, OWN))
     everywhere[np.arange(BLOCKS), :, point] = J_own
     border = np.concatenate([J_t, everywhere.reshape(BLOCKS, ROWS, -1)], axis=2)
     all_sums = Sums.empty(POINTS, PARAMETERS + POINTS * OWN)
-    all_sums.add(point, r, J_h, border)
+    all_sums.add(point, np.ones(len(point)), r, J_h, border)
     joined = (np.concatenate([to_prior, distance.ravel()]), np.concatenate([precision, own.precision.ravel()]))
     bordered = step(all_sums, shared(*joined), Prior.none(POINTS))
     np.testing.assert_array_equal(found.own.estimated.ravel(), bordered.estimated[PARAMETERS:])
@@ -164,7 +164,7 @@ def test_a_parameter_is_estimated_from_four_fifths_of_its_prior_on():
 def test_without_any_parameter_the_points_stand_alone():
     point, r, J_h, _, _, _ = problem(9)
     sums = Sums.empty(POINTS, 0)
-    sums.add(point, r, J_h, np.zeros((BLOCKS, ROWS, 0)))
+    sums.add(point, np.ones(len(point)), r, J_h, np.zeros((BLOCKS, ROWS, 0)))
     found = step(sums, shared(np.zeros(0), np.zeros(0)), Prior.none(POINTS))
     for p in range(POINTS):
         mine = point == p

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import chirp, lfilter
 
 from rigdata import load_campaign
 from tests.rigs.campaign_file import plans_of, write_campaign
@@ -27,17 +29,26 @@ def written(tmp_path, rig, plans=ONE_LOAD, seed=1):
     return path
 
 
-@pytest.mark.parametrize("held", [False, True])
+def of_times(own, values, t):
+    """What a logger program makes of readings at their own times: held, along lines, along splines; by order."""
+    held = values[np.searchsorted(own, t, side="right") - 1]
+    return {1: held, 2: np.interp(t, own, values), 4: CubicSpline(own, values)(t)}
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("slow", [150.0, 400.0])
-def test_a_channel_that_was_filled_up_is_told_with_its_rate(slow, held):
+@pytest.mark.parametrize("excited", ["sine", "band"])
+def test_a_channel_that_was_filled_up_is_told_with_its_rate(slow, order, excited):
     rng = np.random.default_rng(1)
-    t, own = np.arange(8000) / 2000.0, np.arange(-1, 700 * 4) / slow + 0.0007
-    values = np.sin(2 * np.pi * 25 * own) + 0.01 * rng.standard_normal(len(own))
-    filled = values[np.searchsorted(own, t, side="right") - 1] if held else np.interp(t, own, values)
+    t, own = np.arange(8000) / 2000.0, np.arange(-3, 700 * 4) / slow + 0.0007
+    lines = np.arange(5.0, 60.0, 0.7) if excited == "band" else np.array([25.0])
+    values = np.cos(2 * np.pi * np.outer(own, lines) + rng.uniform(0, 6, len(lines))).sum(axis=1)
+    filled = of_times(own, values + 0.01 * rng.standard_normal(len(own)), t)[order]
+    filled[[310, 7500]] = np.nan
     found = slower_channel(filled, 2000.0)
     assert found is not None
-    assert found.order == (1 if held else 2)
-    assert found.rate == pytest.approx(slow, rel=1e-4)
+    assert found.order == order
+    assert found.rate == pytest.approx(slow, rel=2e-4)
 
 
 @pytest.mark.parametrize("step", [0.0, 1e-3, 0.05])
@@ -45,7 +56,18 @@ def test_a_channel_at_its_own_rate_is_not(step):
     rng = np.random.default_rng(2)
     t = np.arange(8000) / 2000.0
     values = np.sin(2 * np.pi * 25 * t) + 2 * np.sin(2 * np.pi * 22 * t) + 0.01 * rng.standard_normal(len(t))
-    assert slower_channel(np.round(values / step) * step if step else values, 2000.0) is None
+    values = np.round(values / step) * step if step else values
+    assert slower_channel(values, 2000.0) is None
+    values[[2000, 2300, 5100]] += [9.0, -4.0, 7.0]
+    assert slower_channel(values, 2000.0) is None
+
+
+def test_blows_and_sweeps_fill_no_channel():
+    t, noise = np.arange(8000) / 2000.0, 1e-3 * np.random.default_rng(3).standard_normal(8000)
+    blows = np.zeros(8000)
+    blows[[700, 2500, 5000]] = [1.0, 0.8, 0.9]
+    for values in (lfilter([1.0], [1.0, -1.9, 0.95], blows), chirp(t, 5.0, 4.0, 120.0)):
+        assert slower_channel(values + noise, 2000.0) is None
 
 
 def test_straight_lines_make_a_sine_smaller_by_sinc_squared():

@@ -15,8 +15,9 @@ from rigdata.run import Run
 from tests.rigs import held_run
 from tests.rigs.held_run import HeldReader, channels, columns
 from tpjb_ident.phasors import extraction
+from tpjb_ident.phasors.compensation import compensated
 from tpjb_ident.phasors.extraction import MAX_JITTER, extract
-from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.phasors.shaft import ShaftCourse
@@ -89,8 +90,8 @@ def held(seconds=4.0, stamps=None, turns=None, late=0.0, quantities=("displaceme
 FIXED = PhasorSettings(windows=WindowSettings(length=0.4))
 
 
-def taken(run, follow=None, settings=FIXED):
-    return extract(run, 30.0, settings, LINES, follow)
+def taken(run, follow=None):
+    return extract(run, 30.0, FIXED, LINES, follow)
 
 
 def exact(result, quantity="displacement", but=(), tolerance=1e-9):
@@ -127,8 +128,8 @@ def test_a_run_on_file_without_a_clock_counts_its_samples():
 
 def test_a_channel_recorded_late_is_put_back():
     late = 3e-3
-    settings = PhasorSettings(windows=FIXED.windows, delays={"force": late})
-    found = taken(held(late=late), settings=settings)
+    run = held(late=late)
+    found = compensated(taken(run), run, {}, {"force": late})
     exact(found, "force")
     exact(found)
     plain = taken(held(late=late))
@@ -259,7 +260,7 @@ def test_a_window_of_its_own_clock_has_its_mean_and_noise():
     z = np.array([2.0 - 1.0j, 0.5j])
     values = np.outer(np.exp(2j * math.pi * 25.3 * t), z).real + [700.0, -30.0] + 0.01 * rng.standard_normal((500, 2))
     values[40, 0] = np.nan
-    found = fit_uneven(values.T, t, FREQUENCIES, 1.0)
+    found = LineFitter(len(t), RATE, FREQUENCIES, time=t).fit(values.T[:, None], t[:1] - 1.0)
     # phasors count from the origin, two seconds before the first sample
     np.testing.assert_allclose(found.z[0, 0], z * np.exp(2j * math.pi * 25.3 * 1.0), atol=5e-3)
     np.testing.assert_allclose(found.mean[0], [700.0, -30.0], atol=5e-3)
@@ -275,4 +276,5 @@ def test_a_line_that_does_not_turn_once_in_a_window_leaves_its_mean_alone(slow):
     frequencies = np.array([25.0, slow])
     even = LineFitter(length, RATE, frequencies).fit(rows, np.zeros(1))
     assert even.mean[0, 0] == pytest.approx(7.0, abs=1e-3)
-    assert fit_uneven(rows[0], time, frequencies, 0.0).mean[0, 0] == pytest.approx(7.0, abs=1e-3)
+    uneven = LineFitter(length, RATE, frequencies, time=time).fit(rows, np.zeros(1))
+    assert uneven.mean[0, 0] == pytest.approx(7.0, abs=1e-3)

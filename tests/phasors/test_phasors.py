@@ -9,7 +9,7 @@ import pytest
 
 from rigdata.problem import RigDataError
 from tpjb_ident.phasors import line_fit, run_phasors
-from tpjb_ident.phasors.line_fit import LineFitter, fit_uneven
+from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSettings, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, oil_force
 from tpjb_ident.phasors.windows import (
@@ -83,7 +83,9 @@ def test_uneven_times_are_fitted_where_they_are():
     values = np.stack(
         [sum((z[a] * np.exp(2j * np.pi * f * t)).real for f, z in TRUE.items()) for a in range(2)], axis=1
     )
-    block = fit_uneven(values[keep].T, t[keep], np.array(list(TRUE)), 0.0)
+    own = t[keep]
+    fitter = LineFitter(len(own), RATE, np.array(list(TRUE)), time=own)
+    block = fitter.fit(values[keep].T[:, None], own[:1])
     np.testing.assert_allclose(block.z[0, 0], TRUE[25.0], atol=1e-9)
 
 
@@ -155,7 +157,7 @@ def test_gaps_at_other_places_in_every_channel_need_no_robust_fit(monkeypatch):
 def test_a_time_column_in_the_wrong_unit_is_named_with_file_and_cure():
     """Milliseconds called seconds make a record of one sample a second."""
     run = SimpleNamespace(file="r1.csv", id="r1", sample_rate=1.0, length=4000)
-    inspection = object.__new__(run_phasors._Inspection)
-    inspection.run, inspection.settings = run, PhasorSettings()
+    fit = object.__new__(run_phasors._RunFit)
+    fit.run, fit.settings = run, PhasorSettings()
     with pytest.raises(RigDataError, match=r"r1.csv, time: 1 samples per second .* 35 Hz.*ms called s"):
-        inspection._lines((35.0,), 20.0, ())
+        fit._lines((35.0,), 20.0, ())

@@ -17,7 +17,7 @@ from tpjb_ident.phasors.frequency import (
     MAX_RETUNED,
     MAX_SLIP,
     MAX_WINDOW_SLIP,
-    frequency_slip,
+    phase_advance,
     retuned,
     speeds_from_runout,
     tuned,
@@ -53,6 +53,11 @@ def in_channels(z, scale, start, length, speeds):
     """A run of probes and cells along X and Y."""
     none, described = np.zeros(scale.shape), vector_channels(("displacement", "force"))
     return RunPhasors("r", POINT, 0.0, LINES, start, length, described, z, none, scale, none, 30.0, speeds)
+
+
+def frequency_slip(phasors, start, noise):
+    advance = phase_advance(phasors, start, noise)
+    return 0.0 if advance is None else advance.slip
 
 
 def test_a_frequency_error_is_the_advance_of_the_phase():

@@ -21,7 +21,7 @@ from tpjb_ident.bands.disturbing_lines import (
 from tpjb_ident.bands.period import find_period, resampled
 from tpjb_ident.bands.samples import Samples, read_samples
 from tpjb_ident.conditions import Condition, merged
-from tpjb_ident.phasors.compensation import compensated, inspect_readings
+from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
 from tpjb_ident.runs.point_data import mean_temperatures
@@ -99,7 +99,7 @@ def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
     """Read one run and transform it."""
     with run.opened():
-        slower, conditions = inspect_readings(run)
+        slower = filled_channels(run)
         samples = read_samples(run, settings.seconds)
         temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:
@@ -115,12 +115,14 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         cut = resampled(samples, period, settings.band[1])
         length = round(period)
         clean = without_disturbances(cut, lines, length)
-    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower)
-    phasors = replace(phasors, conditions=merged(samples.conditions, conditions, _clock_conditions(clocks)))
+    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower, settings.delays)
+    phasors = replace(
+        phasors, conditions=merged(samples.conditions, slower_condition(slower), _clock_conditions(clocks))
+    )
     command = None if clean.command is None else _bins(clean.command, length, _places(clean.rate, length, settings))
     width = LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD
     return RunSpectra(
-        phasors.advanced(settings.delays),
+        phasors,
         command,
         bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
         lines,

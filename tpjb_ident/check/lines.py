@@ -12,7 +12,6 @@ from rigdata.calibration import Channel
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.run import Run
 from tpjb_ident.phasors.line_fit import LineFitter
-from tpjb_ident.phasors.line_means import channel_phasors
 from tpjb_ident.phasors.run_data import RunPhasors
 
 #: Lines of a band that are looked at, the strongest of as many parts of it.
@@ -52,7 +51,7 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
     for values in (phasors.mean, np.abs(phasors.residual[line]), phasors.scale):
         median = np.ma.median(np.ma.masked_invalid(values), axis=0)
         medians.append(np.append(np.ma.filled(median, np.nan), np.nan)[places])
-    row = np.append(channel_phasors(phasors, line), np.nan)[places]
+    row = np.append(phasors.record[line], np.nan)[places]
     omega = 2 * np.pi * phasors.lines.excitation[line].frequency
     mean, floor, scatter = medians
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])

@@ -28,6 +28,8 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 CONSIDERED = 0.8
 #: Smallest eigenvalue of a point's equations, scaled to a diagonal of ones, that tells its numbers apart.
 _TOLD = 1e-13
+#: Weight that holds a considered number of a point at its mean, over its own.
+_HELD = 1e14
 #: Numbers of a point: real and imaginary parts of h_xx, h_xy, h_yx, h_yy.
 NUMBERS = 8
 
@@ -74,12 +76,13 @@ class Sums:
             np.zeros(parameters),
         )
 
-    def add(self, point: IntArray, r: FloatArray, J_h: FloatArray, J_t: FloatArray) -> None:
-        """Add weighted rows of blocks: `point` (n,), `r` (n, k), `J_h` (n, k, numbers), `J_t` (n, k, q)."""
-        transposed = J_h.transpose(0, 2, 1)
-        np.add.at(self.A, point, transposed @ J_h)
+    def add(self, point: IntArray, weight: FloatArray, r: FloatArray, J: FloatArray, J_t: FloatArray) -> None:
+        """Add rows of blocks: `point`, root of the `weight` (n,), `r` (n, k), `J` (n, k, numbers), `J_t` (n, k, q)."""
+        r, J, J_t = r * weight[:, None], J * weight[:, None, None], J_t * weight[:, None, None]
+        transposed = J.transpose(0, 2, 1)
+        np.add.at(self.A, point, transposed @ J)
         np.add.at(self.E, point, transposed @ J_t)
-        np.add.at(self.g_h, point, np.einsum("nka,nk->na", J_h, r))
+        np.add.at(self.g_h, point, np.einsum("nka,nk->na", J, r))
         flat = J_t.reshape(J_t.shape[0] * J_t.shape[1], J_t.shape[2])
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
@@ -165,26 +168,24 @@ def step(sums: Sums, shared: Prior, own: Prior) -> Step:
     inverse = np.asarray(np.linalg.inv(S), dtype=float)
     estimated = shared.estimated(np.diag(inverse))
     told = own.estimated(_variances(A_inverse, K, inverse)[:, k:])
-    # what is considered takes no part: its place holds a one, what it would move is kept apart
-    part = np.concatenate([np.ones((len(A), k), dtype=bool), told], axis=1)
-    moves = A[:, :, k:] * part[:, :, None] * ~told[:, None, :]
-    moves_shared = (sums.E[:, k:] * ~told[:, :, None]).transpose(0, 2, 1)
-    distance = np.where(told, 0.0, own.distance)
-    g = part * (g - np.einsum("pal,pl->pa", moves, distance))
-    g_t = sums.g_t + shared.precision * shared.distance - np.einsum("pql,pl->q", moves_shared, distance)
-    A = A * part[:, :, None] * part[:, None, :] + ~part[:, :, None] * np.eye(A.shape[1])
-    A_inverse, K, S = _eliminated(A, sums.E * part[:, :, None], G)
+    # what is considered is held at its mean; what it would move is kept apart
+    moves, moves_shared = A[:, :, k:] * ~told[:, None, :], (sums.E[:, k:] * ~told[:, :, None]).transpose(0, 2, 1)
+    held = _HELD * A[:, last, last] * ~told
+    A[:, last, last] += held
+    g[:, k:] += held * own.distance
+    A_inverse, K, S = _eliminated(A, sums.E, G)
     S_inverse = np.zeros_like(S)
     chosen = np.ix_(estimated, estimated)
     S_inverse[chosen] = np.linalg.inv(S[chosen])
-    remaining = g_t + np.einsum("pak,pa->k", K, g) - S[:, ~estimated] @ shared.distance[~estimated]
+    g_t = sums.g_t + shared.precision * shared.distance + np.einsum("pak,pa->k", K, g)
+    remaining = g_t - S[:, ~estimated] @ shared.distance[~estimated]
     theta = S_inverse @ (estimated * remaining) + np.where(estimated, 0.0, shared.distance)
     x = np.einsum("pab,pb->pa", A_inverse, g) + K @ theta
     posterior = np.sqrt(np.maximum(_variances(A_inverse, K, S_inverse)[:, k:], 0.0))
     root = np.sqrt(own.precision)
     pushes = -(moves_shared + K.transpose(0, 2, 1) @ moves)
     points = Own(
-        np.where(told, x[:, k:], own.distance),
+        x[:, k:],
         np.where(told, posterior, 1 / root),
         told,
         _by_prior(told, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),

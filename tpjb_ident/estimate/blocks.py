@@ -14,6 +14,7 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
+from rigdata.vector import plane_vector
 from tpjb_ident.conditions import Condition
 
 #: Quantities of the equation, in the order of its rows.
@@ -144,16 +145,8 @@ def stacked(
 def vector(rig: Rig, blocks: Blocks, quantity: str) -> ComplexArray:
     """X and Y of a quantity by least squares over its sensors, (n, 2); NaN without two directions."""
     rows = rig.of(quantity)
-    if len(rows) < 2:
-        return np.full((len(blocks), 2), np.nan + 0j)
-    along = blocks.along[:, rows] * blocks.present[:, rows, None]
-    gram = np.einsum("nja,njb->nab", along, along)
-    determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] ** 2
-    plane = determinant > 1e-6
-    moment = np.einsum("nja,nj->na", along, blocks.z[:, rows])
-    result = np.full((len(blocks), 2), np.nan + 0j)
-    result[plane] = np.linalg.solve(gram[plane], moment[plane][:, :, None])[:, :, 0]
-    return result
+    readings = np.where(blocks.present[:, rows], blocks.z[:, rows], np.nan)
+    return plane_vector(blocks.along[:, rows], readings)
 
 
 def film_force(rig: Rig, blocks: Blocks) -> ComplexArray:

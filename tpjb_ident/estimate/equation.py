@@ -49,6 +49,10 @@ class State:
         change = blocks.miss.real[:, None, None] * self.slope[blocks.point]
         return self.h[blocks.point] + np.where(known, change, 0.0) + self.bare
 
+    def cell_force(self, rig: Rig, blocks: Blocks) -> ComplexArray:
+        """Force of the cells along X and Y, the film's without the housing's inertia, (n, 2) [N]."""
+        return np.einsum("nij,nj->ni", self.at_run(blocks), self.u[:, :2]) - rig.mass * self.u[:, 2:]
+
     def factor_rows(self, rows: ComplexArray) -> ComplexArray:
         """T times rows (n, m + 2, ..)."""
         return with_factor(self.factor, rows)

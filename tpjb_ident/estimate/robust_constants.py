@@ -10,7 +10,7 @@ import functools
 from math import comb
 
 import numpy as np
-from scipy.special import chdtr, gammaincinv, gammaln, xlogy
+from scipy.special import chdtr, gammaincinv
 
 from rigdata.arrays import FloatArray
 
@@ -32,17 +32,15 @@ def half_shrinkage(dimension: int, share: float) -> float:
 def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
     """Constant c at which the bisquare location/regression estimate has this Gaussian efficiency."""
 
-    def moment(k: int, c: float) -> float:
-        """E[u^2k; u < c]: the chi-square's recursion x^k p_d(x) ~ p_(d + 2 k)(x)."""
-        rising = float(np.prod(dimension + 2.0 * np.arange(k)))
-        return rising * float(chdtr(dimension + 2 * k, c**2))
-
     def shortfall(c: float) -> float:
         # psi^2 = u^2 (1 - v)^4 and the mean slope (1 - v)^2 - 4 v (1 - v) / d, with v = (u / c)^2
-        a = sum(comb(4, j) * (-1) ** j * moment(j + 1, c) / c ** (2 * j) for j in range(5)) / dimension
-        more = 4 / dimension
-        b = moment(0, c) - (2 + more) * moment(1, c) / c**2 + (1 + more) * moment(2, c) / c**4
-        return float(b**2 / a - efficiency)
+        slopes = (1.0, -2.0 - 4 / dimension, 1.0 + 4 / dimension)
+        a = b = 0.0
+        for k in range(5):
+            a += comb(4, k) * (-1) ** k * _moment(dimension, k + 1, c**2) / c ** (2 * k) / dimension
+        for k, slope in enumerate(slopes):
+            b += slope * _moment(dimension, k, c**2) / c ** (2 * k)
+        return b**2 / a - efficiency
 
     lower, upper = 2.0, 30.0
     while upper - lower > 1e-12:  # halved: scipy's root finders take longer to import than `identify` to solve
@@ -53,26 +51,27 @@ def efficiency_constant(dimension: int, efficiency: float = 0.95) -> float:
 
 @functools.cache
 def trimming_limits(dimension: int) -> tuple[float, float, float]:
-    """Squared distances where a window starts to lose weight and where it has none."""
+    """Squared distances where a window starts to lose weight and where it has none; the variance that weights leave."""
     lower, upper = _quantile(_BEGIN, dimension), _quantile(_END, dimension)
+    # the weight as a polynomial of the squared distance: 1 - 3 v^2 + 2 v^3 with v from 0 to 1 between the limits
+    v = np.polynomial.Polynomial([-lower, 1.0]) / (upper - lower)
+    moments = [_moment(dimension, k, lower) for k in range(2)]
+    weight: list[float] = (1 - 3 * v**2 + 2 * v**3).coef.tolist()
+    for k, coefficient in enumerate(weight):
+        for n in range(2):
+            moments[n] += coefficient * (_moment(dimension, k + n, upper) - _moment(dimension, k + n, lower))
+    return lower, upper, moments[1] / (dimension * moments[0])
 
-    nodes, width = np.polynomial.legendre.leggauss(40)
-    x = lower + 0.5 * (upper - lower) * (nodes + 1)
-    part = 0.5 * (upper - lower) * width * trimming_weight(x, lower, upper) * _density(x, dimension)
-    mass = float(chdtr(dimension, lower) + part.sum())
-    moment = float(dimension * chdtr(dimension + 2, lower) + (part * x).sum())
-    return lower, upper, moment / (dimension * mass)
+
+def _moment(dimension: int, k: int, limit: float) -> float:
+    """E[x^k; x < limit] of the chi-square distribution, by its recursion x^k p_d(x) ~ p_(d + 2 k)(x)."""
+    rising = float(np.prod(dimension + 2.0 * np.arange(k)))
+    return rising * float(chdtr(dimension + 2 * k, limit))
 
 
 def _quantile(share: float, dimension: int) -> float:
     """Of the chi-square distribution."""
     return float(2.0 * gammaincinv(dimension / 2, share))
-
-
-def _density(x: FloatArray, dimension: int) -> FloatArray:
-    """Of the chi-square distribution."""
-    half = dimension / 2.0
-    return np.asarray(np.exp(xlogy(half - 1.0, x) - x / 2.0 - gammaln(half) - np.log(2) * dimension / 2.0))
 
 
 def trimming_weight(u2: FloatArray, lower: float, upper: float) -> FloatArray:

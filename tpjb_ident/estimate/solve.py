@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.arrowhead import NUMBERS, Step, Sums, are_told, step
-from tpjb_ident.estimate.blocks import Blocks, Rig, totals
+from tpjb_ident.estimate.blocks import Blocks, Rig, totals, vector
 from tpjb_ident.estimate.equation import (
     HOUSING_ROWS,
     UNKNOWNS,
@@ -182,19 +182,15 @@ class Solver:
             rows = self._rows(blocks, state, self.scatter.variance[group])
             self.u[places] = state.u
             weight = np.sqrt(self.scatter.weights[places] * self.solvable[blocks.point])
-            sums.add(
-                group,
-                rows.r * weight[:, None],
-                np.concatenate([rows.J_h, rows.J_own], axis=2) * weight[:, None, None],
-                rows.J_t * weight[:, None, None],
-            )
+            sums.add(group, weight, rows.r, rows.J, rows.J_t)
+            self._add_slopes(sums, group, weight, blocks, state)
             fits.append((group, rows, weight**2))
         if first:  # a point whose readings leave a number untold has no answer
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
         given = sums.given(self.shape.numbers)
-        parts = [_fit(rows, weight, given[group]) for group, rows, weight in fits]
+        parts = [rows.residuals(weight, given[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 
@@ -214,7 +210,8 @@ class Solver:
         )
         self._apply(blocks, state, additive=False)
         if not self.moved:
-            state.u = _first_motion(self.rig, blocks, state)
+            d, a = (vector(self.rig, blocks, quantity) for quantity in ("displacement", "acceleration"))
+            state.u = np.nan_to_num(np.concatenate([d, a], axis=1))
         self._apply(blocks, state, additive=True)
         return state
 
@@ -250,33 +247,25 @@ class Solver:
         components = ForceScatter.of(patterns, motion, state.at_run(blocks), scatter)
         projected = components.white(_real(Q2 @ np.linalg.solve(L, columns)))
         r = components.white(_real(Q2 @ white))[:, :, 0]
-        J_h, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
-        J_h = self.shape.mapped(J_h, blocks.point)
-        along = components.along(r, J_h)
-        slopes = self._slope_rows(blocks, state)
-        if slopes is not None:
-            r = np.concatenate([r, slopes[0]], axis=1)
-            J_t = np.concatenate([J_t, slopes[1]], axis=1)
-            more = slopes[0].shape[1]
-            J_h, J_own = (np.pad(J, ((0, 0), (0, more), (0, 0))) for J in (J_h, J_own))
+        J_film, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
+        J_h = self.shape.mapped(J_film, blocks.point)
         counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
-        return _Rows(r, J_h, J_own, J_t, along, counted, 2 * Q2.shape[1])
+        return _Rows(r, np.concatenate([J_h, J_own], axis=2), J_t, components.along(r, J_h), counted)
 
-    def _slope_rows(self, blocks: Blocks, state: State) -> tuple[FloatArray, FloatArray] | None:
+    def _add_slopes(self, sums: Sums, group: IntArray, weight: FloatArray, blocks: Blocks, state: State) -> None:
         """How readings turn within a record: c z_j - i omega rate z_j, the drive's own change c eliminated."""
         if all(type(term).slope_columns is Term.slope_columns for term in self.shared.terms):
-            return None
+            return
         m = blocks.z.shape[1]
         told = (blocks.windows > 3) & blocks.present.all(axis=1)
         reading = state.reading(self.rig, blocks)[:, :m]
         columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.shared.terms], axis=2)
-        safe = np.where(told[:, None, None], blocks.slope_noise, np.eye(m))
-        L = np.linalg.cholesky(safe)
+        L = np.linalg.cholesky(np.where(told[:, None, None], blocks.slope_noise, np.eye(m)))
         Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
         Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
-        J = _real(Q2 @ np.linalg.solve(L, columns)) * told[:, None, None]
-        r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] * told[:, None]
-        return r - J @ self.shared.value[0], J
+        J = _real(Q2 @ np.linalg.solve(L, columns))
+        r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] - J @ self.shared.value[0]
+        sums.add(group, weight * told, r, np.zeros((*r.shape, sums.A.shape[1])), J)
 
     def _move(self, taken: Step) -> float:
         x = taken.h * self.unit
@@ -351,22 +340,19 @@ class Solver:
 @dataclass(frozen=True)
 class _Rows:
     r: FloatArray  #: (n, k)
-    J_h: FloatArray  #: (n, k, 8)
-    J_own: FloatArray  #: (n, k, L): of the points' own parameters
+    J: FloatArray  #: (n, k, numbers): of the points' numbers of H and of their own parameters
     J_t: FloatArray  #: (n, k, q)
     along: AlongForce
     counted: FloatArray  #: (n,): equations that say something
-    block_rows: int  #: of r: the others are those of the clocks
 
-
-def _fit(rows: _Rows, weight: FloatArray, given: FloatArray) -> Residuals:
-    """What is left of blocks of a weight (n,), and what the numbers of their points take; `given` (n, k, k)."""
-    r, J_h = rows.r[:, : rows.block_rows], rows.J_h[:, : rows.block_rows]
-    given = weight[:, None, None] * given
-    leverage = np.einsum("nka,nab,nkb->n", J_h, given, J_h, optimize=True) / np.maximum(rows.counted, 1.0)
-    taken = np.einsum("nca,nab,ncb->nc", rows.along.J_h, given, rows.along.J_h, optimize=True)
-    chi_square = np.einsum("nk,nk->n", r, r)
-    return Residuals(chi_square, rows.counted, leverage, rows.along.chi_square, rows.along.information, taken)
+    def residuals(self, weight: FloatArray, given: FloatArray) -> Residuals:
+        """What is left of blocks of a weight (n,), and what the numbers of their points take; `given` (n, a, a)."""
+        J_h, given = self.J[:, :, : given.shape[1]], weight[:, None, None] * given
+        leverage = np.einsum("nka,nab,nkb->n", J_h, given, J_h, optimize=True) / np.maximum(self.counted, 1.0)
+        along = self.along
+        taken = np.einsum("nca,nab,ncb->nc", along.J_h, given, along.J_h, optimize=True)
+        chi_square = np.einsum("nk,nk->n", self.r, self.r)
+        return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, taken)
 
 
 def _regular(R: ComplexArray) -> ComplexArray:
@@ -379,19 +365,3 @@ def _regular(R: ComplexArray) -> ComplexArray:
 def _real(rows: ComplexArray) -> FloatArray:
     """Complex rows (n, k, ..) of unit variance as real ones, (n, 2 k, ..)."""
     return np.sqrt(2.0) * np.concatenate([rows.real, rows.imag], axis=1)
-
-
-def _first_motion(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
-    """Motion (n, 4) by least squares over the sensors and the housing, each weighed by its own noise."""
-    n = len(blocks)
-    B = with_factor(state.factor, motion_matrix(rig, blocks, state))
-    size = np.sqrt(np.einsum("njj->nj", blocks.noise).real)
-    usual = np.abs(blocks.z) * 1e-3
-    deviation = np.where(blocks.present, np.maximum(size, usual) + 1e-300, 1.0)
-    housing = np.full((n, HOUSING_ROWS), 1.0) * np.maximum(
-        0.05 * (blocks.omega**2 * np.abs(blocks.z[:, rig.of("displacement")]).max(axis=1))[:, None], 1e-300
-    )
-    weight = 1 / np.concatenate([deviation, housing], axis=1)
-    z = np.concatenate([blocks.z * blocks.present, np.zeros((n, HOUSING_ROWS))], axis=1) * weight
-    solution = np.linalg.pinv(B * weight[:, :, None]) @ z[:, :, None]
-    return np.asarray(solution[:, :, 0])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State
@@ -187,3 +187,12 @@ def beyond(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0
         if fitted.estimated[k] and distance > limit * scatter:
             places.append(k)
     return places
+
+
+def of_groups(rows: ComplexArray, group: IntArray, number: int) -> ComplexArray:
+    """Columns (n, m, number k) of which a block has those of its group alone, `rows` (n, m, k); -1 is no group."""
+    n, m, k = rows.shape
+    columns = np.zeros((n, m, number, k), complex)
+    mine = np.flatnonzero(group >= 0)
+    columns[mine, :, group[mine]] = rows[mine]
+    return columns.reshape(n, m, number * k)

@@ -55,6 +55,16 @@ def white_noise(values: FloatArray) -> float:
     return robust_deviation(np.diff(values, 2)) / float(np.sqrt(6.0))
 
 
+def usual_scale(scale: FloatArray) -> FloatArray:
+    """Median over the windows with a scale (n_windows, q); infinite where none has."""
+    usual = np.full(scale.shape[1], np.inf)
+    for k, column in enumerate(scale.T):
+        finite_values = column[np.isfinite(column)]
+        if len(finite_values):
+            usual[k] = np.median(finite_values)
+    return usual
+
+
 def is_present(values: FloatArray) -> BoolArray:
     """Whether a reading is a value: finite, and no overflow mark; (n,)."""
     with np.errstate(invalid="ignore"):  # a NaN compared is what "no value" looks like

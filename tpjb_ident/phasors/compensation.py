@@ -1,57 +1,45 @@
 """What the channels' electronics did to the phasors, taken out: filters, delays, slower sampling.
 
-A channel sampled at f_s and written at a higher rate (filled up by a logger program) holds an image of every line f at
-f_s - f and f_s + f, of size (f / (f_s -+ f))^n: n = 1 where values are held, 2 along straight lines, 4 along cubic
-splines. The line itself comes out smaller (and late, where values are held) by a factor that the rates alone determine.
+A channel sampled at f_s and written at a higher rate (filled up by a logger program) holds an image of all that it
+shows at f, noise too, at f_s - f and f_s + f, of size (f / (f_s -+ f))^n: n = 1 where values are held, 2 along straight
+lines, 4 along cubic splines. A line itself comes out smaller (and late, where values are held) by a factor that the
+rates alone determine. Images give the rate away: the phases of the spectrum at f and f_s - f add up to the same angle
+at all f, which those of a record at its own rate do at no sum of two frequencies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import find_peaks
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rigdata.calibration import Channel
-from rigdata.channel_statistics import ChannelStatistics
-from rigdata.problem import Problem, RigDataError, refuse
+from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import device_readers
-from tpjb_ident.phasors.lines import LineSet
+from tpjb_ident.phasors.found_lines import vertex
 from tpjb_ident.phasors.run_data import RunPhasors
-from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude, noise_floor
 
-#: Samples that are looked at.
-_RHYTHM_LOOK = 2**13
-#: Share of the samples that must be straight (or flat), at least.
-_STRAIGHT = 0.15
-#: A bend is none below this share of the usual one.
-_NO_BEND = 0.01
-#: How much of the bends must come in one rhythm, of what a strict one has,
-_RHYTHM = 0.8
-#: and how far their number may be off.
-_COUNT_OFF = 0.25
-#: Samples from the start that are looked at.
-_LOOK = 2**14
-#: A channel with more of its samples at a limit than this is of no use.
-_CLIPPED = 0.05
-#: An image stands this many times above the noise of its channel,
-_CLEAR = 8.0
-#: and has at least this share of its line.
-_SHARE = 1e-4
-#: Both images tell one order of filling, to this,
-_AGREE = 0.15
-#: which is one of these: held, straight lines, cubic splines.
+#: Seconds from the start that are looked at, and powers of two of samples, at least and at most.
+_LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
+#: A reading so many times farther from its neighbours' mean than all but a hundredth is a glitch.
+_GLITCH = 4.0
+#: Pairs of bins that tell whether their phases agree, at least; bins that a slow movement may fill.
+_LEAST_PAIRS, _SLOW = 30, 3
+#: Exponent of chance below which phases agree: those of 80 plain records came to 18, of filled ones to 40 and more.
+_CLEAR = 25.0
+#: Sums of frequencies to either side [bins], above whose usual agreement a rate stands so many times (the phases of a
+#: single blow agree at all of them), and the least agreement of a rate: what is folded back has less.
+_BESIDE, _ABOVE, _AGREEMENT = 40, 3.0, 0.35
+#: Multiples of a rate that tell it more sharply.
+_MULTIPLES = 4
+#: Part of f_s in which images tell the order of filling, and how far from it they may be, relative.
+_TOLD_BY, _AGREE = (0.2, 0.45), 0.35
+#: Orders of filling.
 _ORDERS = {1: "held", 2: "interpolated", 4: "interpolated (splines)"}
-#: An image so near to a line of the record [1 / record length] may be what a drift leaves of that.
-_NEAR = 8.0
-#: An image of less than this share of what it would be is none.
-_MISSING = 0.3
-#: The largest peaks are tried as images, so many.
-_TRIED = 24
 #: Rates that divide the export's rate to this share do so exactly.
 _EVEN = 3e-4
 #: Images to either side of a line that a spline's own factor is summed over.
@@ -91,93 +79,83 @@ class SlowerChannel:
         return np.abs((places + 0.5 * self.export_rate) % self.export_rate - 0.5 * self.export_rate)
 
 
-def filled_channels(records: tuple[WholeRecord, ...], result: RunPhasors) -> dict[str, SlowerChannel]:
+def filled_channels(run: Run) -> dict[str, SlowerChannel]:
     """Channels that were sampled slower than they were written, by name."""
     slower: dict[str, SlowerChannel] = {}
-    for record in records:
-        amplitude = hann_amplitude(record.spectrum)
-        for column, place in enumerate(record.places):
-            sizes = np.abs(np.nan_to_num(record.z[:, column]))
-            floor = noise_floor(amplitude[:, column])
-            for strong in np.argsort(-sizes)[:2]:
-                found = _images_of(int(strong), sizes, amplitude[:, column], floor, record)
-                if found is not None:
-                    slower.setdefault(result.channels[place].name, found)
+    for reader in device_readers(run):
+        power = np.clip(np.log2(_LOOK * reader.rate) + 1, _LEAST_POWER, _MOST_POWER)
+        rows = reader.read(0, min(reader.length, 2 ** int(power) - 2)).rows
+        for channel, values in zip(reader.channels, rows):
+            filling = slower_channel(values, reader.rate)
+            if filling is not None:
+                slower[channel.name] = filling
     return slower
 
 
-def _images_of(
-    strong: int, sizes: FloatArray, amplitude: FloatArray, floor: FloatArray, record: WholeRecord
-) -> SlowerChannel | None:
-    """Rate and order of filling by a pair of images of one line of the record; `sizes` (n_whole_lines,)."""
-    line, size = record.lines.whole[strong], float(sizes[strong])
-    frequency, first, driven = line.frequency, line.frequency / (line.order or 1), line.name == "excitation"
-    least = np.maximum(_CLEAR * floor, _SHARE * size)
-    if not np.isfinite(least).all() or size <= 0:
+def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | None:
+    """How a channel was filled up, told from the beginning of its readings (n,); None where it was not."""
+    clean = _clean_stretch(values)
+    n = len(clean)
+    if n < 8 * _LEAST_PAIRS:
         return None
-    peaks = find_peaks(amplitude)[0]
-    peaks = peaks[(amplitude > least)[peaks] & (peaks > 1.2 * frequency * record.duration)]
-    peaks = peaks[_is_free(peaks, record)]
-    for low in peaks[np.argsort(-amplitude[peaks])][:_TRIED]:
-        rate = low / record.duration + frequency
-        mirror = record.rate - (rate + frequency) if rate + frequency > record.rate / 2 else rate + frequency
-        around = np.round(mirror * record.duration).astype(int) + np.arange(-1, 2)
-        if around.min() < 1 or around.max() >= len(amplitude) - 1 or not _is_free(around, record).all():
-            continue
-        # shaft and mains have orders of their own, beside one another
-        if not driven and abs((rate + 0.5 * first) % first - 0.5 * first) * record.duration < _NEAR:
-            continue
-        high = int(around[np.argmax(amplitude[around])])
-        orders = [
-            np.log(_peak_size(amplitude, int(k)) / size) / np.log(frequency / abs(rate + sign * frequency))
-            for k, sign in ((low, -1), (high, 1))
-        ]
-        order = min(_ORDERS, key=lambda n: abs(n - orders[0]))
-        if amplitude[high] <= least[high] or max(abs(n - order) for n in orders) >= _AGREE:
-            continue
-        exact = (low + _peak_offset(amplitude, int(low))) / record.duration + frequency
-        ratio = record.rate / exact
-        exact = record.rate / round(ratio) if abs(ratio - round(ratio)) < _EVEN * ratio else exact
-        slower = SlowerChannel(exact, record.rate, order)
-        if not _is_missing(slower, sizes, amplitude, least, record):
-            return slower
+    spectrum = np.fft.rfft((clean - clean.mean()) * np.hanning(n))
+    size, agreement, chance = np.abs(spectrum), *_pair_agreement(spectrum)
+    peaks = find_peaks(agreement)[0]
+    for k in peaks[chance[peaks] > _CLEAR].tolist():
+        order = _filling_order(size, k)
+        beside = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
+        if agreement[k] > max(_ABOVE * beside, _AGREEMENT) and order is not None:
+            rate = _sharpened(agreement, chance, k) * export_rate / n
+            ratio = export_rate / rate
+            even = abs(ratio - round(ratio)) < _EVEN * ratio
+            return SlowerChannel(export_rate / round(ratio) if even else rate, export_rate, order)
     return None
 
 
-def _is_missing(
-    slower: SlowerChannel, sizes: FloatArray, amplitude: FloatArray, least: FloatArray, record: WholeRecord
-) -> bool:
-    """Whether some line has no image where this filling would have left a clear one."""
-    frequencies = record.lines.whole_frequencies
-    for image in (slower.rate - frequencies, slower.rate + frequencies):
-        expected = _MISSING * sizes * np.abs(frequencies / image) ** slower.order
-        folded = np.abs((image + 0.5 * record.rate) % record.rate - 0.5 * record.rate)
-        at = np.round(folded * record.duration).astype(int)
-        seen = (at > _NEAR) & (at < len(amplitude) - 1) & _is_free(at, record)
-        place = at[seen]
-        found = np.maximum(amplitude[place], np.maximum(amplitude[place - 1], amplitude[place + 1]))
-        if (expected[seen] > np.maximum(least[place], found)).any():
-            return True
-    return False
+def _clean_stretch(values: FloatArray) -> FloatArray:
+    """Longest stretch of readings (n,) without missing ones and glitches, whose phases agree everywhere."""
+    bad = ~np.isfinite(values)
+    bend = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
+    usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
+    bad[1:-1] |= bend > _GLITCH * usual
+    edges = np.concatenate([[-1], np.flatnonzero(bad), [len(values)]])
+    longest = int(np.argmax(np.diff(edges)))
+    return values[edges[longest] + 1 : edges[longest + 1]]
 
 
-def _is_free(bins: IntArray, record: WholeRecord) -> BoolArray:
-    """Whether bins (n,) are away from all lines of the record, (n,)."""
-    lines = record.lines.whole_frequencies * record.duration
-    return np.asarray(np.abs(bins[:, None] - lines).min(axis=1) > _NEAR)
+def _pair_agreement(spectrum: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """How well phases at f and k - f agree over all f, from 0 to 1 for every k in bins, and minus its log chance."""
+    m = len(spectrum)
+    phases = spectrum / np.maximum(np.abs(spectrum), np.finfo(float).tiny)
+    phases[:_SLOW] = 0.0
+    wave = np.fft.ifft(phases, 1 << (2 * m - 1).bit_length())
+    sums = np.abs(np.fft.fft(wave**2))[: 2 * m - 1] * len(wave)
+    pairs = np.minimum(np.arange(2 * m - 1), np.arange(2 * m - 2, -1, -1))
+    agreement = sums / np.maximum(pairs, 1)
+    # every pair is there twice, and the window makes neighbours alike
+    return agreement, np.where(pairs > _LEAST_PAIRS, agreement**2 * pairs / 3, 0.0)
 
 
-def _peak_offset(amplitude: FloatArray, k: int) -> float:
-    """Distance of a line from the bin with its largest amplitude, by Hann's window [bins]."""
-    side = 1 if amplitude[k + 1] > amplitude[k - 1] else -1
-    ratio = amplitude[k + side] / amplitude[k]
-    return float(side * (2 * ratio - 1) / (1 + ratio))
+def _sharpened(agreement: FloatArray, chance: FloatArray, k: int) -> float:
+    """Rate near `k` [bins] by the highest of its multiples that stands out."""
+    rate = k + vertex(agreement[k - 1 : k + 2])
+    for multiple in range(2, _MULTIPLES + 1):
+        near = min(round(multiple * rate) - 2, len(agreement) - 5)
+        near += int(np.argmax(agreement[near : near + 5]))
+        if near + 1 < len(agreement) and chance[near] > _CLEAR:
+            rate = (near + vertex(agreement[near - 1 : near + 2])) / multiple
+    return rate
 
 
-def _peak_size(amplitude: FloatArray, k: int) -> float:
-    """Amplitude of the line at a peak of a spectrum with Hann's window."""
-    offset = _peak_offset(amplitude, k)
-    return float(amplitude[k] / (np.sinc(offset) / (1 - offset**2)) if abs(offset) < 0.99 else amplitude[k])
+def _filling_order(size: FloatArray, k: int) -> int | None:
+    """Order of filling by the images about f_s, bin `k`, of a spectrum (n_bins,); None where they tell none."""
+    f = np.arange(int(_TOLD_BY[0] * k), int(_TOLD_BY[1] * k))
+    f = f[k - f < len(size) - 1]
+    if not len(f):
+        return None
+    shown = float(np.median(np.log(size[k - f] / size[f]) / np.log(f / (k - f))))
+    order = min(_ORDERS, key=lambda n: abs(n - shown))
+    return order if abs(shown - order) < _AGREE * order else None
 
 
 def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ...]:
@@ -188,27 +166,23 @@ def slower_condition(slower: Mapping[str, SlowerChannel]) -> tuple[Condition, ..
     return (Condition("slower-channels", f"{rates}; what that does to a sine was taken out"),)
 
 
-def compensated(result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel]) -> RunPhasors:
-    """The run's phasors as channels without filters and delays would have given them."""
-    gains = channel_gains(run, result.channels, slower, result.lines)
-    return result if gains is None else result.divided(gains)
+def compensated(
+    result: RunPhasors, run: Run, slower: Mapping[str, SlowerChannel], delays: Mapping[str, float]
+) -> RunPhasors:
+    """The run's phasors as channels without filters, filling and delays would have given them.
 
-
-def channel_gains(
-    run: Run, channels: Sequence[Channel], slower: Mapping[str, SlowerChannel], lines: LineSet
-) -> ComplexArray | None:
-    """What channels made of a sine of size one at every line, (n_whole_lines, n_channels); None where nothing."""
-    if not any(c.response or c.name in slower for c in channels):
-        return None
-    frequencies = lines.whole_frequencies
-    gains = np.ones((len(frequencies), len(channels)), dtype=complex)
-    for k, channel in enumerate(channels):
+    `delays` [s]: of whole quantities.
+    """
+    frequencies = result.lines.whole_frequencies
+    gains = np.ones((len(frequencies), len(result.channels)), dtype=complex)
+    for k, channel in enumerate(result.channels):
+        gains[:, k] = np.exp(-2j * np.pi * frequencies * delays.get(channel.quantity, 0.0))
         if channel.response:
             gain = channel.response.at(frequencies)
-            gains[:, k] *= _reached(gain, frequencies, len(lines.excitation), run, channel.name)
+            gains[:, k] *= _reached(gain, frequencies, len(result.lines.excitation), run, channel.name)
         if channel.name in slower:
             gains[:, k] *= slower[channel.name].at(frequencies)
-    return gains
+    return result if np.all(gains == 1.0) else result.divided(gains)
 
 
 def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run, name: str) -> ComplexArray:
@@ -219,96 +193,3 @@ def _reached(gain: ComplexArray, frequencies: FloatArray, driven: int, run: Run,
         cure = "Extend filter_table, or check filter"
         raise refuse(run.file, f"channel {name}", text, cure, run.id)
     return np.where(valid, gain, 1.0)
-
-
-def slower_channel(readings: FloatArray, export_rate: float) -> SlowerChannel | None:
-    """Tell whether a channel was filled up, from the beginning of its readings; `readings` (n,).
-
-    Logger programs write groups of different rates into one table by interpolation. A sine comes out of that smaller
-    (and late, where values are held), by a factor that the two rates alone determine: it is taken out of the phasors as
-    a filter is. What gives such a channel away is that its bends (or steps) come in a strict rhythm.
-    """
-    values = readings[:_RHYTHM_LOOK]
-    if len(values) < 200 or not np.isfinite(values).all():
-        return None
-    for held, changes in ((True, np.abs(np.diff(values))), (False, np.abs(np.diff(values, 2)))):
-        usual = 2 * float(changes.mean())
-        bent = changes > _NO_BEND * usual
-        if not usual > 0 or bent.mean() > 1 - _STRAIGHT:
-            continue
-        rate = _rhythm(bent.astype(float), export_rate, held)
-        if rate is not None:
-            return SlowerChannel(rate, export_rate, 1 if held else 2)
-    return None
-
-
-def _rhythm(bent: FloatArray, export_rate: float, held: bool) -> float | None:
-    """Rate at which the bends come [Hz]; None where they do not come in a rhythm."""
-    n = len(bent)
-    padded = 8 * n
-    spectrum = np.abs(np.fft.rfft(bent - bent.mean(), padded))
-    step = export_rate / padded
-    low, top = int(8 * padded / n), int(0.505 * export_rate / step)
-    peaks = spectrum[low : top + 1]
-    if not len(peaks) or not peaks.max() > 0:
-        return None
-    # the first line of a rhythm is the rate, the others are its multiples
-    peak = low + int(np.flatnonzero(peaks > 0.7 * peaks.max())[0])
-    while peak + 1 < len(spectrum) and spectrum[peak + 1] > spectrum[peak]:
-        peak += 1
-    ratio = 1 / (peak * step / export_rate)
-    # a corner between two samples of the export bends the line at both
-    each = 1 if held or bent.mean() < 1.5 / ratio else 2
-    expected = each / ratio
-    strict = abs(bent.mean() / expected - 1) < _COUNT_OFF and spectrum[peak] > _RHYTHM * np.sinc(expected) * bent.sum()
-    return _sharpened(bent, peak * step, export_rate) if strict and expected < 1 - _STRAIGHT else None
-
-
-def _sharpened(bent: FloatArray, rate: float, export_rate: float) -> float:
-    """The rate to a part in a million: the even ratio next to it, or the phase advance between the halves."""
-    ratio = export_rate / rate
-    n = len(bent)
-    if abs(ratio - round(ratio)) * n / ratio**2 < 0.5:
-        return export_rate / round(ratio)
-    place = np.arange(n) * rate / export_rate
-    wave = bent * np.exp(-2j * np.pi * place)
-    turn = np.angle(wave[n // 2 :].sum() * wave[: n // 2].sum().conj()) / (2 * np.pi)
-    return rate + turn * export_rate / (n / 2)
-
-
-def inspect_readings(run: Run) -> tuple[dict[str, SlowerChannel], tuple[Condition, ...]]:
-    """Channels that were sampled slower than the export, by name, and what to say of them.
-
-    What a single channel's device did is lost once two channels are turned into a vector: that it was driven into its
-    limits, or sampled slower than the others.
-    """
-    slower = {name: slower_channel(values, run.sample_rate) for name, values in unclipped_readings(run).items()}
-    named = {name: channel for name, channel in slower.items() if channel is not None}
-    return named, slower_condition(named)
-
-
-def unclipped_readings(run: Run) -> dict[str, FloatArray]:
-    """Readings of a run's beginning by channel; refused is one driven into its limits: what was cut off is lost."""
-    readings: dict[str, FloatArray] = {}
-    clipped: list[Problem] = []
-    for reader in device_readers(run):
-        rows = reader.read(0, min(reader.length, _LOOK)).rows
-        for channel, values in zip(reader.channels, rows):
-            readings[channel.name] = values
-            if channel.quantity != "acceleration":
-                clipped += _clipped(run, channel.name, (values - channel.zero) / channel.slope)
-    if clipped:
-        raise RigDataError(clipped)
-    return readings
-
-
-def _clipped(run: Run, name: str, values: np.ndarray) -> list[Problem]:
-    statistics = ChannelStatistics()
-    statistics.add(values)
-    share = 0.0 if statistics.constant else statistics.clipped_share()
-    if share <= _CLIPPED:
-        return []
-    unit = run.channels[name].unit
-    text = f"{share:.1%} of the samples sit at a limit (from {statistics.low:g} to {statistics.high:g} {unit}): clipped"
-    cure = "Widen the channel's range and repeat the run; what was cut off cannot be had back"
-    return [Problem("error", run.file, f"channel {name}", text, cure, run.id)]

@@ -14,7 +14,7 @@ from scipy.signal import find_peaks
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, phasor_noise
 from tpjb_ident.phasors.whole_record import WholeRecord, hann_amplitude, noise_floor
 
 #: A line stands this many times above the noise floor around it,
@@ -96,8 +96,8 @@ def vertex(three: FloatArray) -> float:
     return float(0.5 * (a - c) / curvature) if curvature < 0 else 0.0
 
 
-#: Parts of the record whose phasors at the excitation are looked at.
-_PARTS = 64
+#: Windows that tell a line beside the excitation from its slow change, at least.
+_LEAST = 8
 #: Distances from the excitation at which a line is looked for [1 / record length],
 _NEAREST, _FARTHEST, _STEP = 1.0, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
@@ -106,58 +106,46 @@ _CLEAR_POWER = 25.0
 _LEFT = 0.25
 
 
-def near_line(records: tuple[WholeRecord, ...], result: RunPhasors, driven: int) -> float | None:
-    """Frequency [Hz] of a line close beside an excitation line; None where there is none."""
-    frequency, duration = result.lines.excitation[driven].frequency, records[0].duration
+def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> float | None:
+    """Frequency [Hz] of a line close beside an excitation line of a record of `duration` [s]; None where there is none.
+
+    Its beat shows in the windows' phasors.
+    """
+    frequency = result.lines.excitation[driven].frequency
     known = np.abs(np.delete(result.lines.frequencies, driven) - frequency) * duration
-    if (known < _FARTHEST).any():
+    noise = phasor_noise(result, rate)
+    live = np.isfinite(noise)
+    z = result.z[:, driven, live] / noise[live]
+    good = np.isfinite(z).all(axis=1)
+    if (known < _FARTHEST).any() or good.sum() < _LEAST or not live.any():
         return None
-    parts, size = [], []
-    for record in records:
-        phasors, noise = _part_phasors(record, frequency)
-        live = (record.used > 0.5) & (noise > np.finfo(float).tiny)
-        parts.append(phasors[:, live] / noise[live])
-        size.append(np.abs(result.z[:, driven, np.array(record.places)[live]]) / noise[live])
-    if not sum(part.shape[1] for part in parts):
-        return None
-    left, shift, power = _best(np.concatenate(parts, axis=1))
-    amplitude = np.nanmedian(np.linalg.norm(np.concatenate(size, axis=1), axis=1))
-    channels = sum(len(record.places) for record in records)
-    clear = power > _CLEAR_POWER * channels and left - _PARTS * channels < _LEFT * power
-    return frequency + shift / duration if clear and power > _PARTS * (MIN_SHARE * amplitude) ** 2 else None
+    windows, time = z[good], (result.start[good] + 0.5 * result.length) / duration
+    left, shift, power = _best(windows, time)
+    count, channels = windows.shape
+    amplitude = float(np.median(np.linalg.norm(windows, axis=1)))
+    clear = power > _CLEAR_POWER * channels and left - count * channels < _LEFT * power
+    return frequency + shift / duration if clear and power > count * (MIN_SHARE * amplitude) ** 2 else None
 
 
-def _part_phasors(record: WholeRecord, frequency: float) -> tuple[ComplexArray, FloatArray]:
-    """Phasors of the residual at a frequency in equal parts (n_parts, n_channels), and their noise (n_channels,)."""
-    length = record.residual.shape[1] // _PARTS
-    time = record.start + np.arange(length * _PARTS) / record.rate
-    wave = np.exp(-2j * np.pi * frequency * time).reshape(_PARTS, length)
-    rows = record.residual[:, : length * _PARTS].reshape(-1, _PARTS, length)
-    phasors = np.einsum("cpl,pl->pc", rows, wave) * (2 / length)
-    scale = 1.4826 * np.median(np.abs(record.residual[:, :: max(1, length // 8)]), axis=1)
-    return phasors, np.maximum(2 * scale / np.sqrt(length), np.finfo(float).tiny)
+def _best(windows: ComplexArray, time: FloatArray) -> tuple[float, float, float]:
+    """Power that is left beside the line that explains most, its distance [1 / record length], its power.
 
-
-def _best(parts: ComplexArray) -> tuple[float, float, float]:
-    """Power that is left beside the line that explains most, its distance [1 / record length], its power."""
-    time = (np.arange(_PARTS) + 0.5) / _PARTS
+    `windows` (n, m), `time` (n,) over the record's length.
+    """
     steady = np.linalg.qr(np.vander(time - 0.5, 3) + 0j)[0]
-    unsteady = parts - steady @ (steady.conj().T @ parts)
+    unsteady = windows - steady @ (steady.conj().T @ windows)
     total = float(np.sum(np.abs(unsteady) ** 2))
 
-    def explained(shift: float) -> float:
-        wave = np.exp(2j * np.pi * shift * time)
-        wave = wave - steady @ (steady.conj().T @ wave)
-        return float(np.sum(np.abs(wave.conj() @ unsteady) ** 2) / np.vdot(wave, wave).real)
+    def explained(shifts: FloatArray) -> FloatArray:
+        waves = np.exp(2j * np.pi * np.multiply.outer(time, shifts))
+        waves -= steady @ (steady.conj().T @ waves)
+        power = np.sum(np.abs(waves.conj().T @ unsteady) ** 2, axis=1)
+        return np.asarray(power / np.sum(np.abs(waves) ** 2, axis=0))
 
-    if total < _CLEAR_POWER * parts.shape[1] + _PARTS * parts.shape[1]:
-        return total, 0.0, 0.0
     shifts = np.arange(_NEAREST, _FARTHEST, _STEP)
     shifts = np.concatenate([-shifts, shifts])
-    step = _STEP
-    while step > 1e-3:
-        powers = [explained(shift) for shift in shifts]
-        best = float(shifts[int(np.argmax(powers))])
-        shifts, step = best + step * np.linspace(-1.0, 1.0, 9), step / 4
-    power = explained(best)
+    for step in _STEP / 4.0 ** np.arange(5):
+        powers = explained(shifts)
+        best, power = float(shifts[np.argmax(powers)]), float(powers.max())
+        shifts = best + step * np.linspace(-1.0, 1.0, 9)
     return total - power, best, power

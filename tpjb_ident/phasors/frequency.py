@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from rigdata.run import Run
 from tpjb_ident.conditions import Condition
-from tpjb_ident.phasors.bad_samples import robust_deviation
-from tpjb_ident.phasors.line_fit import usual_scale
+from tpjb_ident.phasors.bad_samples import robust_deviation, usual_scale
 from tpjb_ident.phasors.lines import LineSet, known_lines
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse
@@ -56,25 +55,52 @@ def retuned(result: RunPhasors, lines: LineSet) -> RunPhasors | None:
     return replace(result, z=result.z * turn[:, :, None], lines=lines)
 
 
-def frequency_slip(phasors: ComplexArray, start: FloatArray, noise: float) -> float:
-    """Frequency error that the phase advance of window phasors shows [Hz]; `phasors` (n, 2), `start` (n,) [s]."""
-    good = np.isfinite(phasors).all(axis=1)
-    if good.sum() < 3:
-        return 0.0
-    z, t = phasors[good], start[good]
+@dataclass(frozen=True)
+class _Advance:
+    """How a line's phase advances from window to window beyond its frequency."""
+
+    windows: IntArray  #: (n,): that show it
+    steps: FloatArray  #: (n - 1,), Hz: error of its frequency between neighbours
+    doubt: float  #: Hz: standard error of a step between neighbours
+
+    @property
+    def slip(self) -> float:
+        """Error of the frequency that stands clear of the steps' scatter [Hz], else zero."""
+        slip = float(np.median(self.steps))
+        spread = robust_deviation(self.steps - slip)
+        return slip if abs(slip) > 4 * spread / np.sqrt(len(self.steps)) else 0.0
+
+
+def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Advance | None:
+    """Advance of phasors (n, m) of one noise at `start` (n,) [s]; None where they do not stand clear of it."""
+    windows = np.flatnonzero(np.isfinite(phasors).all(axis=1))
+    if len(windows) < 3:
+        return None
+    z, apart = phasors[windows], np.diff(start[windows])
     size = float(np.median(np.linalg.norm(z, axis=1)))
     if not size > 10 * noise:
-        return 0.0
-    steps = _frequency_steps(z, t)
-    slip = float(np.median(steps))
-    spread = robust_deviation(steps - slip)
-    return slip if abs(slip) > 4 * spread / np.sqrt(len(steps)) else 0.0
+        return None
+    turns = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi)
+    return _Advance(windows, turns / apart, noise / size / (2 * np.pi * float(np.median(apart))))
 
 
-def _frequency_steps(phasors: ComplexArray, start: FloatArray) -> FloatArray:
-    """Frequency error (n - 1,) [Hz] by the phase between neighbours (n, 2), each weighted by what both show."""
-    turns = np.angle(np.einsum("ni,ni->n", phasors[1:], phasors[:-1].conj()))
-    return np.asarray(turns / (2 * np.pi * np.diff(start)))
+def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> _Advance | None:
+    """Advance of a line in some channels together, each weighted by its power over its noise."""
+    chosen = list(range(len(result.channels))) if places is None else places
+    z, noise = result.z[:, line, chosen], usual_scale(result.scale[:, chosen]) / np.sqrt(result.length * rate)
+    present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
+    if not present.any():
+        return None
+    # a channel without noise must not stand for all
+    least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
+    weighted = z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny)
+    return phase_advance(weighted, result.start, 1.0)
+
+
+def _line_slip(result: RunPhasors, line: int | None, rate: float, places: list[int] | None = None) -> float:
+    """Frequency error of a line by some channels together [Hz]."""
+    advance = None if line is None else _line_advance(result, line, rate, places)
+    return 0.0 if advance is None else advance.slip
 
 
 def tuned(
@@ -82,7 +108,7 @@ def tuned(
 ) -> Tuning | None:
     """Compare a first fit with what it assumed; None where it was good enough."""
     exact, off_set_point = _excitations(result, driven, run.sample_rate)
-    slip = _shaft_slip(result, run.sample_rate)
+    slip = _line_slip(result, result.lines.place("1X"), run.sample_rate)
     span = result.start[-1] - result.start[0] + result.length
     follow = _drifting(result, run.sample_rate)
     if not off_set_point and follow is None and abs(slip) * span <= 5 * MAX_SLIP:
@@ -119,23 +145,6 @@ def _excitations(
     )
 
 
-def _shaft_slip(result: RunPhasors, rate: float, places: list[int] | None = None) -> float:
-    index = result.lines.place("1X")
-    return 0.0 if index is None else _line_slip(result, index, rate, places)
-
-
-def _line_slip(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> float:
-    """Frequency error of a line by some channels together, each weighted by its power over its noise [Hz]."""
-    chosen = slice(None) if places is None else places
-    z, noise = result.z[:, line, chosen], usual_scale(result.scale[:, chosen]) / np.sqrt(result.length * rate)
-    present = np.isfinite(z).any(axis=0) & np.isfinite(noise)
-    if not present.any():
-        return 0.0
-    # a channel without noise must not stand for all
-    least = 1e-9 * np.nanmax(np.abs(z[:, present]), axis=0)
-    return frequency_slip(z[:, present] / np.maximum(noise[present], least + np.finfo(float).tiny), result.start, 1.0)
-
-
 def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
     """How much faster the clocks of several devices let the excitation turn than the lines have it, relative."""
     devices = tuple(dict.fromkeys(result.device))
@@ -152,7 +161,7 @@ def device_rates(result: RunPhasors, rate: float) -> dict[str, float]:
 
 def exact_frequencies(result: RunPhasors, places: list[int], rate: float) -> FloatArray:
     """Frequencies of the whole record's lines by the clock of some channels, (n_whole_lines,) [Hz]."""
-    turning = _shaft_slip(result, rate, places)
+    turning = _line_slip(result, result.lines.place("1X"), rate, places)
     frequencies = np.array([line.frequency + turning * line.order for line in result.lines.whole])
     for k, line in enumerate(result.lines.whole):
         if line.name in ("excitation", "mains"):
@@ -175,24 +184,20 @@ def _drifting(result: RunPhasors, rate: float) -> ShaftCourse | None:
 
 
 def speeds_from_runout(result: RunPhasors, rate: float) -> tuple[FloatArray, float] | None:
-    """Shaft speed in every window from the turning of its 1X phasor; gives speeds (n,).
+    """Shaft speed in every window (n,) from the turning of its 1X phasors in the probes, and its standard error [Hz].
 
     Runout and unbalance draw the same 1X from window to window; between the middles of two windows its phase
     advances by what the shaft is ahead of the frequency fitted.
     """
-    index = result.lines.place("1X")
-    if index is None or len(result.start) < 3:
+    line = result.lines.place("1X")
+    if line is None:
         return None
-    z = result.displacement.phasors[:, index]
-    good = np.flatnonzero(np.isfinite(z).all(axis=1))
-    noise = float(np.median(usual_scale(result.displacement.noise))) / np.sqrt(result.length * rate)
-    size = float(np.median(np.linalg.norm(z[good], axis=1))) if len(good) else 0.0
-    if len(good) < 3 or not size > 10 * noise:
+    noise = float(np.median(usual_scale(result.scale[:, result.pick("displacement")])))
+    z = result.displacement.phasors[:, line]
+    advance = phase_advance(z, result.start, noise / np.sqrt(result.length * rate))
+    if advance is None:
         return None
-    t = result.start[good]
-    steps = _frequency_steps(z[good], t)
     speeds = np.full(len(result.start), np.nan)
-    speeds[good] = result.lines.frequencies[index] + np.concatenate(
-        [steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]]
-    )
-    return speeds, noise / size / (2 * np.pi * float(np.median(np.diff(t))))
+    steps = np.concatenate([advance.steps[:1], advance.steps, advance.steps[-1:]])
+    speeds[advance.windows] = result.lines.frequencies[line] + 0.5 * (steps[1:] + steps[:-1])
+    return speeds, advance.doubt

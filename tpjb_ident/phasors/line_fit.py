@@ -6,17 +6,19 @@ of one run are repeats of one phasor as long as the drive is locked to the recor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.phasors.bad_samples import (
     BAD_LIMIT,
     SCALE_LIMIT,
     is_present,
     robust_deviation,
     robust_fit,
+    usual_scale,
     with_flanks,
 )
 from tpjb_ident.phasors.windows import line_design
@@ -24,58 +26,8 @@ from tpjb_ident.phasors.windows import line_design
 #: Outlying samples up to this share are left out again and again until fit and verdict agree.
 _FEW = 0.1
 _FEW_ROUNDS = 8
-#: Samples of a block.
+#: Samples of a block of waves.
 BLOCK = 256
-#: Samples of a long window that are multiplied at once.
-_AT_ONCE = 256
-
-
-class WaveBlocks:
-    """The columns of `line_design` on an even grid, with a linear drift.
-
-    exp(i omega (t_b + tau)) = exp(i omega t_b) exp(i omega tau): over a short block every window of an even grid sees
-    the same few waves in tau, turned by one factor per block. The waves of one block stay in a core's first cache,
-    where those of a long window do not, which makes projection and synthesis several times quicker.
-    """
-
-    def __init__(self, length: int, rate: float, frequencies: FloatArray) -> None:
-        self.full = length // BLOCK
-        self.rest = length - self.full * BLOCK
-        tau = np.arange(BLOCK) / rate
-        # line_design's own columns in tau; its drift columns are replaced by 1 and tau
-        self._waves = line_design(tau, frequencies, 1)
-        self._waves[:, -1] = tau
-        self._rows = np.ascontiguousarray(self._waves.T)
-        starts = np.arange(self.full + (self.rest > 0)) * BLOCK / rate
-        self._turn: ComplexArray = np.exp(2j * np.pi * np.multiply.outer(starts, frequencies))
-        half = 0.5 * (length - 1) / rate
-        self._place, self._slope = (starts - half) / half, 1 / half
-
-    def project(self, rows: FloatArray) -> FloatArray:
-        """Inner products with every column, (k, length) -> (k, 2 m + 2)."""
-        parts = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
-        main = rows[:, : self.full * BLOCK].reshape(len(rows), self.full, BLOCK)
-        np.matmul(main, self._waves, out=parts[:, : self.full])
-        if self.rest:
-            parts[:, self.full] = rows[:, self.full * BLOCK :] @ self._waves[: self.rest]
-        sums = np.empty((len(rows), parts.shape[2]))
-        lines = np.einsum("kbm,bm->km", parts[:, :, 0:-2:2] + 1j * parts[:, :, 1:-2:2], self._turn.conj())
-        sums[:, 0:-2:2], sums[:, 1:-2:2] = lines.real, lines.imag
-        sums[:, -2] = parts[:, :, -2].sum(axis=1)
-        sums[:, -1] = parts[:, :, -2] @ self._place + parts[:, :, -1].sum(axis=1) * self._slope
-        return sums
-
-    def subtract(self, rows: FloatArray, coefficients: FloatArray) -> None:
-        """Take the sum of all columns, times their (k, 2 m + 2) coefficients, off (k, length) rows in place."""
-        lines = (coefficients[:, 0:-2:2] + 1j * coefficients[:, 1:-2:2])[:, None, :] * self._turn
-        local = np.empty((len(rows), len(self._turn), self._waves.shape[1]))
-        local[:, :, 0:-2:2], local[:, :, 1:-2:2] = lines.real, lines.imag
-        local[:, :, -2] = coefficients[:, None, -2] + coefficients[:, None, -1] * self._place
-        local[:, :, -1] = coefficients[:, None, -1] * self._slope
-        main = rows[:, : self.full * BLOCK].reshape(len(rows), self.full, BLOCK)
-        main -= local[:, : self.full] @ self._rows
-        if self.rest:
-            rows[:, self.full * BLOCK :] -= local[:, self.full] @ self._rows[:, : self.rest]
 
 
 @dataclass(frozen=True)
@@ -87,39 +39,51 @@ class WindowFit:
     scale: FloatArray  #: (n_windows, n_channels): robust standard deviation of what the lines leave
     lost: FloatArray  #: (n_windows, n_channels): share of the samples left out (bad or missing)
 
-    def put(self, window: int, channels: slice, single: WindowFit) -> None:
-        """Put the fit of one window and some channels in the place of what is there."""
-        self.z[window, :, channels], self.mean[window, channels] = single.z[0], single.mean[0]
-        self.scale[window, channels], self.lost[window, channels] = single.scale[0], single.lost[0]
+    @staticmethod
+    def empty(windows: int, lines: int, channels: int) -> WindowFit:
+        """Windows of which nothing was recorded."""
+        missing = np.full((windows, channels), np.nan)
+        z = np.full((windows, lines, channels), np.nan + 0j)
+        return WindowFit(z, missing, missing.copy(), np.ones((windows, channels)))
 
-
-def joined(fits: list[WindowFit], channels: bool = False) -> WindowFit:
-    """Windows of one run one after the other, or the channels of the same windows side by side."""
-    z = np.concatenate([fit.z for fit in fits], axis=2 if channels else 0)
-    others = ("mean", "scale", "lost")
-    return WindowFit(z, *(np.concatenate([getattr(f, n) for f in fits], axis=int(channels)) for n in others))
-
-
-def no_windows(count: int, lines: int, channels: int) -> WindowFit:
-    """Windows of which nothing was recorded."""
-    none = np.full((count, channels), np.nan)
-    return WindowFit(np.full((count, lines, channels), np.nan + 0j), none, none.copy(), np.ones((count, channels)))
+    def put(
+        self,
+        windows: IntArray,
+        part: WindowFit,
+        lines: BoolArray | None = None,
+        channels: Sequence[bool] | None = None,
+    ) -> None:
+        """Put the fit of some windows, lines and channels, by default of all, in the place of what is there."""
+        chosen_lines = np.ones(self.z.shape[1], dtype=bool) if lines is None else lines
+        chosen = np.ones(self.z.shape[2], dtype=bool) if channels is None else np.asarray(channels)
+        self.z[np.ix_(windows, chosen_lines, chosen)] = part.z
+        table = np.ix_(windows, chosen)
+        self.mean[table], self.scale[table], self.lost[table] = part.mean, part.scale, part.lost
 
 
 class LineFitter:
-    """Joint fit of lines and a drift on equal windows of an even grid: one pseudo-inverse for all of them."""
+    """Joint fit of lines and a slow drift to windows of the same columns: one pseudo-inverse for all of them."""
 
-    def __init__(self, length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> None:
+    def __init__(
+        self,
+        length: int,
+        rate: float,
+        frequencies: FloatArray,
+        drift_order: int = 1,
+        time: FloatArray | None = None,
+    ) -> None:
         self.length, self.rate = length, rate
         self.frequencies = np.asarray(frequencies, dtype=float)
-        self.design = even_design(length, rate, self.frequencies, drift_order)
+        if time is None:
+            duration = length / rate
+            self.design = even_design(length, rate, self.frequencies, drift_order)
+        else:  # (length,) [s]: of samples with jitter or gaps
+            duration = float(time[-1] - time[0])
+            self.design = line_design(time - time[0], self.frequencies, drift_order)
+        self._gram = self.design.T @ self.design
         # Lines that a window tells apart leave a well-conditioned Gram matrix; its size is a dozen.
-        self._gram_inverse = np.linalg.pinv(_products(self.design, self.design), rcond=1e-12, hermitian=True)
-        self._level = _level(self.design, self.frequencies, length / rate)
-        in_blocks = length >= 2 * BLOCK and drift_order == 1
-        self._blocks = WaveBlocks(length, rate, self.frequencies) if in_blocks else None
-        # The scale of the residual needs no more than a few hundred samples.
-        self._stride = max(1, length // 512)
+        self._gram_inverse = np.linalg.pinv(self._gram, rcond=1e-12, hermitian=True)
+        self._level = _level(self.design, self.frequencies, duration)
 
     def fit(self, rows: FloatArray, start: FloatArray, usual: FloatArray | None = None) -> WindowFit:
         """Fit windows; `rows` (n_channels, n_windows, length), `start` (n_windows,), `usual` (n_channels,)."""
@@ -131,58 +95,43 @@ class LineFitter:
         """Fit windows, and give what is left of them, (n_channels, n_windows, length), with bad samples as zero."""
         q, n = rows.shape[:2]
         stack = rows.reshape(q * n, self.length)
-        offset = _mean_of_present(stack[:, :: self._stride])
-        residual = stack - offset
-        coefficients = self._solve_and_subtract(residual)
-        holed = np.flatnonzero(~np.isfinite(coefficients).all(axis=1))
-        filled = np.where(is_present(stack[holed]), stack[holed] - offset[holed], 0.0)
-        coefficients[holed], residual[holed] = self._solve_and_subtract(filled), filled
-        scale = 1.4826 * np.median(np.abs(residual[:, :: self._stride]), axis=1)
-        scale[holed] = np.inf  # what is filled in is left out first
-        scale = scale.reshape(q, n)
-        usual = usual_scale(scale.T) if usual is None else usual
-        lost = np.zeros((q, n))
-        bad = np.isinf(scale) | self._unclean(residual, scale, usual, np.abs(coefficients).sum(axis=1))
-        coefficients, offset = coefficients.reshape(q, n, -1), offset.reshape(q, n)
-        residual = residual.reshape(q, n, -1)
-        for k, i in np.argwhere(bad):
-            gaps = ~is_present(rows[k, i])
-            robust = self._without_few(residual[k, i], gaps, coefficients[k, i], scale[k, i], float(usual[k]))
+        present = is_present(stack)
+        count = np.maximum(present.sum(axis=1, keepdims=True), 1)
+        offset = np.sum(stack, axis=1, keepdims=True, where=present) / count
+        values = np.where(present, stack - offset, 0.0)
+        coefficients = values @ self.design @ self._gram_inverse
+        residual = values - coefficients @ self.design.T
+        # The scale of the residual needs no more than a few hundred samples.
+        scale = 1.4826 * np.median(np.abs(residual[:, :: max(1, self.length // 512)]), axis=1)
+        scale[~present.all(axis=1)] = np.inf  # what is filled in is left out first
+        usual = usual_scale(scale.reshape(q, n).T) if usual is None else usual
+        limit = np.repeat(usual, n)
+        lost = np.zeros(q * n)
+        for k in np.flatnonzero(self._is_unclean(residual, scale, limit, np.abs(coefficients).sum(axis=1))).tolist():
+            gaps = ~present[k]
+            robust = self._without_few(residual[k], gaps, coefficients[k], scale[k], limit[k])
             if robust is None:
-                fit = robust_fit(self.design, rows[k, i] - offset[k, i], float(usual[k]))
+                fit = robust_fit(self.design, np.where(gaps, np.nan, values[k]), limit[k])
                 robust = fit.coefficients, fit.scale, fit.lost
-            coefficients[k, i], scale[k, i], lost[k, i] = robust
-            remainder = rows[k, i] - offset[k, i] - self.design @ coefficients[k, i]
-            residual[k, i] = np.where(np.abs(remainder) <= BAD_LIMIT * scale[k, i], remainder, 0.0)
-        mean = coefficients @ self._level + offset
-        z = _phasors(coefficients, self.frequencies, start)
-        return WindowFit(z, *(np.ascontiguousarray(values.T) for values in (mean, scale, lost))), residual
+            coefficients[k], scale[k], lost[k] = robust
+            remainder = np.where(gaps, np.inf, np.abs(values[k] - self.design @ coefficients[k]))
+            residual[k] = np.where(remainder <= BAD_LIMIT * scale[k], values[k] - self.design @ coefficients[k], 0.0)
+        mean = coefficients @ self._level + offset[:, 0]
+        z = _phasors(coefficients.reshape(q, n, -1), self.frequencies, start)
+        figures = (np.ascontiguousarray(part.reshape(q, n).T) for part in (mean, scale, lost))
+        return WindowFit(z, *figures), residual.reshape(q, n, -1)
 
-    def _unclean(self, residual: FloatArray, scale: FloatArray, usual: FloatArray, size: FloatArray) -> BoolArray:
-        """Windows that hold bad samples (q, n): by a sample of theirs, or by their scale.
+    def _is_unclean(self, residual: FloatArray, scale: FloatArray, usual: FloatArray, size: FloatArray) -> BoolArray:
+        """Windows (k,) that hold bad samples: by a sample of theirs, or by their scale.
 
         A long disturbance pulls the whole fit and hides in the window's own scale: the run's tells. The rounding of a
-        noise-free record is no bad sample. A missing value makes the comparisons false.
+        noise-free record is no bad sample.
 
-        `residual` (q n, length), `scale` (q, n), `usual` (q,), `size` (q n,): sum of the coefficients.
+        `residual` (k, length), `scale`, `usual` (k,), `size` (k,): sum of the coefficients.
         """
-        largest = np.maximum(residual.max(axis=1), -residual.min(axis=1)).reshape(scale.shape)
-        rounding = 1e-10 * size.reshape(scale.shape)
-        clean = largest <= np.maximum(BAD_LIMIT * scale, rounding)
-        clean &= scale <= np.maximum(SCALE_LIMIT * usual[:, None], rounding)
-        return ~clean
-
-    def _solve_and_subtract(self, rows: FloatArray) -> FloatArray:
-        """Coefficients of every row, (k, n_columns); the rows become residuals."""
-        if self._blocks is None:
-            coefficients = _products(rows.T, self.design) @ self._gram_inverse
-            for first in range(0, self.length, _AT_ONCE):
-                part = slice(first, first + _AT_ONCE)
-                rows[:, part] -= coefficients @ self.design[part].T
-        else:
-            coefficients = self._blocks.project(rows) @ self._gram_inverse
-            self._blocks.subtract(rows, coefficients)
-        return coefficients
+        largest, rounding = np.maximum(residual.max(axis=1), -residual.min(axis=1)), 1e-10 * size
+        clean = np.isfinite(scale) & (largest <= np.maximum(BAD_LIMIT * scale, rounding))
+        return ~(clean & (scale <= np.maximum(SCALE_LIMIT * usual, rounding)))
 
     def _without_few(
         self, residual: FloatArray, gaps: BoolArray, coefficients: FloatArray, scale: float, usual: float
@@ -197,7 +146,6 @@ class LineFitter:
         first, limit = scale, SCALE_LIMIT * usual
         if limit < first < np.inf:
             return None
-        gram = np.linalg.inv(self._gram_inverse)
         size, solution, left_out = np.abs(residual), coefficients, None
         for _ in range(_FEW_ROUNDS):
             previous, left_out = left_out, np.flatnonzero(gaps | with_flanks(size > BAD_LIMIT * scale))
@@ -208,19 +156,13 @@ class LineFitter:
             rows = self.design[left_out]
             # the residual of the left-out samples is what they contributed beyond the fit
             try:
-                change = np.linalg.solve(gram - rows.T @ rows, residual[left_out] @ rows)
+                change = np.linalg.solve(self._gram - rows.T @ rows, residual[left_out] @ rows)
             except np.linalg.LinAlgError:  # what is left does not tell its lines apart
                 return None
             solution = coefficients - change
             size = np.where(gaps, 0.0, np.abs(residual + self.design @ change))
             scale = robust_deviation(size[~gaps])
         return None
-
-
-def _products(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Inner products of all columns, part by part: a tall product at once is shared out among threads, at a loss."""
-    stretches = [slice(k, k + _AT_ONCE) for k in range(0, len(first), _AT_ONCE)]
-    return np.asarray(np.sum([first[part].T @ second[part] for part in stretches], axis=0))
 
 
 def even_design(length: int, rate: float, frequencies: FloatArray, drift_order: int = 1) -> FloatArray:
@@ -257,39 +199,3 @@ def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> Floa
     told = frequencies * duration >= apart.min(initial=np.inf)
     weights[: 2 * len(frequencies)][np.repeat(told, 2)] = 0.0
     return weights
-
-
-def usual_scale(scale: FloatArray) -> FloatArray:
-    """Median over the windows with a scale; infinite where none has; `scale` (n_windows, q)."""
-    if len(scale) and np.isfinite(scale).all():
-        return np.asarray(np.median(scale, axis=0))
-    usual = np.full(scale.shape[1], np.inf)
-    for k, column in enumerate(scale.T):
-        finite_values = column[np.isfinite(column)]
-        if len(finite_values):
-            usual[k] = np.median(finite_values)
-    return usual
-
-
-def _mean_of_present(rows: FloatArray) -> FloatArray:
-    """Mean of the values of every row, (n, 1); zero where a row has none."""
-    present = is_present(rows)
-    if present.all():
-        return rows.mean(axis=1, keepdims=True)
-    total = np.where(present, rows, 0.0).sum(axis=1, keepdims=True)
-    return np.asarray(total / np.maximum(present.sum(axis=1, keepdims=True), 1))
-
-
-def fit_uneven(rows: FloatArray, time: FloatArray, frequencies: FloatArray, origin: float) -> WindowFit:
-    """Fit one window with its own time stamps (jitter, gaps).
-
-    `rows` (q, n), `time` (n,) [s], `frequencies` (n_lines,) [Hz].
-    """
-    offset = _mean_of_present(rows)
-    design = line_design(time - time[0], frequencies)
-    fits = [robust_fit(design, row, np.inf) for row in rows - offset]
-    coefficients = np.array([[fit.coefficients] for fit in fits])
-    mean = coefficients[:, 0] @ _level(design, frequencies, float(time[-1] - time[0])) + offset[:, 0]
-    scale, lost = np.array([fit.scale for fit in fits]), np.array([fit.lost for fit in fits])
-    z = _phasors(coefficients, frequencies, np.array([time[0] - origin]))
-    return WindowFit(z, mean[None], scale[None], lost[None])

@@ -8,7 +8,6 @@ window; what is faint in the whole record alone, unless it stands out there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +22,9 @@ HIGHEST = 0.45
 MAINS_DRIFT, SPEED_DRIFT = 0.15, 0.08
 #: Harmonics of the shaft that are named where they coincide with the excitation.
 NAMED_HARMONICS = 3
+_NAMED = tuple(f"{n}X" for n in range(1, NAMED_HARMONICS + 1))
+#: Lines that follow the drive or were found wander no farther than rounding [Hz].
+_EXACT = 1e-6
 #: Lines closer than this are one [1 / record length].
 ONE_LINE = 0.6
 #: Harmonics of the shaft and of the drive that are looked at in the whole record.
@@ -81,18 +83,19 @@ class LineSet:
 
     def faster(self, rate: float) -> LineSet:
         """The same lines by a clock that lets them turn faster, relative."""
-        return self._moved(lambda line: rate * line.frequency)
+        return self._moved(rate, 0.0)
 
     def at_speed(self, speed: float) -> LineSet:
         """The same lines with 1X, 2X.. at another shaft speed [Hz]."""
-        return replace(self._moved(lambda line: line.order * (speed - self.speed)), speed=speed)
+        return replace(self._moved(0.0, speed - self.speed), speed=speed)
 
-    def _moved(self, by: Callable[[Line], float]) -> LineSet:
-        """The same lines, each moved in frequency [Hz]."""
-        excitation, nuisance, faint = (
-            tuple(replace(line, frequency=line.frequency + by(line)) for line in lines)
-            for lines in (self.excitation, self.nuisance, self.faint)
-        )
+    def _moved(self, rate: float, turning: float) -> LineSet:
+        """The same lines, faster by a relative rate and with the shaft [Hz]."""
+        groups = []
+        for lines in (self.excitation, self.nuisance, self.faint):
+            moved = [line.frequency * (1 + rate) + line.order * turning for line in lines]
+            groups.append(tuple(replace(line, frequency=f) for line, f in zip(lines, moved)))
+        excitation, nuisance, faint = groups
         return replace(self, excitation=excitation, nuisance=nuisance, faint=faint)
 
 
@@ -122,26 +125,25 @@ def known_lines(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"
         )
     driven = tuple(Line("excitation", float(f)) for f in sorted(set(excitation)))
+    faint = _faint_lines(driven, speed, settings)
+    strong = strong_lines(driven, speed, settings)
+    for f in extra:
+        strong.append(next((line for line in faint if abs(line.frequency - f) < apart), Line("found", f, _EXACT)))
     conditions: list[Condition] = []
     nuisance: list[Line] = []
-    faint = [line for line in _faint_lines(driven, speed, settings) if 0.0 < line.frequency < top]
-    for n in range(settings.shaft_harmonics + 1, NAMED_HARMONICS + 1):
-        line = Line(f"{n}X", n * speed)
-        coincident = [e for e in driven if speed > 0 and abs(e.frequency - n * speed) <= n * SPEED_DRIFT]
-        conditions += [_on_excitation(line, e) for e in coincident[:1]]
-    found = [next((line for line in faint if abs(line.frequency - f) < apart), Line("found", f, 1e-6)) for f in extra]
-    for line in strong_lines(driven, speed, settings) + found:
-        if not 0.0 < line.frequency < top:
-            continue
-        coincident = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
-        if coincident:
-            conditions.append(_on_excitation(line, coincident[0]))
-        elif _is_apart(line, nuisance, 0.0 if line.name == "found" else apart):
-            nuisance.append(line)
     resolved: list[Line] = []
     level = Line("level", 0.0)
-    for line in faint:
-        if _is_apart(line, [level, *driven, *nuisance, *resolved], 2 * apart):
+    for line in strong + faint:
+        coincident = [e for e in driven if abs(e.frequency - line.frequency) <= line.wander]
+        if not 0.0 < line.frequency < top:
+            continue
+        if coincident:
+            if line in strong or line.name in _NAMED:
+                conditions.append(_on_excitation(line, coincident[0]))
+        elif line in strong:
+            if _is_apart(line, nuisance, 0.0 if line.name == "found" else apart):
+                nuisance.append(line)
+        elif _is_apart(line, [level, *driven, *nuisance, *resolved], 2 * apart):
             resolved.append(line)
     return LineSet(driven, tuple(nuisance), tuple(conditions), speed, tuple(resolved))
 
@@ -150,30 +152,35 @@ def _is_apart(line: Line, others: list[Line], least: float) -> bool:
     return all(abs(o.frequency - line.frequency) > max(o.wander, line.wander, least) for o in others)
 
 
+def _shaft_lines(speed: float, first: int, last: int) -> list[Line]:
+    orders = range(first, last + 1) if speed > 0 else ()
+    return [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in orders]
+
+
+def _drive_lines(driven: tuple[Line, ...], first: int, last: int) -> list[Line]:
+    lines = []
+    for line in driven:
+        lines += [Line(f"harmonic {n}", n * line.frequency, _EXACT) for n in range(first, last + 1)]
+    return lines
+
+
 def strong_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
     """What turns with the shaft, the mains, what the actuator makes of the drive."""
-    shaft = [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in range(1, settings.shaft_harmonics + 1) if speed > 0]
-    drive = [
-        Line(f"harmonic {n}", n * e.frequency, 1e-6) for e in driven for n in range(2, settings.drive_harmonics + 1)
-    ]
-    mains = [
-        Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT)
-        for n in range(1, settings.mains_harmonics + 1)
-        if settings.mains > 0
-    ]
-    return shaft + mains + drive
+    orders = range(1, settings.mains_harmonics + 1) if settings.mains > 0 else ()
+    mains = [Line("mains" if n == 1 else f"mains {n}", n * settings.mains, MAINS_DRIFT) for n in orders]
+    shaft = _shaft_lines(speed, 1, settings.shaft_harmonics)
+    return shaft + mains + _drive_lines(driven, 2, settings.drive_harmonics)
 
 
 def _faint_lines(driven: tuple[Line, ...], speed: float, settings: LineSettings) -> list[Line]:
     """Further harmonics, and what a film that is not linear makes of the shaft's and the drive's motion."""
-    turning = range(settings.shaft_harmonics + 1, _FAINT_SHAFT + 1) if speed > 0 else ()
-    faint = [Line(f"{n}X", n * speed, n * SPEED_DRIFT, n) for n in turning]
+    faint = _shaft_lines(speed, settings.shaft_harmonics + 1, _FAINT_SHAFT)
     for e in driven:
-        further = range(settings.drive_harmonics + 1, _FAINT_DRIVE + 1)
-        faint += [Line(f"harmonic {n}", n * e.frequency, 1e-6) for n in further]
+        faint += _drive_lines((e,), settings.drive_harmonics + 1, _FAINT_DRIVE)
         twice, half = 2 * speed - e.frequency, 2 * e.frequency - speed
         if speed > 0:
-            faint += [Line("2X-f", abs(twice), 1e-6, 2 * np.sign(twice)), Line("2f-X", abs(half), 1e-6, -np.sign(half))]
+            faint.append(Line("2X-f", abs(twice), _EXACT, 2 * np.sign(twice)))
+            faint.append(Line("2f-X", abs(half), _EXACT, -np.sign(half)))
     return faint
 
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.problem import RigDataError
@@ -31,8 +30,8 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
     nominal = getattr(campaign, "mains", None)
     if nominal is not None:
         return float(nominal)
-    dynamic = campaign.of_kind("dynamic")
-    coincident = [c for c in MAINS_FREQUENCIES if any(abs(run.point.excitation_hz - c) < _NEAR for run in dynamic)]
+    driven = np.array([run.point.excitation_hz for run in campaign.of_kind("dynamic")])
+    coincident = [c for c in MAINS_FREQUENCIES if (np.abs(driven - c) < _NEAR).any()]
     if not coincident or usual not in MAINS_FREQUENCIES:
         return usual
     votes = {c: _votes(campaign.runs, c) for c in MAINS_FREQUENCIES}
@@ -43,40 +42,32 @@ def mains_frequency(campaign: Campaign, usual: float) -> float:
 
 
 def _votes(runs: Sequence[Run], choice: float) -> int:
-    """In how many runs a line stands at `choice` where nothing else does."""
-    count = visible = 0
+    """In how many runs a line stands at `choice` [Hz] where nothing else does."""
+    lines: list[bool] = []
     for run in runs:
-        if visible >= _MAX_RUNS:
-            break
         point = run.point
-        others = [k * point.excitation_hz for k in (1, 2, 3)] + [k * point.shaft_speed_hz for k in range(1, 7)]
-        if any(abs(f - choice) < _APART for f in others):
-            continue
-        shown = _stands_out(run, choice)
-        if shown is not None:
-            visible += 1
-            count += shown
-    return count
+        others = np.outer(np.arange(1, 7), [point.excitation_hz, point.shaft_speed_hz])
+        others[3:, 0] = np.inf  # higher harmonics of a drive are faint
+        if len(lines) < _MAX_RUNS and (np.abs(others - choice) >= _APART).all():
+            lines += _line_at(run, choice)
+    return sum(lines)
 
 
-def _stands_out(run: Run, choice: float) -> bool | None:
+def _line_at(run: Run, choice: float) -> list[bool]:
+    """Whether forces or displacements of a run show a line at `choice` [Hz]; nothing where they cannot."""
     try:
-        length = min(run.length, _LOOK)
-        records = [run.vector(q, 0, length) for q in ("displacement", "force")]
+        records = [run.vector(q, 0, min(run.length, _LOOK)) for q in ("displacement", "force")]
     except RigDataError:  # the run's own reading says so
-        return None
+        return []
     usable = [record for record in records if record.rate >= 3 * choice and len(record) >= record.rate]
-    return any(_line_in(record.values, record.rate, choice) for record in usable) if usable else None
-
-
-def _line_in(values: FloatArray, rate: float, choice: float) -> bool:
-    if not np.isfinite(values).all():
-        return False
-    n = len(values)
-    spectrum = np.abs(np.fft.rfft((values - values.mean(axis=0)) * np.hanning(n)[:, None], axis=0))
-    amplitude = np.linalg.norm(spectrum, axis=1)
-    frequency = np.fft.rfftfreq(n, 1 / rate)
-    width = max(0.2, 2 * rate / n)
-    line = np.abs(frequency - choice) <= width
-    around = (np.abs(frequency - choice) > 2 * width) & (np.abs(frequency - choice) < 2 * width + 4.0)
-    return bool(amplitude[line].max() > _CLEAR * np.median(amplitude[around]))
+    shown = False
+    for record in usable:
+        n = len(record)
+        window = np.hanning(n)[:, None]
+        spectrum = np.fft.rfft((record.values - record.values.mean(axis=0)) * window, axis=0)
+        amplitude = np.linalg.norm(spectrum, axis=1)
+        away, width = np.abs(np.fft.rfftfreq(n, 1 / record.rate) - choice), max(0.2, 2 * record.rate / n)
+        around = (away > 2 * width) & (away < 2 * width + 4.0)
+        # a missing value leaves no spectrum, and no line in it
+        shown |= bool(amplitude[away <= width].max() > _CLEAR * np.median(amplitude[around]))
+    return [shown] if usable else []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,38 +29,33 @@ class _ReadingCache:
     def __init__(self, reader: Any, channels: Sequence[str], samples: int = SHORT) -> None:
         self._reader, self._channels = reader, tuple(channels)
         self.samples = min(samples, reader.length())
-        self._kept: dict[str, FloatArray] | None = None
-        self._time: FloatArray | None = None
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._reader, name)
 
     def read(self, names: Sequence[str], start: int, stop: int) -> list[FloatArray]:
         """Raw readings of `names`, (stop - start,) each; not to be written to."""
-        beginning = self._beginning() if stop <= self.samples else {}
-        if all(name in beginning for name in names):
-            return [beginning[name][start:stop] for name in names]
+        if stop <= self.samples and all(name in self._beginning for name in names):
+            return [self._beginning[name][start:stop] for name in names]
         return list(self._reader.read(names, start, stop))
 
     def time(self, start: int, stop: int) -> FloatArray:
         """Seconds of samples start..stop-1."""
-        if stop > self.samples:
-            return np.asarray(self._reader.time(start, stop))
-        if self._time is None:
-            self._time = np.asarray(self._reader.time(0, self.samples))
-        return self._time[start:stop].copy()
+        return np.array(self._times[start:stop] if stop <= self.samples else self._reader.time(start, stop))
 
+    @cached_property
+    def _times(self) -> FloatArray:
+        return np.asarray(self._reader.time(0, self.samples))
+
+    @cached_property
     def _beginning(self) -> dict[str, FloatArray]:
-        if self._kept is None:
-            try:
-                values = self._reader.read(self._channels, 0, self.samples)
-            except RigDataError:  # told by whoever needs the channel that cannot be read
-                self._kept = {}
-            else:
-                self._kept = dict(zip(self._channels, values))
-                for one in values:
-                    one.flags.writeable = False
-        return self._kept
+        try:
+            values = self._reader.read(self._channels, 0, self.samples)
+        except RigDataError:  # told by whoever needs the channel that cannot be read
+            return {}
+        for readings in values:
+            readings.flags.writeable = False
+        return dict(zip(self._channels, values))
 
 
 class _Beginning:

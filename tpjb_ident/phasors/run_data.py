@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, ComplexArray, FloatArray
+from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
-from rigdata.vector import inverse_directions
+from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
+from tpjb_ident.phasors.bad_samples import usual_scale
 from tpjb_ident.phasors.lines import LineSet, LineSettings
 from tpjb_ident.phasors.windows import WindowSettings
 
@@ -37,7 +37,6 @@ class PhasorBlock:
 
     phasors: ComplexArray  #: (n_windows, n_lines, 2) complex: X and Y at every line, SI; NaN where a window gave none
     mean: FloatArray  #: (n_windows, 2): mean of the quantity, SI
-    noise: FloatArray  #: (n_windows, 2): robust standard deviation of what the lines leave
     lost: FloatArray  #: (n_windows,): share of the samples left out (bad or missing)
 
 
@@ -86,29 +85,18 @@ class RunPhasors:
         """Places of the channels of a quantity."""
         return [i for i, c in enumerate(self.channels) if c.quantity == quantity]
 
-    def _vector(self, quantity: str) -> PhasorBlock:
-        """X and Y of a quantity from its channels, those left out that a window says nothing of."""
+    def plane(self, quantity: str, values: ComplexArray) -> ComplexArray:
+        """X and Y (.., 2) of a quantity from values (.., n_channels) of all channels, NaN where there is none."""
         places = self.pick(quantity)
-        axes = tuple(float(self.channels[i].axis or 0.0) for i in places)
-        z, mean, scale = self.z[:, :, places], self.mean[:, places], self.scale[:, places]
-        n_windows, n_lines = z.shape[:2]
-        phasors = np.full((n_windows, n_lines, 2), np.nan + 0j)
-        means, noise = np.full((n_windows, 2), np.nan), np.full((n_windows, 2), np.nan)
-        usable = np.isfinite(z).any(axis=1) & np.isfinite(mean)
-        for rows, members in _patterns(usable):
-            inverse = inverse_directions(tuple(axes[i] for i in members))
-            phasors[rows] = z[rows][:, :, members] @ inverse.T
-            means[rows] = mean[rows][:, members] @ inverse.T
-            noise[rows] = np.sqrt(scale[rows][:, members] ** 2 @ (inverse**2).T)
-        return PhasorBlock(phasors, means, noise, self.lost[:, places].max(axis=1, initial=0.0))
+        along = directions(np.array([self.channels[k].axis or 0.0 for k in places]))
+        return plane_vector(along, values[..., places])
 
-    def advanced(self, delays: Mapping[str, float]) -> RunPhasors:
-        """The run without delays of whole quantities."""
-        return self.divided(self._late(delays)) if any(delays.values()) else self
-
-    def _late(self, delays: Mapping[str, float]) -> ComplexArray:
-        late = np.array([delays.get(c.quantity, 0.0) for c in self.channels])
-        return np.exp(-2j * np.pi * np.multiply.outer(self.lines.whole_frequencies, late))
+    def _vector(self, quantity: str) -> PhasorBlock:
+        places = self.pick(quantity)
+        lost = self.lost[:, places].max(axis=1, initial=0.0)
+        return PhasorBlock(
+            self.plane(quantity, self.z), self.plane(quantity, np.asarray(self.mean, complex)).real, lost
+        )
 
     def divided(self, gains: ComplexArray) -> RunPhasors:
         """The run without gains of its channels at the whole record's lines, (n_whole_lines, n_channels)."""
@@ -116,26 +104,15 @@ class RunPhasors:
         record = self.record / gains if len(self.record) else self.record
         return replace(self, z=self.z / gains[: self.z.shape[1]], record=record, residual=residual)
 
-    def with_record(
-        self, record: ComplexArray, residual: tuple[ComplexArray, ...], delays: Mapping[str, float]
-    ) -> RunPhasors:
-        """The run with phasors and residual of its whole record, without delays of whole quantities."""
-        late = self._late(delays)
-        return replace(self, record=record / late, residual=tuple(bins / gain for bins, gain in zip(residual, late)))
+    def film_force(self, values: ComplexArray) -> ComplexArray:
+        """X and Y (.., 2) of the oil force [N] by values (.., n_channels) of all channels."""
+        moves = bool(self.pick("acceleration"))
+        a = self.plane("acceleration", values) if moves else None
+        return oil_force(self.plane("force", values), a, self.housing_mass if moves else 0.0)
 
     def oil_force(self, line: int | slice = 0) -> ComplexArray:
         """Oil-force phasors at one line, shape (n, 2) [N], or at several, (n, n_lines, 2)."""
-        a = None if self.acceleration is None else self.acceleration.phasors[:, line]
-        return oil_force(self.cell_force.phasors[:, line], a, 0.0 if a is None else self.housing_mass)
-
-
-def _patterns(usable: BoolArray) -> list[tuple[BoolArray, list[int]]]:
-    """Windows by the channels that they say something of: windows (n,) and places of the channels, two at least."""
-    if usable.all():
-        return [(np.ones(len(usable), dtype=bool), list(range(usable.shape[1])))]
-    patterns, pattern_of = np.unique(usable, axis=0, return_inverse=True)
-    table = [(pattern_of.ravel() == k, np.flatnonzero(pattern).tolist()) for k, pattern in enumerate(patterns)]
-    return [(rows, members) for rows, members in table if len(members) > 1]
+        return self.film_force(self.z[:, line])
 
 
 def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | None, housing_mass: float) -> ComplexArray:
@@ -149,3 +126,13 @@ def oil_force(cell_force: ComplexArray, housing_acceleration: ComplexArray | Non
     if housing_acceleration is None:
         return np.asarray(cell_force, dtype=complex)
     return np.asarray(cell_force + housing_mass * housing_acceleration, dtype=complex)
+
+
+def complex_median(z: ComplexArray) -> ComplexArray:
+    """Median of real and imaginary parts over the first axis; `z` (n, ...)."""
+    return np.asarray(np.median(z.real, axis=0) + 1j * np.median(z.imag, axis=0))
+
+
+def phasor_noise(run: RunPhasors, rate: float) -> FloatArray:
+    """Standard deviation of a window's phasor by what its lines leave, channel by channel (n_channels,)."""
+    return np.maximum(2 * usual_scale(run.scale) / np.sqrt(run.length * rate), np.finfo(float).tiny)

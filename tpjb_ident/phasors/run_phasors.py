@@ -14,7 +14,7 @@ import numpy as np
 from rigdata.problem import refuse
 from rigdata.run import Run
 from tpjb_ident.conditions import merged
-from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition, unclipped_readings
+from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
 from tpjb_ident.phasors.extraction import extract
 from tpjb_ident.phasors.found_lines import lines_beside, near_line, unexpected_lines
 from tpjb_ident.phasors.frequency import DRIFT, device_rates, retuned, tuned
@@ -23,7 +23,7 @@ from tpjb_ident.phasors.reading_cache import SHORT, beginning_of, with_kept_begi
 from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.phasors.shaft import ShaftCourse, shaft_speed
 from tpjb_ident.phasors.stretches import longest_stretch
-from tpjb_ident.phasors.whole_record import WholeRecord, record_phasors, residual_beside, whole_records
+from tpjb_ident.phasors.whole_record import WholeRecord, whole_records, with_record
 from tpjb_ident.phasors.windows import RecordTooShortError
 
 
@@ -35,64 +35,33 @@ def run_phasors(run: Run, housing_mass: float, settings: PhasorSettings | None =
         cure = "Excite with sines, or leave the run out"
         raise refuse(run.file, "excitation", text, cure, run.id)
     run = with_kept_beginning(run)
-    unclipped_readings(run)
-    inspection = _inspected(run, housing_mass, settings)
-    result, slower = inspection.result, inspection.slower
-    if inspection.run.length < run.length:
-        result = _continued(run, inspection, settings)
+    fit = _beginning_fit(run, housing_mass, settings)
+    if fit.run.length < run.length:
+        fit.extend(run)
+    result, slower = fit.result, fit.slower
     device = tuple(
         f"{slower[c.name].rate:.4g} Hz" if c.name in slower else d for c, d in zip(result.channels, result.device)
     )
-    conditions = merged(result.conditions, slower_condition(slower))
-    return compensated(replace(result, conditions=conditions, device=device), run, slower)
+    conditions = merged(fit.conditions, result.lines.conditions, slower_condition(slower))
+    return compensated(replace(result, conditions=conditions, device=device), run, slower, settings.delays)
 
 
-def _inspected(run: Run, housing_mass: float, settings: PhasorSettings) -> _Inspection:
-    """Inspection of a run, of the beginning of a long one."""
+def _beginning_fit(run: Run, housing_mass: float, settings: PhasorSettings) -> _RunFit:
+    """Fit of a run, of the beginning of a long one."""
     if run.length > SHORT:
         try:
-            return _Inspection(beginning_of(run, SHORT), housing_mass, settings)
+            return _RunFit(beginning_of(run, SHORT), housing_mass, settings)
         except RecordTooShortError:  # the beginning is not enough; all of it may be
             pass
-    return _Inspection(run, housing_mass, settings)
+    return _RunFit(run, housing_mass, settings)
 
 
-def _continued(run: Run, inspection: _Inspection, settings: PhasorSettings) -> RunPhasors:
-    """All of a long run, with the lines of its beginning."""
-    first, mass = inspection.result, inspection.result.housing_mass
-    lines = first.lines
-    conditions = tuple(c for c in first.conditions if c not in lines.conditions and c != DRIFT)
-    clocks = inspection.clocks
-    result = _stretch(run, mass, settings, lines, None, clocks)
-    better = tuned(run, result, inspection.driven, lines.speed, settings)
-    if better is not None:
-        conditions = merged(conditions, better.conditions)
-        quick = retuned(result, better.lines) if better.follow is None else None
-        result = quick or _stretch(run, mass, settings, better.lines, better.follow, clocks)
-    # the noise of a phasor of the whole record is less than that of its beginning
-    share = np.sqrt(inspection.run.length / run.length)
-    residual = tuple(share * bins for bins in first.residual)
-    conditions = merged(conditions, result.lines.conditions)
-    return replace(result, conditions=conditions, record=first.record, residual=residual)
-
-
-def _stretch(
-    run: Run,
-    housing_mass: float,
-    settings: PhasorSettings,
-    lines: LineSet,
-    follow: ShaftCourse | None,
-    clocks: Mapping[str, float] | None = None,
-) -> RunPhasors:
-    """Windows of the run's longest stretch of one excitation."""
-    return longest_stretch(extract(run, housing_mass, settings, lines, follow, clocks), run.sample_rate)
-
-
-class _Inspection:
+class _RunFit:
     """Fit of a record: lines that nobody mentioned are looked for, wrong frequencies put right, and fitted again."""
 
     result: RunPhasors
     records: tuple[WholeRecord, ...]
+    follow: ShaftCourse | None
     clocks: Mapping[str, float] | None = None
 
     def __init__(self, run: Run, housing_mass: float, settings: PhasorSettings) -> None:
@@ -100,7 +69,7 @@ class _Inspection:
         self.driven = settings.excitation_lines or (run.point.excitation_hz,)
         speed, self.conditions = shaft_speed(run)
         self._fit(self._lines(self.driven, speed, ()), None)
-        self.slower = filled_channels(self.records, self.result)
+        self.slower = filled_channels(run)
         if settings.find_lines:
             self._add_unexpected(speed)
         better = tuned(run, self.result, self.driven, speed, settings)
@@ -112,10 +81,25 @@ class _Inspection:
             self._fit(self.result.lines, self.follow)
         if settings.find_lines:
             self._add_near()
-        channels, lines = len(self.result.channels), self.result.lines
-        residual = tuple(residual_beside(self.records, i, channels) for i in range(len(lines.excitation)))
-        result = replace(self.result, conditions=self.conditions + lines.conditions)
-        self.result = result.with_record(record_phasors(self.records, channels), residual, settings.delays)
+        self.result = with_record(self.result, self.records)
+
+    def extend(self, run: Run) -> None:
+        """Fit all of a long run with the lines of its beginning."""
+        first, share = self.result, np.sqrt(self.run.length / run.length)
+        self.run = run
+        self._fit_windows(first.lines, None)
+        self.conditions = tuple(c for c in self.conditions if c != DRIFT)
+        better = tuned(run, self.result, self.driven, first.lines.speed, self.settings)
+        if better is not None:
+            self.conditions += better.conditions
+            quick = retuned(self.result, better.lines) if better.follow is None else None
+            if quick is None:
+                self._fit_windows(better.lines, better.follow)
+            else:
+                self.result = quick
+        # the noise of a phasor of the whole record is less than that of its beginning
+        residual = tuple(share * bins for bins in first.residual)
+        self.result = replace(self.result, record=first.record, residual=residual)
 
     def _lines(self, excitation: tuple[float, ...], speed: float, extra: tuple[float, ...]) -> LineSet:
         run, rate = self.run, self.run.sample_rate
@@ -126,9 +110,14 @@ class _Inspection:
         return known_lines(excitation, speed, rate, self.settings.lines, extra, run.length / rate)
 
     def _fit(self, lines: LineSet, follow: ShaftCourse | None) -> None:
-        self.follow: ShaftCourse | None = follow
-        self.result = _stretch(self.run, self.mass, self.settings, lines, follow, self.clocks)
+        self._fit_windows(lines, follow)
         self.records = whole_records(self.run, self.result)
+
+    def _fit_windows(self, lines: LineSet, follow: ShaftCourse | None) -> None:
+        """Windows of the run's longest stretch of one excitation."""
+        self.follow = follow
+        windows = extract(self.run, self.mass, self.settings, lines, follow, self.clocks)
+        self.result = longest_stretch(windows, self.run.sample_rate)
 
     def _add_unexpected(self, speed: float) -> None:
         """Fit lines along that stand out of the residual, but for the images of what was filled up."""
@@ -141,7 +130,8 @@ class _Inspection:
     def _add_near(self) -> None:
         """Fit lines along that no window tells from the excitation."""
         lines = self.result.lines
-        near = [near_line(self.records, self.result, i) for i in range(len(lines.excitation))]
+        duration, rate = self.records[0].duration, self.run.sample_rate
+        near = [near_line(self.result, i, duration, rate) for i in range(len(lines.excitation))]
         beside = tuple(frequency for frequency in near if frequency is not None)
         if beside:
             exact = lines.driven

@@ -85,51 +85,40 @@ class NoiseSeries:
     mean: FloatArray  #: (m, p)
 
 
-class _Rotated:
-    """Series of one shape, each in the basis in which white and 1/f noise are both diagonal.
+def _rotated(series: Sequence[NoiseSeries], unit: float) -> list[tuple[FloatArray, FloatArray]]:
+    """Series of one shape together, k of them, each in the basis in which white and 1/f noise are both diagonal.
 
-    Every level that the search tries costs a few products of small matrices for all of them together.
+    Every level that the search tries costs a few products of small matrices for all of them together. Gives the
+    spectra (k, m) of the 1/f noise over the white, and signal, drift and values (k, m, p + 2).
     """
-
-    def __init__(self, alike: Sequence[NoiseSeries], unit: float) -> None:
-        turned = [_rotated(s, unit) for s in alike]
-        self.flicker = np.stack([spectrum for spectrum, _ in turned])
-        self.columns = np.stack([columns for _, columns in turned])
-        self.size = alike[0].mean.shape[1]
-
-    def minus_log_likelihood(self, white: float, flicker: float, drift: float) -> float:
-        """Sum over the series; levels in the unit of `__init__`."""
-        variance = white + flicker * self.flicker
-        p = self.size
-        gram = np.swapaxes(self.columns, 1, 2) @ (self.columns / variance[..., None])
-        # the drift is a random column: Woodbury takes it out of every product at once
-        u = gram[:, p]
-        inflation = 1.0 + drift**2 * u[:, p]
-        gram = gram - drift**2 * u[:, :, None] * u[:, None, :] / inflation[:, None, None]
-        xx, xy, yy = gram[:, :p, :p], gram[:, :p, p + 1], gram[:, p + 1, p + 1]
-        log_det = np.log(variance).sum() + np.log(inflation).sum() + np.linalg.slogdet(xx)[1].sum()
-        explained = np.sum(xy * np.linalg.solve(xx, xy[..., None])[..., 0])
-        return 0.5 * float(log_det + yy.sum() - explained)
-
-
-def _rotated(series: NoiseSeries, unit: float) -> tuple[FloatArray, FloatArray]:
-    """Spectrum (m,) of the 1/f noise over the white, and signal, drift and values (m, p + 2) in its basis."""
-    root = np.sqrt(series.duration)
-    kernel = flicker_kernel(series.time, series.duration) * np.outer(root, root)
-    spectrum, basis = np.linalg.eigh(kernel)
-    scale = np.maximum(np.max(np.abs(series.mean), axis=0), 1e-300)
-    mean, _ = np.linalg.qr((series.mean / scale) * root[:, None])
-    drift = (series.time - np.mean(series.time)) * root
-    columns = np.column_stack([mean, drift, series.values / unit * root])
-    return np.maximum(spectrum, 0.0), basis.T @ columns
-
-
-def _by_shape(series: Sequence[NoiseSeries]) -> list[list[NoiseSeries]]:
-    """Series grouped by their numbers of blocks and of signal columns."""
-    groups: dict[tuple[int, ...], list[NoiseSeries]] = {}
+    groups: dict[tuple[int, ...], list[tuple[FloatArray, FloatArray]]] = {}
     for samples in series:
-        groups.setdefault(samples.mean.shape, []).append(samples)
-    return list(groups.values())
+        root = np.sqrt(samples.duration)
+        kernel = flicker_kernel(samples.time, samples.duration) * np.outer(root, root)
+        spectrum, basis = np.linalg.eigh(kernel)
+        scale = np.maximum(np.max(np.abs(samples.mean), axis=0), 1e-300)
+        mean, _ = np.linalg.qr((samples.mean / scale) * root[:, None])
+        drift = (samples.time - np.mean(samples.time)) * root
+        columns = np.column_stack([mean, drift, samples.values / unit * root])
+        groups.setdefault(samples.mean.shape, []).append((np.maximum(spectrum, 0.0), basis.T @ columns))
+    stacks = (zip(*alike) for alike in groups.values())
+    return [(np.stack(spectra), np.stack(columns)) for spectra, columns in stacks]
+
+
+def _minus_log_likelihood(spectra: FloatArray, columns: FloatArray, levels: FloatArray) -> float:
+    """Sum over series of one shape; white, 1/f and drift `levels` (3,) in the unit of `_rotated`."""
+    white, flicker, drift = levels
+    variance = white + flicker * spectra
+    p = columns.shape[2] - 2
+    gram = np.swapaxes(columns, 1, 2) @ (columns / variance[..., None])
+    # the drift is a random column: Woodbury takes it out of every product at once
+    u = gram[:, p]
+    inflation = 1.0 + drift**2 * u[:, p]
+    gram = gram - drift**2 * u[:, :, None] * u[:, None, :] / inflation[:, None, None]
+    xx, xy, yy = gram[:, :p, :p], gram[:, :p, p + 1], gram[:, p + 1, p + 1]
+    log_det = np.log(variance).sum() + np.log(inflation).sum() + np.linalg.slogdet(xx)[1].sum()
+    explained = np.sum(xy * np.linalg.solve(xx, xy[..., None])[..., 0])
+    return 0.5 * float(log_det + yy.sum() - explained)
 
 
 def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift: bool = True) -> NoiseModel:
@@ -139,16 +128,16 @@ def estimate_noise(series: Sequence[NoiseSeries], drift_rate: float, learn_drift
         raise BadInputError("no series is long enough to learn noise from: record longer holds")
     white = float(np.median([_white_level(s) for s in usable]))
     unit = np.sqrt(white)
-    rotated = [_Rotated(alike, unit) for alike in _by_shape(usable)]
+    rotated = _rotated(usable, unit)
     prior = np.log(drift_rate / unit)
     spread = 1.0 if learn_drift else _PINNED
 
     def objective(logs: FloatArray) -> float:
-        w, f, d = np.exp(np.clip(logs, -30.0, 30.0))
-        total = sum(r.minus_log_likelihood(w, f, d) for r in rotated)
+        levels = np.exp(np.clip(logs, -30.0, 30.0))
+        total = sum(_minus_log_likelihood(*alike, levels) for alike in rotated)
         # probes that flicker more drift more; beyond that, a level that the data do not feel (no 1/f at all) must
         # not run away to minus infinity
-        expected = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * f)
+        expected = 0.5 * np.log(np.exp(2.0 * prior) + DRIFT_OVER_FLICKER**2 * levels[1])
         total += 0.5 * ((logs[2] - expected) / spread) ** 2
         return total + 0.5 * (logs[1] / 5.0) ** 2 + 0.5 * (logs[0] / 5.0) ** 2
 

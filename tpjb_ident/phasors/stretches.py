@@ -12,9 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from tpjb_ident.phasors.line_fit import usual_scale
-from tpjb_ident.phasors.line_means import complex_median
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import RunPhasors, complex_median, phasor_noise
 
 #: Windows of a stretch, at least.
 _LEAST = 3
@@ -31,9 +29,9 @@ _ACROSS = 0.05
 def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     """The run with the windows of its longest stretch alone; those of others give no phasor."""
     driven = len(result.lines.excitation)
-    noise = usual_scale(result.scale) * 2 / np.sqrt(result.length * rate)
+    noise = phasor_noise(result, rate)
     live = np.isfinite(noise) & np.array([c.quantity != "acceleration" for c in result.channels])
-    z = result.z[:, :driven, live] / np.maximum(noise[live], np.finfo(float).tiny)
+    z = result.z[:, :driven, live] / noise[live]
     quantity = np.array([c.quantity for c, is_live in zip(result.channels, live) if is_live])
     good = np.flatnonzero(np.isfinite(z).all(axis=(1, 2)))
     if len(good) < _LEAST or len(set(quantity)) < 2:

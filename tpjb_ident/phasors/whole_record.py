@@ -33,7 +33,7 @@ class WholeRecord:
     """One device's record, fitted as one window."""
 
     lines: LineSet
-    places: tuple[int, ...]  #: of its channels among those of the run
+    places: list[int]  #: of its channels among those of the run
     z: ComplexArray  #: (n_whole_lines, n_channels): NaN where the rate does not show a line
     used: FloatArray  #: (n_channels,): share of the samples that are neither missing nor bad
     residual: FloatArray  #: (n_channels, n), SI: bad samples are zero
@@ -95,10 +95,20 @@ def fitted_whole(
     fit, residual = fitter.fit_with_residual(samples.rows[:, None], np.array([start]))
     z = np.full((len(shown), len(places)), np.nan + 0j)
     z[shown] = fit.z[0]
-    return WholeRecord(lines, tuple(places), z, 1 - fit.lost[0], residual[:, 0], rate, start)
+    return WholeRecord(lines, places, z, 1 - fit.lost[0], residual[:, 0], rate, start)
 
 
-def residual_beside(records: tuple[WholeRecord, ...], driven: int, channels: int) -> ComplexArray:
+def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhasors:
+    """The run with the phasors of its whole record, and what that leaves around its excitation lines."""
+    channels = len(result.channels)
+    z = np.full((len(records[0].z), channels), np.nan + 0j)
+    for record in records:
+        z[:, record.places] = record.z
+    residual = tuple(_beside(records, i, channels) for i in range(len(result.lines.excitation)))
+    return replace(result, record=z, residual=residual)
+
+
+def _beside(records: tuple[WholeRecord, ...], driven: int, channels: int) -> ComplexArray:
     """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
     first = records[0]
     frequencies = first.lines.whole_frequencies * first.duration
@@ -112,11 +122,3 @@ def residual_beside(records: tuple[WholeRecord, ...], driven: int, channels: int
         within = at < len(record.spectrum)
         beside[np.ix_(within, record.places)] = record.spectrum[at[within]]
     return beside
-
-
-def record_phasors(records: tuple[WholeRecord, ...], channels: int) -> ComplexArray:
-    """Phasors (n_whole_lines, n_channels) of all lines."""
-    z = np.full((len(records[0].z), channels), np.nan + 0j)
-    for record in records:
-        z[:, list(record.places)] = record.z
-    return z

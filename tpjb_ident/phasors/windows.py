@@ -97,18 +97,14 @@ def plan_windows(n_samples: int, rate: float, lines: LineSet, settings: WindowSe
     available = n_samples / rate
     # Very long records are cut into more windows, not into windows that fill the memory.
     wanted = settings.length or max(shortest, min(available / settings.target_count, MAX_SAMPLES / rate))
-    if settings.length and settings.length < shortest * 0.999:
-        raise RecordTooShortError(
-            f"a window of {settings.length:g} s cannot tell the lines apart "
-            f"(nearest neighbours of the excitation {_gap(lines):.3g} Hz away); it takes {shortest:.3g} s",
-            shortest,
-        )
-    if available < shortest * 0.999:
-        raise RecordTooShortError(
-            f"the record of {available:.3g} s cannot tell the excitation from a line {_gap(lines):.3g} Hz "
-            f"away; it takes at least {shortest:.3g} s",
-            shortest,
-        )
+    limits = [("a window", settings.length or math.inf), ("the record", available)]
+    for name, seconds in limits:
+        if seconds < shortest * 0.999:
+            raise RecordTooShortError(
+                f"{name} of {seconds:.3g} s cannot tell the lines apart: the nearest to the excitation is "
+                f"{_gap(lines):.3g} Hz away; it takes at least {shortest:.3g} s",
+                shortest,
+            )
     count = max(1, int(available / wanted + 1e-9))
     return n_samples // count if settings.length is None else round(wanted * rate), count
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigdata.campaign import Campaign
+from rigdata.problem import RigDataError
+from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimators.estimate import estimate_table
@@ -42,6 +44,10 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
     runs = campaign.of_kind("baseline")
     if not runs:
         return DryTest()
+    for run in runs:
+        errors = [f.problem for f in observe(run).report.found if f.problem.severity == "error"]
+        if errors:  # clipped or dead: there is no dry test without its channels
+            raise RigDataError(errors)
     points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])
     estimates = [estimate_table(phasor_table(p.D, p.F, p.run_index), p.omega, method) for p in points]
     good = sorted((est for est in estimates if np.isfinite(est.covariance).all()), key=lambda est: est.omega)

@@ -13,6 +13,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, totals
 from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
+from tpjb_ident.estimate.shape import real_numbers
 from tpjb_ident.estimate.term import Additive, Fitted, Parameter
 
 #: Name of the condition where the runs tell G.
@@ -56,7 +57,7 @@ class Amplitude(Additive):
         part = slice(first, first + _NUMBERS)
         if not fitted.estimated[part].any():
             return ()
-        entries = np.concatenate([h.real.ravel(), h.imag.ravel()])
+        entries = real_numbers(h)
         share = float(np.linalg.norm(fitted.value[part] * entries) / np.linalg.norm(entries))
         text = f"h at the runs' mean amplitude differs by {100 * share:.1f} % from that at none"
         return (Condition(ZERO_AMPLITUDE, f"{text}; K and C are those at none, by the runs' several amplitudes"),)

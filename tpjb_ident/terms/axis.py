@@ -25,9 +25,8 @@ class Axis(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """(-sin, cos) times the vector that the sensor measures."""
         columns = self.no_columns(blocks)
-        d, a = state.u[:, :2], state.u[:, 2:]
-        force = np.einsum("nij,nj->ni", state.at_run(blocks), d) - self.rig.mass * a
-        vectors = {"displacement": d, "force": force, "acceleration": a}
+        force = state.cell_force(self.rig, blocks)
+        vectors = {"displacement": state.u[:, :2], "force": force, "acceleration": state.u[:, 2:]}
         for k, j in enumerate(self._rows):
             across = np.stack([-blocks.along[:, j, 1], blocks.along[:, j, 0]], axis=1)
             measured = vectors[self.rig.sensors[j].quantity]

@@ -18,7 +18,7 @@ from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_forces, entry_sizes, film_force_rows
 from tpjb_ident.estimate.noise import scatter_patterns
-from tpjb_ident.estimate.term import Additive, Parameter
+from tpjb_ident.estimate.term import Additive, Parameter, of_groups
 
 #: Change of H over the squared motion of a band and of two tones, over a blow's peak in one sense, in both its square.
 _BAND, _PAIR, _BLOW, _BLOWS = 20.0, 10.0, 1.5, 5.0
@@ -74,13 +74,10 @@ class Distortion(Additive):
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """G d in the cells, G a share of every entry of H."""
-        columns = self.no_columns(blocks)
         force = entry_forces(entry_sizes(state.h[blocks.point]), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
-        for n, b in enumerate(self._bent):
-            mine = self._band[blocks.point] == b
-            columns[mine, :, _NUMBERS * n : _NUMBERS * (n + 1)] = rows[mine]
-        return columns
+        bands = [self._bent.index(b) if b in self._bent else -1 for b in self._band[blocks.point].tolist()]
+        return of_groups(rows, np.array(bands, dtype=np.intp), len(self._bent))
 
     def random_effects(self, blocks: Blocks, state: State) -> ComplexArray | None:
         """The film's force at every line of one phase set, along X and Y: cells and housing answer to it alike."""

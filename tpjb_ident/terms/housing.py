@@ -91,12 +91,11 @@ class Housing(Term):
         """In the housing's own rows."""
         columns = self.no_columns(blocks)
         m, square = blocks.z.shape[1], blocks.omega**2
-        d, a = state.u[:, :2], state.u[:, 2:]
         if self.rig.mount != "cells":
-            columns[:, m:, 0] = -square[:, None] * d
+            columns[:, m:, 0] = -square[:, None] * state.u[:, :2]
             columns[:, m:, 1:] = -1j * columns[:, m:, :1]
             return columns
-        force = np.einsum("nij,nj->ni", state.at_run(blocks), d) - self.rig.mass * a
+        force = state.cell_force(self.rig, blocks)
         loss = complex(1 - 1j * state.parameters[self.name][3])
         scaled = square[:, None] * _NANOMETRE * loss * force
         columns[:, m, 0], columns[:, m + 1, 1] = scaled[:, 0], scaled[:, 1]

@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, film_force_rows
-from tpjb_ident.estimate.term import Additive, Parameter
+from tpjb_ident.estimate.term import Additive, Parameter, of_groups
 from tpjb_ident.terms.load_turn import LoadTurn
 
 #: Least standard deviation of a run's load against its set point: actuators are no better (relative, and rad).
@@ -42,15 +42,10 @@ class Load(Additive):
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """DH / d ln W d, and dH / d alpha d, in the cells."""
-        columns = self.no_columns(blocks)
         d = state.u[:, :2]
         force = np.einsum("nij,nj->ni", state.slope[blocks.point], d)
         size = film_force_rows(self.rig, blocks, state, force[:, :, None])[:, :, 0]
         numbers = state.parameters.get(self.turn.name)
-        turn = self.turn.turned(blocks, state, numbers) if numbers is not None and len(numbers) else None
-        places = np.arange(len(blocks))
-        family = self._family[blocks.point]
-        columns[places, :, 2 * family] = size
-        if turn is not None:
-            columns[places, :, 2 * family + 1] = turn
-        return columns
+        turn = self.turn.turned(blocks, state, numbers) if numbers is not None and len(numbers) else 0 * size
+        rows = np.stack([size, turn], axis=2)
+        return of_groups(rows, self._family[blocks.point], len(self.turn.families))

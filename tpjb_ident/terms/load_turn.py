@@ -17,7 +17,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State, entry_forces, film_force_rows
-from tpjb_ident.estimate.term import Additive, Parameter
+from tpjb_ident.estimate.term import Additive, Parameter, of_groups
 
 #: Plausible of a bearing: relative slope [1/rad], and its change per unit of ln W, one standard deviation.
 PLAUSIBLE = (1.5, 0.75)
@@ -52,11 +52,7 @@ class LoadTurn(Additive):
         size = np.repeat(direct * [1.0, 1j], 4, axis=1)
         force = entry_forces(np.concatenate([size, log_load * size], axis=1), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
-        columns = np.zeros((*rows.shape[:2], _NUMBERS * len(self.families)), complex)
-        for k in range(len(self.families)):
-            mine = self._family[blocks.point] == k
-            columns[mine, :, _NUMBERS * k : _NUMBERS * (k + 1)] = rows[mine]
-        return columns
+        return of_groups(rows, self._family[blocks.point], len(self.families))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """Readings per unit of every number, each run turned by its own miss."""
