@@ -178,7 +178,10 @@ def fit_sides(
         mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
         share = np.divide(mean_carried, full[pads], out=np.zeros(r), where=full[pads] > 0)
         distances[pads, pads] += (share * full_se[pads]) ** 2
-    return SideFit(*columns.T[:3], distances, *columns.T[3:], scale, scale_se, noise, misfit)
+    distance, tilt, tilt_se, deflection, deflection_se = columns.T
+    return SideFit(
+        distance, tilt, tilt_se, distances, deflection, deflection_se, scale, scale_se, noise, misfit,
+    )  # fmt: skip
 
 
 def _under_push(curves: Sequence[PivotCurve], push: float, count: int) -> tuple[FloatArray, FloatArray]:
