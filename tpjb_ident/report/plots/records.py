@@ -211,7 +211,6 @@ def _multiple_coherence(
 
 
 _FLAGGED = 0.9
-
 _SMALLEST = 1e-7
 
 
@@ -254,7 +253,6 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
 
 
 _REJECTED = 0.3
-
 _NAMED = 6  # rejected windows that are named in the picture
 
 
