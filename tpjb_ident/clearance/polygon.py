@@ -26,7 +26,7 @@ that pad, 0.32 D on the two opposite and -0.12 D on the two beside it (five pads
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -146,28 +146,6 @@ def _pivot_deflection(curves: Sequence[PivotCurve], pad: IntArray, load: FloatAr
     return deflection
 
 
-@dataclass(frozen=True)
-class _System:
-    """The used averages, whitened together."""
-
-    contact: ContactIntervals  #: m averages
-    place: FloatArray  #: (m,) along the side [m]
-    whitener: FloatArray  #: (m, m) [1/m]
-    pads: IntArray  #: (r,) reached, from 0
-    count: int  #: of all pads
-    noise: NoiseModel
-
-    @property
-    def of_pad(self) -> FloatArray:
-        """Columns (m, r): one where the average is of that reached pad."""
-        return (self.contact.pad[:, None] == self.pads[None, :]).astype(float)
-
-    @property
-    def design(self) -> FloatArray:
-        """Columns (m, 2 r): distance and turn of every reached side."""
-        return np.hstack([self.of_pad, -self.of_pad * self.place[:, None]])
-
-
 def fit_sides(
     contact: ContactIntervals, angles: FloatArray, reached: BoolArray, curves: Sequence[PivotCurve] | None
 ) -> SideFit:
@@ -176,10 +154,62 @@ def fit_sides(
     usable = reached[contact.pad] & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
-    deflection = _pivot_deflection(curves or (), used.pad, used.load)
-    whitener = _whitener(used, angles, noise, _SLIDING * deflection * used.alone)
-    system = _System(used, place, whitener, np.flatnonzero(reached), len(angles), noise)
-    return _solve_unknown(system) if curves is None else _solve_known(system, curves)
+    carried = _pivot_deflection(curves or (), used.pad, used.load)
+    whitener = _whitener(used, angles, noise, _SLIDING * carried * used.alone)
+    count, pads = len(angles), np.flatnonzero(reached)
+    r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
+    pivots, precision, mean = _pivot_terms(used, of_pad, curves, count)
+    design = np.hstack([of_pad, -of_pad * place[:, None], pivots])
+    prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
+    beta, covariance, misfit = _least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean])
+    columns = np.full((count, 5), np.nan)  # of every pad: distance, turn and its error, deflection and its error
+    errors = np.sqrt(np.diag(covariance))
+    columns[pads, :3] = np.column_stack([beta[:r], beta[r : 2 * r], errors[r : 2 * r]])
+    distances = np.full((count, count), np.nan)
+    distances[np.ix_(pads, pads)] = covariance[:r, :r]
+    scale = scale_se = np.nan
+    if curves is None:
+        columns[pads, 3:] = np.column_stack([beta[2 * r : 3 * r], errors[2 * r : 3 * r]])
+    else:
+        full, full_se = _under_push(curves, used.push, count)
+        scale, scale_se = float(beta[-1]), float(errors[-1])
+        columns[:, 3], columns[:, 4] = scale * full, full_se
+        # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean
+        mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
+        share = np.divide(mean_carried, full[pads], out=np.zeros(r), where=full[pads] > 0)
+        distances[pads, pads] += (share * full_se[pads]) ** 2
+    distance, tilt, tilt_se, deflection, deflection_se = columns.T
+    return SideFit(
+        distance, tilt, tilt_se, distances, deflection, deflection_se, scale, scale_se, noise, misfit,
+    )  # fmt: skip
+
+
+def _under_push(curves: Sequence[PivotCurve], push: float, count: int) -> tuple[FloatArray, FloatArray]:
+    """Deflection of every pivot (n,) [m] under the push [N] by its curve, and its standard error."""
+    full, error = _pivot_deflection(curves, np.arange(count), np.full(count, push)), np.zeros(count)
+    for curve in curves:
+        low, high = curve.secant_band(push, _ONE_SIGMA)
+        error[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(high / low))
+    return full, error
+
+
+def _pivot_terms(
+    contact: ContactIntervals, of_pad: FloatArray, curves: Sequence[PivotCurve] | None, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What the pivots add to the design (m, k), with the precisions and the means (k,) of their prior.
+
+    Without curves every pivot's deflection in proportion to its load, and one curvature for all pads; with them the
+    curves' shape and size, each times one common factor.
+    """
+    w = np.maximum(contact.load, 0.0) / contact.push
+    bend = np.cbrt(w) ** 2 - w
+    if curves is None:
+        precision = np.zeros(of_pad.shape[1] + 1)
+        precision[-1] = _CURVATURE_SPREAD**-2
+        return np.column_stack([of_pad * w[:, None], bend]), precision, np.zeros(len(precision))
+    full = _pivot_deflection(curves, np.arange(count), np.full(count, contact.push))
+    columns = [full[contact.pad] * bend, _pivot_deflection(curves, contact.pad, contact.load)]
+    return np.column_stack(columns), np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])
 
 
 def _place_along_side(contact: ContactIntervals, angles: FloatArray, reached: BoolArray) -> FloatArray:
@@ -245,63 +275,12 @@ def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, 
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
-def _solve_known(system: _System, curves: Sequence[PivotCurve]) -> SideFit:
-    """Sides with the pivots' deflections from their curves, times one common factor near one."""
-    pad, push = system.contact.pad, system.contact.push
-    full = _pivot_deflection(curves, np.arange(system.count), np.full(system.count, push))
-    deflection = _pivot_deflection(curves, pad, system.contact.load)
-    w = np.maximum(system.contact.load, 0.0) / push
-    shape = full[pad] * (np.cbrt(w) ** 2 - w)
-    design = np.column_stack([system.design, shape, deflection])
-    prior, mean = np.zeros(design.shape[1]), np.zeros(design.shape[1])
-    prior[-2:] = _SHAPE_SPREAD**-2, _SCALE_SPREAD**-2
-    mean[-1] = 1.0
-    beta, covariance, misfit = _least_squares(system, design, prior, mean)
-    deflection_se = np.zeros(system.count)
-    for curve in curves:
-        lo, hi = curve.secant_band(push, _ONE_SIGMA)
-        deflection_se[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(hi / lo))
-    sides = _sides(system, beta, covariance, misfit)
-    # an error of a curve shifts its side by the share of the deflection that the sweep's averages carry on the mean
-    carried = np.zeros(system.count)
-    for k in system.pads:
-        carried[k] = np.mean(deflection[pad == k])
-    share = np.divide(carried, full, out=np.zeros_like(full), where=full > 0)
-    return replace(
-        sides,
-        covariance=sides.covariance + np.diag((share * deflection_se) ** 2),
-        deflection=beta[-1] * full,
-        deflection_se=deflection_se,
-        scale=float(beta[-1]),
-        scale_se=float(np.sqrt(covariance[-1, -1])),
-    )
-
-
-def _solve_unknown(system: _System) -> SideFit:
-    """Sides with every pivot's deflection fitted in proportion to its load, and one curvature for all pads."""
-    w = np.maximum(system.contact.load, 0.0) / system.contact.push
-    design = np.column_stack([system.design, system.of_pad * w[:, None], np.cbrt(w) ** 2 - w])
-    prior = np.zeros(design.shape[1])
-    prior[-1] = _CURVATURE_SPREAD**-2
-    beta, covariance, misfit = _least_squares(system, design, prior, np.zeros(design.shape[1]))
-    sides = _sides(system, beta, covariance, misfit)
-    r = len(system.pads)
-    deflection, se = np.full(system.count, np.nan), np.full(system.count, np.nan)
-    deflection[system.pads] = beta[2 * r : 3 * r]
-    se[system.pads] = np.sqrt(np.diag(covariance)[2 * r : 3 * r])
-    return replace(sides, deflection=deflection, deflection_se=se)
-
-
 def _least_squares(
-    system: _System, design: FloatArray, prior: FloatArray, mean: FloatArray
+    whitener: FloatArray, along: FloatArray, design: FloatArray, prior: FloatArray, mean: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
     """Generalised least squares with a Gaussian prior: values, covariance, whitened misfit."""
-    r = len(system.pads)
-    prior = prior.copy()
-    prior[r : 2 * r] = _TILT_SPREAD**-2
     unit = np.max(np.abs(design), axis=0)
-    x = system.whitener @ (design / unit)
-    y = system.whitener @ system.contact.along
+    x, y = whitener @ (design / unit), whitener @ along
     scaled = np.diag(prior / unit**2)
     covariance = np.linalg.inv(x.T @ x + scaled)
     beta = covariance @ (x.T @ y + scaled @ (mean * unit))
@@ -309,16 +288,3 @@ def _least_squares(
     # what the noise model does not explain widens the intervals; a lucky sweep does not narrow them
     covariance = covariance * max(misfit, 1.0)
     return beta / unit, covariance / np.outer(unit, unit), misfit
-
-
-def _sides(system: _System, beta: FloatArray, covariance: FloatArray, misfit: float) -> SideFit:
-    """Distances and turns of all pads, NaN where not reached; without the pivots' deflections."""
-    r, pads = len(system.pads), system.pads
-    empty = np.full(system.count, np.nan)
-    distance, tilt, tilt_se = empty.copy(), empty.copy(), empty.copy()
-    distance[pads] = beta[:r]
-    tilt[pads] = beta[r : 2 * r]
-    tilt_se[pads] = np.sqrt(np.diag(covariance)[r : 2 * r])
-    full = np.full((system.count, system.count), np.nan)
-    full[np.ix_(pads, pads)] = covariance[:r, :r]
-    return SideFit(distance, tilt, tilt_se, full, empty, empty, np.nan, np.nan, system.noise, misfit)

@@ -141,9 +141,7 @@ def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
     found = agreements(comparison.table)
     best = closest(found)
     sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
-    if best is None:
-        sentences.append("No coefficient could be compared: see the quality flags.")
-    else:
+    if best is not None:
         points = max(d.n for d in best.deviations)
         with_best = f"The prediction comes closest with {_in_words(best.pivots)}: {best.medians}"
         sentences.append(f"{with_best} (median over {points} points).")

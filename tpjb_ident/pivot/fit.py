@@ -8,7 +8,6 @@ errors? The worst goes first, then the remainder is tested again without it.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
@@ -295,25 +294,19 @@ def _steps(record: DryRecord, law: LawFit, noise: NoiseModel, zero: float) -> Pi
     """Points of one run, counted from the reading `zero` [m]."""
     blocks = record.blocks
     groups = blocks.hold if record.holds else np.arange(len(blocks))
-    rows = []
-    for group in np.unique(groups[groups >= 0]):
-        members = groups == group
-        duration = blocks.duration[members]
-        share = duration / duration.sum()
-        branch = int(blocks.branch[members][0])
-        rows.append(
-            (
-                float(share @ blocks.load[members]) * (1.0 - law.theta[FRICTION] * branch),
-                float(share @ blocks.deflection[members]) - zero - law.theta[OFFSET],
-                math.sqrt(noise.mean_variance(float(duration.sum()))),
-                float(share @ blocks.across_load[members]),
-                float(share @ blocks.across[members]) - float(blocks.across[0]),
-                branch,
-                float(record.good[members].all()),
-            )
-        )
-    load, deflection, se, across_load, across, branches, weight = np.array(rows).T
-    return PivotSteps(load, deflection, se, across_load, across, branches.astype(int), weight)
+    members = np.unique(groups[groups >= 0])[:, None] == groups
+    duration = members @ blocks.duration
+    share = members * blocks.duration / duration[:, None]
+    branch = blocks.branch[np.argmax(members, axis=1)]
+    return PivotSteps(
+        load=share @ blocks.load * (1.0 - law.theta[FRICTION] * branch),
+        deflection=share @ blocks.deflection - zero - law.theta[OFFSET],
+        deflection_se=np.sqrt([noise.mean_variance(float(length)) for length in duration]),
+        across_load=share @ blocks.across_load,
+        across_deflection=share @ blocks.across - blocks.across[0],
+        branch=branch,
+        weight=1.0 - (members & ~record.good).any(axis=1),
+    )
 
 
 def _loop(steps: PivotSteps, law: LawFit) -> Hysteresis | None:

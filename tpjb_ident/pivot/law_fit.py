@@ -13,7 +13,7 @@ pad's own affair.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -245,17 +245,18 @@ def _minimise(initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray) -
 
 def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...]:
     """Posterior shares (n,) of the n fits of every pad."""
-    names = sorted({fit.name for candidates in fits for fit in candidates})
-    prior = {name: _SPLINE_PRIOR if name == "spline" else 1.0 for name in names}
-    prior = {name: _PSEUDO_PADS * value / sum(prior.values()) for name, value in prior.items()}
-    weights = [_pad_weights(candidates, prior) for candidates in fits]
+    names = np.array(sorted({fit.name for candidates in fits for fit in candidates}))
+    prior = np.where(names == "spline", _SPLINE_PRIOR, 1.0)
+    prior *= _PSEUDO_PADS / prior.sum()
+    # the fits of a pad by rows, the laws by columns
+    of_law = [(np.array([[fit.name] for fit in candidates]) == names).astype(float) for candidates in fits]
+    heard = [np.array([_CONTACT_VOTE if fit.contact else 1.0 for fit in candidates]) for candidates in fits]
+    weights = [_pad_weights(*pad, prior) for pad in zip(fits, of_law, strict=True)]
     for _ in range(30):
-        votes = [_votes(candidates, shares, names) for candidates, shares in zip(fits, weights, strict=True)]
-        updated = []
-        for vote, candidates in zip(votes, fits, strict=True):
-            # the other pads only: a pad's own evidence must not count twice
-            law_prior = {name: prior[name] + sum(v[name] for v in votes) - vote[name] for name in names}
-            updated.append(_pad_weights(candidates, law_prior))
+        votes = np.array([(w * h) @ laws for w, h, laws in zip(weights, heard, of_law, strict=True)])
+        # the other pads only: a pad's own evidence must not count twice
+        law_priors = prior + votes.sum(axis=0) - votes
+        updated = [_pad_weights(*pad) for pad in zip(fits, of_law, law_priors, strict=True)]
         change = max(float(np.max(np.abs(a - b))) for a, b in zip(updated, weights, strict=True))
         weights = updated
         if change < 1e-4:
@@ -263,19 +264,9 @@ def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...
     return tuple(weights)
 
 
-def _votes(candidates: Sequence[LawFit], shares: FloatArray, names: Sequence[str]) -> dict[str, float]:
-    """What one pad says of each law to the others."""
-    votes = dict.fromkeys(names, 0.0)
-    for fit, share in zip(candidates, shares, strict=True):
-        votes[fit.name] += float(share * (_CONTACT_VOTE if fit.contact else 1.0))
-    return votes
-
-
-def _pad_weights(candidates: Sequence[LawFit], law_prior: Mapping[str, float]) -> FloatArray:
-    logs = np.zeros(len(candidates))
-    for k, fit in enumerate(candidates):
-        contact_prior = _CONTACT_LOSS_PRIOR if fit.contact else 1 - _CONTACT_LOSS_PRIOR
-        logs[k] = np.log(law_prior[fit.name] * contact_prior) + fit.log_evidence
+def _pad_weights(candidates: Sequence[LawFit], of_law: FloatArray, law_prior: FloatArray) -> FloatArray:
+    contact_prior = [_CONTACT_LOSS_PRIOR if fit.contact else 1 - _CONTACT_LOSS_PRIOR for fit in candidates]
+    logs = np.log(of_law @ law_prior * contact_prior) + [fit.log_evidence for fit in candidates]
     weights = np.exp(logs - np.max(logs))
     return np.asarray(weights / weights.sum())
 

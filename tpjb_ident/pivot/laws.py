@@ -24,7 +24,9 @@ extrapolation sane where the records say nothing, and it makes the laws' evidenc
 
 from __future__ import annotations
 
-from typing import Protocol
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,11 +34,30 @@ from rigdata.arrays import FloatArray
 
 #: Values (n,) and their derivative (n, k) with respect to the shape parameters.
 WithDerivative = tuple[FloatArray, FloatArray]
+#: Of load over reference load (n,) and the shape parameters (k,).
+Shape = Callable[[FloatArray, FloatArray], WithDerivative]
 _SPHERE = 2.0 / 3.0
 
 
-class Law(Protocol):
-    """Shape of a law. `u` (n,) is load over reference load, `q` (k,) the shape parameters.
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Shape of a law.
+
+    Attributes
+    ----------
+    name : str
+        In tables and files.
+    phi, psi : callable
+        Shapes of deflection and of compliance: of load over the reference load (n,) and k shape parameters they give
+        values (n,) and their derivative (n, k) with respect to the parameters.
+    parameters : tuple of str
+        Names of the k shape parameters.
+    prior_mean : (k,) ndarray
+        Most plausible shape.
+    prior_precision : (k, k) ndarray
+        Inverse covariance of the prior.
+    bounds : (k,), (k,) ndarray
+        Lowest and highest shape parameters at which the law is monotone.
 
     Examples
     --------
@@ -46,70 +67,13 @@ class Law(Protocol):
     linear [0.5 2. ]
     """
 
-    @property
-    def name(self) -> str:
-        """Name in tables and files."""
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the k shape parameters."""
-
-    @property
-    def prior_mean(self) -> FloatArray:
-        """(k,) most plausible shape."""
-
-    @property
-    def prior_precision(self) -> FloatArray:
-        """(k, k) inverse covariance of the prior."""
-
-    @property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest shape parameters (k,), (k,) at which the law is monotone."""
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        """Deflection shape (n,) and its derivative with respect to q (n, k).
-
-        Parameters
-        ----------
-        u : (n,) ndarray
-            Load over the reference load.
-        q : (k,) ndarray
-            Parameters of the shape.
-        """
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        """Compliance shape (n,) and its derivative with respect to q (n, k).
-
-        Parameters
-        ----------
-        u : (n,) ndarray
-            Load over the reference load.
-        q : (k,) ndarray
-            Parameters of the shape.
-        """
-
-
-class _Shape:
-    """Name, parameters and prior, common to all laws but the spline; (k,) each."""
-
     name: str
-    parameters: tuple[str, ...] = ()
-    mean: tuple[float, ...] = ()
-    spread: tuple[float, ...] = ()
-    low: tuple[float, ...] = ()
-    high: tuple[float, ...] = ()
-
-    @property
-    def prior_mean(self) -> FloatArray:
-        return np.array(self.mean)
-
-    @property
-    def prior_precision(self) -> FloatArray:
-        return np.diag(1.0 / np.array(self.spread) ** 2) if self.spread else np.zeros((0, 0))
-
-    @property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        return np.array(self.low), np.array(self.high)
+    phi: Shape
+    psi: Shape
+    parameters: tuple[str, ...]
+    prior_mean: FloatArray
+    prior_precision: FloatArray
+    bounds: tuple[FloatArray, FloatArray]
 
 
 def _log(u: FloatArray) -> FloatArray:
@@ -127,106 +91,67 @@ def _compliance(u: FloatArray, p: float) -> FloatArray:
     return np.asarray(np.maximum(u, 1e-9) ** (p - 1.0))
 
 
-class _FixedPower(_Shape):
-    """Deflection as W^p: p = 1 is a constant compliance, p = 2/3 a sphere on a flat (paper, Eq. 16)."""
-
-    def __init__(self, name: str, p: float) -> None:
-        self.name, self.p = name, p
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return _raised(u, self.p), np.zeros((len(u), 0))
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        return _compliance(u, self.p), np.zeros((len(u), 0))
+#: Deflection or compliance of a contact whose deflection goes as W^p.
+_Contact = Callable[[FloatArray, float], FloatArray]
 
 
-class _HertzLine(_Shape):
+def _fixed(contact: _Contact, p: float, u: FloatArray, q: FloatArray) -> WithDerivative:
+    """Constant compliance at p = 1, sphere on a flat at p = 2/3 (paper, Eq. 16)."""
+    return contact(u, p), np.zeros((len(u), 0))
+
+
+def _in_series(contact: _Contact, u: FloatArray, q: FloatArray) -> WithDerivative:
+    """Sphere on flat with a linear compliance in series: q is the linear share at the reference load."""
+    point, line = contact(u, _SPHERE), contact(u, 1.0)
+    return (1.0 - q[0]) * point + q[0] * line, (line - point)[:, None]
+
+
+def _power_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    value = _raised(u, q[0])
+    return value, (value * (_log(u) - 1.0 / q[0]))[:, None]
+
+
+def _power_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    value = _compliance(u, q[0])
+    return value, (value * _log(u))[:, None]
+
+
+def _line_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """Cylinder in cylinder: deflection as W (A - ln W) (paper, Eq. 17); kappa = 1 / (A - 1 - ln W_r)."""
-
-    name = "hertz-line"
-    parameters = ("kappa",)
-    mean = (0.08,)
-    spread = (0.05,)
-    low = (0.0,)
-    high = (0.45,)
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        fall = u * (1.0 - _log(u))
-        return u + q[0] * fall, fall[:, None]
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        # at very small or very large loads the logarithm leaves the law's range: the compliance stays positive
-        log = np.minimum(_log(u), 0.98 / max(q[0], 1e-12))
-        return 1.0 - q[0] * log, -log[:, None]
+    fall = u * (1.0 - _log(u))
+    return u + q[0] * fall, fall[:, None]
 
 
-class _Power(_Shape):
-    """Deflection as W^p."""
-
-    name = "power"
-    parameters = ("p",)
-    mean = (0.85,)
-    spread = (0.15,)
-    low = (0.3,)
-    high = (1.3,)
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        value = _raised(u, q[0])
-        return value, (value * (_log(u) - 1.0 / q[0]))[:, None]
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        value = _compliance(u, q[0])
-        return value, (value * _log(u))[:, None]
+def _line_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    # at very small or very large loads the logarithm leaves the law's range: the compliance stays positive
+    log = np.minimum(_log(u), 0.98 / max(q[0], 1e-12))
+    return 1.0 - q[0] * log, -log[:, None]
 
 
-class _PointInSeries(_Shape):
-    """Sphere on flat with a linear compliance in series: lam is the linear share at the reference load."""
-
-    name = "point-in-series"
-    parameters = ("lam",)
-    mean = (0.5,)
-    spread = (0.25,)
-    low = (0.0,)
-    high = (1.0,)
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        point = _raised(u, _SPHERE)
-        return (1.0 - q[0]) * point + q[0] * u, (u - point)[:, None]
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        point = _compliance(u, _SPHERE)
-        return (1.0 - q[0]) * point + q[0], (1.0 - point)[:, None]
+_BEND_WIDTH = 0.1  # of the bend between two compliances, as a share of its load b
 
 
-class _Bilinear(_Shape):
+def _bilinear_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """Two compliances with a bend between them at u = b; r is the first over the second."""
+    r, b = np.exp(q)
+    soft, slope_u, _ = _bend(u, b)
+    # the bent part is b g(u / b) with g homogeneous: d/d(log b) = g b - u g'
+    return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * slope_u)])
 
-    name = "bilinear"
-    parameters = ("log r", "log b")
-    mean = (0.0, 0.0)
-    spread = (0.5, 0.5)
-    low = (-2.0, -1.6)
-    high = (2.0, 1.0)
-    width = 0.1  # of the bend, as a share of b
 
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        r, b = np.exp(q)
-        soft, slope_u, _ = self._bend(u, b)
-        # the bent part is b g(u / b) with g homogeneous: d/d(log b) = g b - u g'
-        return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * slope_u)])
+def _bilinear_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    r, b = np.exp(q)
+    _, step, curve = _bend(u, b)
+    return 1.0 + (r - 1.0) * step, np.column_stack([r * step, -(r - 1.0) * u * curve])
 
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        r, b = np.exp(q)
-        _, step, curve = self._bend(u, b)
-        return 1.0 + (r - 1.0) * step, np.column_stack([r * step, -(r - 1.0) * u * curve])
 
-    def _bend(self, u: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Integral of the smooth step from 0 to u, the step, and its derivative."""
-        w = self.width * b
-        z = np.clip((u - b) / w, -500.0, 500.0)
-        step = 1.0 / (1.0 + np.exp(z))
-        integral = w * (np.logaddexp(0.0, b / w) - np.logaddexp(0.0, -z))
-        return integral, step, -step * (1.0 - step) / w
+def _bend(u: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Integral of the smooth step from 0 to u, the step, and its derivative."""
+    w = _BEND_WIDTH * b
+    z = np.clip((u - b) / w, -500.0, 500.0)
+    step = 1.0 / (1.0 + np.exp(z))
+    integral = w * (np.logaddexp(0.0, b / w) - np.logaddexp(0.0, -z))
+    return integral, step, -step * (1.0 - step) / w
 
 
 NODES = np.log(np.array([0.08, 0.16, 0.3, 0.55, 1.0, 1.6, 2.4, 4.0]))  # ln(W / W_r); the one at 0 is the scale
@@ -247,56 +172,38 @@ def _spline_precision() -> FloatArray:
     return np.asarray(rows.T @ rows)
 
 
-class _Spline(_Shape):
-    """Monotone smoothing spline; the shape parameters are ln(compliance) at the free nodes.
+def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    """The logarithm of the compliance is piecewise linear in that of the load; beyond the nodes its slope goes on."""
+    weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)
+    value = np.exp(weights @ np.insert(q, FIXED, 0.0))
+    return value, np.delete(weights, FIXED, axis=1) * value[:, None]
 
-    The logarithm of the compliance is piecewise linear in the logarithm of the load. Whatever its values, the
-    deflection rises with load; where the points end, the last slope goes on as a power law. Its bends are held
-    down by a prior (a random walk of the slope), which is what a smoothing spline is (Wahba, 1990), and which
-    also widens the band outside the points.
-    """
 
-    name = "spline"
-    parameters = tuple(f"ln psi({np.exp(x):.2g})" for x in np.delete(NODES, FIXED))
-    mean = tuple(TYPICAL_SLOPE * np.delete(NODES, FIXED))
-    low = (-4.0,) * len(mean)  # wide: nothing here can break monotony
-    high = (4.0,) * len(mean)
-    precision = _spline_precision()
-
-    @property
-    def prior_precision(self) -> FloatArray:
-        """(k, k) what holds the bends down."""
-        return self.precision
-
-    def psi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        weights = interpolation(np.log(np.maximum(u, 1e-9)), NODES)
-        value = np.exp(weights @ np.insert(q, FIXED, 0.0))
-        return value, np.delete(weights, FIXED, axis=1) * value[:, None]
-
-    def phi(self, u: FloatArray, q: FloatArray) -> WithDerivative:
-        logs = np.insert(q, FIXED, 0.0)
-        weighted = _GRID_LOAD * np.exp(_GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
-        columns = np.column_stack([weighted, weighted[:, None] * np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
-        # below the grid the compliance is a power of the load, integrable whatever the slope says
-        slope = max((logs[1] - logs[0]) / (NODES[1] - NODES[0]), -0.9)
-        trapezoids = 0.5 * _GRID_STEP * (columns[1:] + columns[:-1])
-        total = np.vstack([np.zeros(columns.shape[1]), np.cumsum(trapezoids, axis=0)])
-        below = columns[0] / (1.0 + slope)
-        # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
-        turn = below[0] / (1.0 + slope) / (NODES[1] - NODES[0])
-        below[1], below[2] = below[1] + turn, below[2] - turn
-        total += below
-        # between grid points the integral is a power of the load: interpolate its logarithm
-        x = np.clip((np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP, None, len(_GRID) - 1.0)
-        cell = np.clip(x.astype(int), 0, len(_GRID) - 2)
-        part = x - cell
-        value = total[:, 0]
-        log = np.log(value)
-        phi = np.exp((1.0 - part) * log[cell] + part * log[cell + 1])
-        relative = total[:, 1:] / value[:, None]
-        jacobian = (1.0 - part)[:, None] * relative[cell] + part[:, None] * relative[cell + 1]
-        phi = np.where(u > 0.0, phi, 0.0)
-        return phi, jacobian * phi[:, None]
+def _spline_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
+    """Integral of the compliance, which rises with the load whatever the nodes say."""
+    logs = np.insert(q, FIXED, 0.0)
+    weighted = _GRID_LOAD * np.exp(_GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
+    columns = np.column_stack([weighted, weighted[:, None] * np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
+    # below the grid the compliance is a power of the load, integrable whatever the slope says
+    slope = max((logs[1] - logs[0]) / (NODES[1] - NODES[0]), -0.9)
+    trapezoids = 0.5 * _GRID_STEP * (columns[1:] + columns[:-1])
+    total = np.vstack([np.zeros(columns.shape[1]), np.cumsum(trapezoids, axis=0)])
+    below = columns[0] / (1.0 + slope)
+    # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
+    turn = below[0] / (1.0 + slope) / (NODES[1] - NODES[0])
+    below[1], below[2] = below[1] + turn, below[2] - turn
+    total += below
+    # between grid points the integral is a power of the load: interpolate its logarithm
+    x = np.clip((np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP, None, len(_GRID) - 1.0)
+    cell = np.clip(x.astype(int), 0, len(_GRID) - 2)
+    part = x - cell
+    value = total[:, 0]
+    log = np.log(value)
+    phi = np.exp((1.0 - part) * log[cell] + part * log[cell + 1])
+    relative = total[:, 1:] / value[:, None]
+    jacobian = (1.0 - part)[:, None] * relative[cell] + part[:, None] * relative[cell + 1]
+    phi = np.where(u > 0.0, phi, 0.0)
+    return phi, jacobian * phi[:, None]
 
 
 def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
@@ -314,13 +221,42 @@ def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
 _GRID_LOAD = np.exp(_GRID)
 _GRID_WEIGHTS = interpolation(_GRID, NODES)
-_ALL: tuple[Law, ...] = (
-    _HertzLine(),
-    _FixedPower("hertz-point", _SPHERE),
-    _Power(),
-    _FixedPower("linear", 1.0),
-    _PointInSeries(),
-    _Bilinear(),
-    _Spline(),
+
+
+def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, float, float, float]]) -> Law:
+    """A law of independent shape parameters: prior mean and standard deviation, lowest and highest of each."""
+    mean, spread, low, high = np.array(list(parameters.values())).reshape(-1, 4).T
+    return Law(name, phi, psi, tuple(parameters), mean, np.diag(1.0 / spread**2), (low, high))
+
+
+def _contact_law(name: str, p: float) -> Law:
+    return _law(name, functools.partial(_fixed, _raised, p), functools.partial(_fixed, _compliance, p), {})
+
+
+_FREE_NODES = np.delete(NODES, FIXED)
+_WIDE = np.full(len(_FREE_NODES), 4.0)  # nothing in a spline can break monotony
+_ALL = (
+    _law("hertz-line", _line_phi, _line_psi, {"kappa": (0.08, 0.05, 0.0, 0.45)}),
+    _contact_law("hertz-point", _SPHERE),
+    _law("power", _power_phi, _power_psi, {"p": (0.85, 0.15, 0.3, 1.3)}),
+    _contact_law("linear", 1.0),
+    _law(
+        "point-in-series",
+        functools.partial(_in_series, _raised),
+        functools.partial(_in_series, _compliance),
+        {"lam": (0.5, 0.25, 0.0, 1.0)},
+    ),
+    _law("bilinear", _bilinear_phi, _bilinear_psi, {"log r": (0.0, 0.5, -2.0, 2.0), "log b": (0.0, 0.5, -1.6, 1.0)}),
+    # monotone and smooth: its bends are held down by the prior (a random walk of the slope), which is what a smoothing
+    # spline is (Wahba, 1990), and which also widens the band outside the points
+    Law(
+        "spline",
+        _spline_phi,
+        _spline_psi,
+        tuple(f"ln psi({np.exp(x):.2g})" for x in _FREE_NODES),
+        TYPICAL_SLOPE * _FREE_NODES,
+        _spline_precision(),
+        (-_WIDE, _WIDE),
+    ),
 )
 LAWS = {law.name: law for law in _ALL}

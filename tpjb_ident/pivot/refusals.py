@@ -268,24 +268,18 @@ def mistakes(
     pickups: Sequence[PickupSignature | None], pairs: Sequence[tuple[str, str]]
 ) -> list[tuple[str, int] | None]:
     """What the signatures say of every run: nothing, or a mistake and how many other runs, most of them, confirm it."""
-    named: list[tuple[str, int] | None] = []
-    for number, signature in enumerate(pickups):
-        if signature is None:
-            named.append(None)
-            continue
-        comparable = [
-            pickup
-            for k, pickup in enumerate(pickups)
-            if k != number and pickup is not None and pickup.channels == signature.channels
-        ]
-        named.append(_mistake(signature, comparable, pairs))
-    return named
+    return [_mistake(number, pickups, pairs) for number in range(len(pickups))]
 
 
 def _mistake(
-    signature: PickupSignature, comparable: Sequence[PickupSignature], pairs: Sequence[tuple[str, str]]
+    number: int, pickups: Sequence[PickupSignature | None], pairs: Sequence[tuple[str, str]]
 ) -> tuple[str, int] | None:
-    """The mistake that, undone, makes a signature that of most runs it now differs from."""
+    """The mistake that, undone, makes a run's signature that of most runs it now differs from."""
+    signature = pickups[number]
+    if signature is None:
+        return None
+    others = (*pickups[:number], *pickups[number + 1 :])
+    comparable = [pickup for pickup in others if pickup is not None and pickup.channels == signature.channels]
     sizes = [(pickup, _mismatch(signature, pickup)) for pickup in comparable]
     different = [(pickup, size) for pickup, size in sizes if size > _MATCHES]
     needed = max(2, math.ceil(len(comparable) / 2))

@@ -85,8 +85,9 @@ def position_panels(
 
 def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
     """Draw the isolability matrix of every plan."""
-    named = {name.replace("_", "-"): (f"Isolability, {name}", plan) for name, plan in plans.items()}
-    return [panel(name, title, isolability, "", plan) for name, (title, plan) in named.items()]
+    return [
+        panel(name.replace("_", "-"), f"Isolability, {name}", isolability, "", plan) for name, plan in plans.items()
+    ]
 
 
 #: A picture of more channels could not be read.

@@ -87,6 +87,11 @@ _AXIS_STYLE: tuple[tuple[str, str, Any], ...] = (("horizontal", "blue", "-"), ("
 _DRIFT = 4
 
 
+def _highest(run: Run, up_to: float | None, rate: float) -> float:
+    """Highest frequency that is drawn [Hz]: as asked, or four times the excitation's, or half the sample rate."""
+    return up_to or 4.0 * run.point.excitation_hz or 0.5 * rate
+
+
 def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -> Figure:
     """Draw the amplitudes of displacement and force over frequency (Hann window over the whole record).
 
@@ -108,8 +113,7 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     ValueError
         When the run is too short, or empty.
     """
-    drive = run.point.excitation_hz if run.point.excitation else None
-    top = up_to or (4.0 * drive if drive else 0.5 * run.sample_rate)
+    drive, top = run.point.excitation_hz, _highest(run, up_to, run.sample_rate)
     figure, grid = new_pictures(2, 1, title=title, height=2.3)
     for (axes,), (quantity, unit) in zip(grid, _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
@@ -136,7 +140,6 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     return figure
 
 
-_FORCE_STYLE: tuple[tuple[str, Any], ...] = (("blue", "-"), ("red", DASHED))
 _FEWEST_SEGMENTS = 5
 _LEVEL = 0.95
 
@@ -171,11 +174,10 @@ def coherence_spectrum(
     if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
         raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
     frequency, value, averages = _multiple_coherence(force, move, rate, piece)
-    drive = run.point.excitation_hz
-    top = up_to or (4.0 * drive if drive else 0.5 * rate)
+    drive, top = run.point.excitation_hz, _highest(run, up_to, rate)
     figure, axes = new_picture("frequency, Hz", "multiple coherence", title=title)
-    for row, name, (colour, dashes) in zip(value, ("horizontal force", "vertical force"), _FORCE_STYLE, strict=True):
-        axes.plot(frequency, row, color=LIGHT[colour], linestyle=dashes, linewidth=1.3, label=name)
+    for row, (axis, colour, dashes) in zip(value, _AXIS_STYLE, strict=True):
+        axes.plot(frequency, row, color=LIGHT[colour], linestyle=dashes, linewidth=1.3, label=f"{axis} force")
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
     from scipy.special import betaincinv
 
@@ -209,7 +211,6 @@ def _multiple_coherence(
 
 
 _FLAGGED = 0.9
-
 _SMALLEST = 1e-7
 
 
@@ -252,7 +253,6 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
 
 
 _REJECTED = 0.3
-
 _NAMED = 6  # rejected windows that are named in the picture
 
 
