@@ -31,10 +31,14 @@ _MEANS = {"clearance_scatter": "assembled_clearance", "pivot_stiffness_scatter":
 class Fit:
     """An explanation with what the data say of it."""
 
-    problem: Problem = field(repr=False)
     unknowns: Unknowns = field(repr=False)
     linear: Linear = field(repr=False)  #: about its solved point
     posterior: Posterior = field(repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """The campaign next to its baseline."""
+        return self.unknowns.problem
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -104,7 +108,7 @@ class Fit:
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
-        names, rows = _combinations(self.problem, self.unknowns)
+        names, rows = _combinations(self.unknowns)
         stated = np.sqrt(np.sum(rows**2, axis=1))
         sizes = rows @ self.posterior.mean / stated
         heard = self._heard(rows) / stated**2
@@ -114,7 +118,7 @@ class Fit:
     @functools.cached_property
     def strain(self) -> Strain:
         """The tolerances of which the data say something."""
-        _, rows = _combinations(self.problem, self.unknowns)
+        _, rows = _combinations(self.unknowns)
         heard = self._heard(rows)
         asked = heard > Deciding.silent * np.sum(rows**2, axis=1)
         return Strain(rows[asked], np.sqrt(heard[asked]))
@@ -143,9 +147,9 @@ class Deviation:
         return self.size / float(np.sqrt(self.heard)) if self.heard > Deciding.silent else 0.0
 
 
-def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], FloatArray]:
+def _combinations(unknowns: Unknowns) -> tuple[list[str], FloatArray]:
     """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, k)."""
-    listed = {int(i): problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
+    listed = {int(i): unknowns.problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
     each = np.eye(len(unknowns.width))
     names, rows = [f"{n.name} {n.place}".strip() for n in listed.values()], list(each[unknowns.tolerances])
     sigma = {n.name: n.sigma for n in listed.values()}
@@ -184,7 +188,7 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
         (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
         if predicted is not None:
             reached = Linear(problem.measured - predicted, theta, start.jacobian, unknowns.width)
-            linear = _better(problem, reached, start)
+            linear = _better(reached, start, problem.errors)
             break
     if linear is None:
         return None
@@ -192,34 +196,35 @@ def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
-        linear = _renewed(run, problem, unknowns, linear)  # those from before the jump say nothing behind it
-        linear = _stepped(run, problem, unknowns, replace(linear, width=held), coarse)
-        linear = _stepped(run, problem, unknowns, replace(linear, width=unknowns.width), coarse)
-        linear = _renewed(run, problem, unknowns, linear)
-    return _settled(run, problem, unknowns, linear)
+        linear = _renewed(run, unknowns, linear)  # those from before the jump say nothing behind it
+        linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
+        linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
+        linear = _renewed(run, unknowns, linear)
+    return _settled(run, unknowns, linear)
 
 
-def _better(problem: Problem, reached: Linear, start: Start) -> Linear:
+def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
     """What a step promised, or where it began: a jump of K and C may lie between them."""
     if start.solved is None or start.coarse:
         return reached
-    totals = [posterior(problem.errors, linear).total for linear in (reached, start.solved)]
+    totals = [posterior(errors, linear).total for linear in (reached, start.solved)]
     return reached if totals[0] >= totals[1] else start.solved
 
 
 def refined(run: Map, fit: Fit) -> Fit:
     """The same with derivatives of its own, and moved on by them."""
-    return _settled(run, fit.problem, fit.unknowns, _renewed(run, fit.problem, fit.unknowns, fit.linear))
+    return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear))
 
 
-def _settled(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear) -> Fit:
-    moved = _stepped(run, problem, unknowns, linear, problem.errors)
-    return Fit(problem, unknowns, moved, posterior(problem.errors, moved))
+def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
+    errors = unknowns.problem.errors
+    moved = _stepped(run, unknowns, linear, errors)
+    return Fit(unknowns, moved, posterior(errors, moved))
 
 
-def _renewed(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear) -> Linear:
+def _renewed(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
     """A model with derivatives of its own; what acts on readings has them already."""
-    asked = [i for i, reading in enumerate(unknowns.is_reading(problem)) if not reading]
+    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
     jacobian = linear.jacobian.copy()
     jobs = [(unknowns.faults, linear.theta, part) for part in parts]
@@ -230,7 +235,7 @@ def _renewed(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear) -> 
     return replace(linear, jacobian=jacobian)
 
 
-def _stepped(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -> Linear:
+def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -> Linear:
     """Steps to the most probable point; each is solved, and corrects the derivatives."""
     for _ in range(_STEPS):
         state = posterior(errors, linear)
@@ -243,7 +248,7 @@ def _stepped(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear, err
             white = errors.white(at.residual, scale)
             return float(white @ white + np.sum((at.theta / at.width) ** 2))
 
-        moved = _step(run, problem, unknowns, linear, target, cost)
+        moved = _step(run, unknowns, linear, target, cost)
         if moved is None:
             return linear
         linear = moved
@@ -251,7 +256,7 @@ def _stepped(run: Map, problem: Problem, unknowns: Unknowns, linear: Linear, err
 
 
 def _step(
-    run: Map, problem: Problem, unknowns: Unknowns, linear: Linear, target: FloatArray,
+    run: Map, unknowns: Unknowns, linear: Linear, target: FloatArray,
     cost: Callable[[Linear], float],
 ) -> Linear | None:  # fmt: skip
     """A step towards a target, shorter where it does not pay, with derivatives corrected by what it showed."""
@@ -261,18 +266,18 @@ def _step(
         (new,) = tuple(run(prediction, [(unknowns.faults, theta)]))
         if new is None:
             continue
-        moved = replace(linear, theta=theta, residual=problem.measured - new)
+        moved = replace(linear, theta=theta, residual=unknowns.problem.measured - new)
         if cost(moved) < most:
-            return _corrected(problem, unknowns, linear, moved)
+            return _corrected(unknowns, linear, moved)
     return None
 
 
-def _corrected(problem: Problem, unknowns: Unknowns, linear: Linear, moved: Linear) -> Linear:
+def _corrected(unknowns: Unknowns, linear: Linear, moved: Linear) -> Linear:
     """Derivatives that would have foretold a step, the least change in units of the priors' widths (Broyden)."""
     change = moved.theta - linear.theta
     surprise = linear.residual - moved.residual - linear.jacobian @ change
     step = change / unknowns.width
-    step[unknowns.is_reading(problem)] = 0.0  # these are linear
+    step[unknowns.is_reading] = 0.0  # these are linear
     length = float(step @ step)
     if length < 1e-20:
         return moved

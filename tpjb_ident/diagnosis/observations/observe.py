@@ -255,8 +255,12 @@ def _add_locus(
     """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
-    for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
-        test = LocusTest(p.point.static_load, p.point.static_load_direction, p.point.spin)
+    points = [p.point for p in locus.points]
+    tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
+    chosen, moved = _spread(tests), moved_by_miss(locus, identification)
+    for test, p, give in zip(tests, locus.points, moved, strict=True):
+        if test not in chosen:
+            continue
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
         stacked = np.vstack([give, np.eye(2)])
         covariance = stacked @ spread @ stacked.T
@@ -265,6 +269,18 @@ def _add_locus(
         builder.add(_locus_elements(_at_point(*astuple(test))), value, covariance)
         out.append(test)
     return tuple(out)
+
+
+def _spread(tests: Sequence[LocusTest]) -> set[LocusTest]:
+    """Every second, third .. direction where a load and a speed have more than `_DIRECTIONS`."""
+    groups: dict[tuple[float, float], list[LocusTest]] = {}
+    for test in dict.fromkeys(tests):
+        groups.setdefault((test.load, test.speed), []).append(test)
+    chosen: set[LocusTest] = set()
+    for group in groups.values():
+        around = sorted(group, key=lambda test: test.direction % (2 * math.pi))
+        chosen.update(around[:: -(-len(around) // _DIRECTIONS)])
+    return chosen
 
 
 def _add_dry(builder: _Builder, curve: PivotCurve) -> DryTest:
@@ -288,6 +304,8 @@ def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
     return float(polygon.push_load)
 
 
+#: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
+_DIRECTIONS = 10
 #: Harmonics of the load's direction that a locus of many directions is described by.
 _HARMONICS = 3
 
