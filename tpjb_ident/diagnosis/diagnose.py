@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
 #: Of equilibria while models are compared: far below any tolerance, and a third faster than the default.
 ACCURACY = 1e-5
-#: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
-_DIRECTIONS = 10
 #: Names of the two models in the column ``pivots``, as pictures label them.
 BEFORE, AFTER = "model before", "with the effects found"
 
@@ -65,7 +63,6 @@ def diagnose(
 ) -> Diagnosis:
     """Find the effects that a baseline lacks to describe a campaign."""
     settings = settings or DiagnoseSettings()
-    observations = _thinned(observations)
     quick = setup.change(accuracy=ACCURACY)
     forward = Forward(quick, observations.layout, observations.elements)
     problem = pose(observations, forward, settings)
@@ -141,30 +138,6 @@ def _rivals(comparison: Comparison, model: Fit) -> list[Fit]:
         if fit.faults and not fit.on_bound and not model.labels <= fit.labels:
             by_names.setdefault(fit.names, fit)
     return list(by_names.values())[: Deciding.impostors]
-
-
-def _thinned(observations: Observations) -> Observations:
-    """Keep every second, third .. load direction of a locus that has more than `_DIRECTIONS`."""
-    used_places = set()
-    tests: dict[tuple[float, float], list[float]] = {}
-    for locus_test in observations.layout.locus:
-        tests.setdefault((locus_test.load, locus_test.speed), []).append(locus_test.direction)
-    for (load, speed), directions in tests.items():
-        around = sorted(set(directions), key=lambda a: a % (2 * np.pi))
-        step = -(-len(around) // _DIRECTIONS)
-        used_places |= {(load, speed, a) for a in around[::step]}
-    selected = np.array([
-        e.family not in {"locus", "load"} or (e.place("load"), e.place("speed"), e.place("direction")) in used_places
-        for e in observations.elements
-    ])  # fmt: skip
-    if selected.all():
-        return observations
-    locus = tuple(t for t in observations.layout.locus if (t.load, t.speed, t.direction) in used_places)
-    return replace(
-        observations, layout=replace(observations.layout, locus=locus), value=observations.value[selected],
-        covariance=observations.covariance[np.ix_(selected, selected)], sigma=observations.sigma[selected],
-        elements=tuple(e for e, m in zip(observations.elements, selected, strict=True) if m),
-    )  # fmt: skip
 
 
 def before_and_after(diagnosis: Diagnosis, identification: Identification | None) -> pd.DataFrame:

@@ -10,7 +10,6 @@ import numpy as np
 from model.setup import Setup
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.observations.constants import Tolerance
-from tpjb_ident.diagnosis.observations.gap import direct_scale
 from tpjb_ident.diagnosis.observations.observe import (
     DryTest,
     DynamicTest,
@@ -18,6 +17,8 @@ from tpjb_ident.diagnosis.observations.observe import (
     LocusTest,
     Observations,
     all_elements,
+    direct_scale,
+    stated_sigma,
 )
 
 #: Standard errors that a well-run test reaches (the sample campaigns' own): share of the mean direct coefficient,
@@ -30,21 +31,13 @@ def planned_observations(setup: Setup, layout: Layout) -> Observations:
     tolerance = Tolerance()
     elements = all_elements(layout, [pad.pivot_angle for pad in setup.bearing.pads])
     value = Forward(setup, layout, elements)()
-    scale = direct_scale(elements, value)
-    table: dict[str, tuple[np.ndarray | float, np.ndarray | float]] = {
-        "h": (_STIFFNESS * scale, tolerance.stiffness * scale),
-        "temperature": (_TEMPERATURE, tolerance.temperature),
-        "locus": (_POSITION, tolerance.position),
-        "load": (tolerance.load_miss, tolerance.load),
-        "dry": (_DRY, tolerance.dry),
-        "clearance": (_POSITION, tolerance.position),
-        "side": (_ANGLE, tolerance.angle),
-    }
-    columns = np.zeros((2, len(value)))
-    for i, e in enumerate(elements):
-        row = table["side" if e.observable == "side_angle" else e.family]
-        columns[:, i] = [float(np.broadcast_to(v, value.shape)[i]) for v in row]
-    return Observations(layout, value, np.diag(columns[0] ** 2), columns[1], elements)
+    table = {
+        "h": _STIFFNESS, "temperature": _TEMPERATURE, "locus": _POSITION, "load": tolerance.load_miss, "dry": _DRY,
+        "clearance": _POSITION,
+    }  # fmt: skip
+    rows = [_ANGLE if e.observable == "side_angle" else table[e.family] for e in elements]
+    noise = np.array(rows) * direct_scale(elements, value)
+    return Observations(layout, value, np.diag(noise**2), stated_sigma(elements, value, tolerance), elements)
 
 
 def dynamic(

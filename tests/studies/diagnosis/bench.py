@@ -21,9 +21,9 @@ from tpjb_ident.diagnosis.forward.candidates import Candidate
 from tpjb_ident.diagnosis.forward.forward import Forward, ForwardModel, NoEquilibriumError
 from tpjb_ident.diagnosis.forward.nuisance import predict
 from tpjb_ident.diagnosis.forward.workers import workers
-from tpjb_ident.diagnosis.observations.gap import coordinate, direct_scale
+from tpjb_ident.diagnosis.observations.gap import coordinate
 from tpjb_ident.diagnosis.observations.model_error import usual_factor
-from tpjb_ident.diagnosis.observations.observe import Observations
+from tpjb_ident.diagnosis.observations.observe import Observations, direct_scale
 from tpjb_ident.diagnosis.verdict.decide import Decision, decide
 from tpjb_ident.diagnosis.verdict.verdict import Verdict
 

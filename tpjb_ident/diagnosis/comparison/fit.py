@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,23 +27,18 @@ _ARRIVED = 0.1
 _MEANS = {"clearance_scatter": "assembled_clearance", "pivot_stiffness_scatter": ""}
 
 
-@dataclass(frozen=True)
-class Point:
-    """Where a model was solved."""
-
-    theta: FloatArray
-    prediction: FloatArray
-    jacobian: FloatArray
-
-
 @dataclass(frozen=True, eq=False)
 class Fit:
     """An explanation with what the data say of it."""
 
-    problem: Problem = field(repr=False)
     unknowns: Unknowns = field(repr=False)
-    point: Point = field(repr=False)
+    linear: Linear = field(repr=False)  #: about its solved point
     posterior: Posterior = field(repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """The campaign next to its baseline."""
+        return self.unknowns.problem
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -73,12 +68,7 @@ class Fit:
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects at their fitted sizes."""
-        return self.unknowns.effects(self.point.theta)
-
-    @property
-    def linear(self) -> Linear:
-        """The model about its solved point."""
-        return _linear(self.problem, self.unknowns, self.point)
+        return self.unknowns.effects(self.linear.theta)
 
     @property
     def amplitudes(self) -> tuple[FloatArray, ...]:
@@ -104,7 +94,7 @@ class Fit:
     @property
     def on_bound(self) -> bool:
         """Whether an amplitude is on its bound: the linear form counts the forbidden side too."""
-        unknowns, theta = self.unknowns, self.point.theta
+        unknowns, theta = self.unknowns, self.linear.theta
         near = 1e-6 * unknowns.width
         out = (theta <= unknowns.low + near) | (theta >= unknowns.high - near)
         return any(out[at].any() for at in unknowns.slices)
@@ -118,7 +108,7 @@ class Fit:
     @functools.cached_property
     def tolerances(self) -> tuple[Deviation, ...]:
         """Every tolerance that kept its stated prior, and the means of scatters, the farthest out first."""
-        names, rows = _combinations(self.problem, self.unknowns)
+        names, rows = _combinations(self.unknowns)
         stated = np.sqrt(np.sum(rows**2, axis=1))
         sizes = rows @ self.posterior.mean / stated
         heard = self._heard(rows) / stated**2
@@ -128,7 +118,7 @@ class Fit:
     @functools.cached_property
     def strain(self) -> Strain:
         """The tolerances of which the data say something."""
-        _, rows = _combinations(self.problem, self.unknowns)
+        _, rows = _combinations(self.unknowns)
         heard = self._heard(rows)
         asked = heard > Deciding.silent * np.sum(rows**2, axis=1)
         return Strain(rows[asked], np.sqrt(heard[asked]))
@@ -157,9 +147,9 @@ class Deviation:
         return self.size / float(np.sqrt(self.heard)) if self.heard > Deciding.silent else 0.0
 
 
-def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], FloatArray]:
+def _combinations(unknowns: Unknowns) -> tuple[list[str], FloatArray]:
     """Every tolerance by itself, and the mean of every scatter, which does what all pads do together, (c, k)."""
-    listed = {int(i): problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
+    listed = {int(i): unknowns.problem.nuisances[i - unknowns.amplitudes] for i in unknowns.tolerances}
     each = np.eye(len(unknowns.width))
     names, rows = [f"{n.name} {n.place}".strip() for n in listed.values()], list(each[unknowns.tolerances])
     sigma = {n.name: n.sigma for n in listed.values()}
@@ -172,117 +162,123 @@ def _combinations(problem: Problem, unknowns: Unknowns) -> tuple[list[str], Floa
     return names, np.array(rows)
 
 
-def _linear(problem: Problem, unknowns: Unknowns, point: Point) -> Linear:
-    return Linear(problem.measured - point.prediction, point.theta, point.jacobian, unknowns.width)
-
-
 @dataclass(frozen=True)
 class Start:
-    """Where a fit begins, on derivatives known from nearby."""
+    """An explanation to be fitted, and where its fit begins, on derivatives known from nearby."""
 
     faults: tuple[Fault, ...]
     theta: FloatArray = field(repr=False)
     jacobian: FloatArray = field(repr=False)
     coarse: bool = False  #: past jumps of K and C first: every element off by itself, tolerances held
-    solved: Point | None = None  #: where the model that it was proposed beside was solved
+    solved: Linear | None = None  #: the model that it was proposed beside, where that was solved
+    estimate: float = 0.0  #: log p(y, model) to first order [nats]
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """What makes two starts the same explanation."""
+        return frozenset(fault.label for fault in self.faults)
 
 
 def fitted(run: Map, problem: Problem, start: Start) -> Fit | None:
     """Fit from a start; None where there is no equilibrium."""
     unknowns = Unknowns(problem, start.faults)
-    point = start.solved
+    linear = start.solved
     for share in _SHARES:  # nearer to what is stated, where there is no equilibrium
         theta = share * np.clip(start.theta, unknowns.low, unknowns.high)
         (predicted,) = tuple(run(prediction, [(start.faults, theta)]))
         if predicted is not None:
-            point = _better(problem, unknowns, Point(theta, predicted, start.jacobian), start)
+            reached = Linear(problem.measured - predicted, theta, start.jacobian, unknowns.width)
+            linear = _better(reached, start, problem.errors)
             break
-    if point is None:
+    if linear is None:
         return None
     if start.coarse:
         held = unknowns.width.copy()
         held[unknowns.tolerances] = Deciding.held
         coarse = problem.errors.coarse
-        point = _renewed(run, problem, unknowns, point)  # those from before the jump say nothing behind it
-        point = _stepped(run, problem, unknowns, point, coarse, held)
-        point = _stepped(run, problem, unknowns, point, coarse, unknowns.width)
-        point = _renewed(run, problem, unknowns, point)
-    point = _stepped(run, problem, unknowns, point, problem.errors, unknowns.width)
-    return Fit(problem, unknowns, point, posterior(problem.errors, _linear(problem, unknowns, point)))
+        linear = _renewed(run, unknowns, linear)  # those from before the jump say nothing behind it
+        linear = _stepped(run, unknowns, replace(linear, width=held), coarse)
+        linear = _stepped(run, unknowns, replace(linear, width=unknowns.width), coarse)
+        linear = _renewed(run, unknowns, linear)
+    return _settled(run, unknowns, linear)
 
 
-def _better(problem: Problem, unknowns: Unknowns, point: Point, start: Start) -> Point:
+def _better(reached: Linear, start: Start, errors: ErrorModel) -> Linear:
     """What a step promised, or where it began: a jump of K and C may lie between them."""
     if start.solved is None or start.coarse:
-        return point
-    totals = [posterior(problem.errors, _linear(problem, unknowns, p)).total for p in (point, start.solved)]
-    return point if totals[0] >= totals[1] else start.solved
+        return reached
+    totals = [posterior(errors, linear).total for linear in (reached, start.solved)]
+    return reached if totals[0] >= totals[1] else start.solved
 
 
 def refined(run: Map, fit: Fit) -> Fit:
     """The same with derivatives of its own, and moved on by them."""
-    problem, unknowns = fit.problem, fit.unknowns
-    point = _renewed(run, problem, unknowns, fit.point)
-    moved = _stepped(run, problem, unknowns, point, problem.errors, unknowns.width)
-    return Fit(problem, unknowns, moved, posterior(problem.errors, _linear(problem, unknowns, moved)))
+    return _settled(run, fit.unknowns, _renewed(run, fit.unknowns, fit.linear))
 
 
-def _renewed(run: Map, problem: Problem, unknowns: Unknowns, point: Point) -> Point:
-    """A point with derivatives of its own; what acts on readings has them already."""
-    asked = [i for i, reading in enumerate(unknowns.is_reading(problem)) if not reading]
+def _settled(run: Map, unknowns: Unknowns, linear: Linear) -> Fit:
+    errors = unknowns.problem.errors
+    moved = _stepped(run, unknowns, linear, errors)
+    return Fit(unknowns, moved, posterior(errors, moved))
+
+
+def _renewed(run: Map, unknowns: Unknowns, linear: Linear) -> Linear:
+    """A model with derivatives of its own; what acts on readings has them already."""
+    asked = [i for i, reading in enumerate(unknowns.is_reading) if not reading]
     parts = [asked[k :: run.opened.count] for k in range(run.opened.count)]
-    jacobian = point.jacobian.copy()
-    jobs = [(unknowns.faults, point.theta, part) for part in parts]
+    jacobian = linear.jacobian.copy()
+    jobs = [(unknowns.faults, linear.theta, part) for part in parts]
     for part, columns in zip(parts, run(derivatives, jobs), strict=True):
         for index, column in zip(part, columns, strict=True):
             if column is not None:
                 jacobian[:, index] = column
-    return Point(point.theta, point.prediction, jacobian)
+    return replace(linear, jacobian=jacobian)
 
 
-def _stepped(
-    run: Map, problem: Problem, unknowns: Unknowns, point: Point, errors: ErrorModel, width: FloatArray
-) -> Point:
+def _stepped(run: Map, unknowns: Unknowns, linear: Linear, errors: ErrorModel) -> Linear:
     """Steps to the most probable point; each is solved, and corrects the derivatives."""
     for _ in range(_STEPS):
-        linear = Linear(problem.measured - point.prediction, point.theta, point.jacobian, width)
         state = posterior(errors, linear)
         target = np.clip(state.mean, unknowns.low, unknowns.high)
         deviation = np.sqrt(np.maximum(np.diag(state.covariance), 1e-300))
-        if np.all(np.abs(target - point.theta) < _ARRIVED * deviation):
-            return point
+        if np.all(np.abs(target - linear.theta) < _ARRIVED * deviation):
+            return linear
 
-        def cost(theta: FloatArray, predicted: FloatArray, scale: int = state.leading) -> float:
-            white = errors.white(problem.measured - predicted, scale)
-            return float(white @ white + np.sum((theta / width) ** 2))
+        def cost(at: Linear, scale: int = state.leading) -> float:
+            white = errors.white(at.residual, scale)
+            return float(white @ white + np.sum((at.theta / at.width) ** 2))
 
-        moved = _step(run, problem, unknowns, point, target, cost)
+        moved = _step(run, unknowns, linear, target, cost)
         if moved is None:
-            return point
-        point = moved
-    return point
+            return linear
+        linear = moved
+    return linear
 
 
 def _step(
-    run: Map, problem: Problem, unknowns: Unknowns, point: Point, target: FloatArray,
-    cost: Callable[[FloatArray, FloatArray], float],
-) -> Point | None:  # fmt: skip
+    run: Map, unknowns: Unknowns, linear: Linear, target: FloatArray,
+    cost: Callable[[Linear], float],
+) -> Linear | None:  # fmt: skip
     """A step towards a target, shorter where it does not pay, with derivatives corrected by what it showed."""
-    most = cost(point.theta, point.prediction)
+    most = cost(linear)
     for share in _SHARES:
-        theta = point.theta + share * (target - point.theta)
+        theta = linear.theta + share * (target - linear.theta)
         (new,) = tuple(run(prediction, [(unknowns.faults, theta)]))
-        if new is not None and cost(theta, new) < most:
-            return Point(theta, new, _corrected(problem, unknowns, point, theta, new))
+        if new is None:
+            continue
+        moved = replace(linear, theta=theta, residual=unknowns.problem.measured - new)
+        if cost(moved) < most:
+            return _corrected(unknowns, linear, moved)
     return None
 
 
-def _corrected(problem: Problem, unknowns: Unknowns, point: Point, theta: FloatArray, new: FloatArray) -> FloatArray:
+def _corrected(unknowns: Unknowns, linear: Linear, moved: Linear) -> Linear:
     """Derivatives that would have foretold a step, the least change in units of the priors' widths (Broyden)."""
-    step = (theta - point.theta) / unknowns.width
-    surprise = new - point.prediction - point.jacobian @ (theta - point.theta)
-    step[unknowns.is_reading(problem)] = 0.0  # these are linear
+    change = moved.theta - linear.theta
+    surprise = linear.residual - moved.residual - linear.jacobian @ change
+    step = change / unknowns.width
+    step[unknowns.is_reading] = 0.0  # these are linear
     length = float(step @ step)
     if length < 1e-20:
-        return point.jacobian
-    return np.asarray(point.jacobian + np.outer(surprise, step / length) / unknowns.width)
+        return moved
+    return replace(moved, jacobian=linear.jacobian + np.outer(surprise, step / length) / unknowns.width)

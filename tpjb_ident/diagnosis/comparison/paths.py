@@ -14,43 +14,6 @@ from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.unknowns import derivatives, path_changes
 from tpjb_ident.diagnosis.forward.workers import Map
 
-
-@dataclass(frozen=True)
-class AmplitudePath:
-    """Change of a prediction along one amplitude: cubic pieces between amplitudes at which the model was asked.
-
-    Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
-    of contact lets K and C jump, at another amplitude for every load, and one polynomial through all of it is wrong
-    everywhere.
-    """
-
-    at: FloatArray  #: (m,): amplitudes, counted from the neutral one, which is among them; rising
-    columns: FloatArray  #: (n, 2 m): changes of the prediction there, then its derivatives
-
-    @functools.cached_property
-    def pieces(self) -> CubicHermiteSpline:
-        """Weights of the columns between the ends."""
-        each = np.eye(2 * len(self.at))
-        return CubicHermiteSpline(self.at, *np.split(each, 2))
-
-    def weights(self, amplitudes: FloatArray) -> FloatArray:
-        """Weights of the columns in the change at some amplitudes, (k, 2 m); straight lines beyond the ends."""
-        inside = np.clip(amplitudes, self.at[0], self.at[-1])
-        return np.asarray(self.pieces(inside) + (amplitudes - inside)[:, None] * self.slope_weights(inside))
-
-    def slope_weights(self, amplitudes: FloatArray) -> FloatArray:
-        """Weights of the columns in the derivative at some amplitudes, (k, 2 m); `amplitudes` (k,)."""
-        return np.asarray(self.pieces(np.clip(amplitudes, self.at[0], self.at[-1]), 1))
-
-
-def path_through(amplitudes: Sequence[float], changes: Sequence[FloatArray]) -> AmplitudePath:
-    """Lay a path through what the model said; `changes` (n,) each."""
-    order = np.argsort([0.0, *amplitudes])
-    at = np.array([0.0, *amplitudes])[order]
-    values = np.array([np.zeros_like(changes[0]), *changes])[order]
-    return AmplitudePath(at, np.hstack([values.T, PchipInterpolator(at, values, axis=0).derivative()(at).T]))
-
-
 #: A typical size in widths of the prior.
 _NEAR = 1.0 / 3.0
 #: Amplitudes of a path at which a score is asked for.
@@ -61,21 +24,39 @@ _SLOW = frozenset({"pad_bending", "pad_conduction"})
 
 @dataclass(frozen=True)
 class Path:
-    """Change of the prediction by one fault: cubic pieces along one amplitude, or straight columns for several."""
+    """Change of the prediction by one fault: cubic pieces along one amplitude, or straight columns for several.
+
+    Pieces that rise where their ends rise (Fritsch & Carlson, SIAM J. Numer. Anal. 17 (1980) 238): a pad that comes out
+    of contact lets K and C jump, at another amplitude for every load, and one polynomial through all of it is wrong
+    everywhere.
+    """
 
     fault: Fault
-    columns: FloatArray = field(repr=False)  #: (n, c)
-    curve: AmplitudePath | None = field(default=None, repr=False)
+    columns: FloatArray = field(repr=False)  #: (n, c): straight ones, or changes at the nodes, then derivatives there
+    nodes: FloatArray | None = field(default=None, repr=False)  #: amplitudes that the model was asked at; rising
+
+    @functools.cached_property
+    def pieces(self) -> CubicHermiteSpline:
+        """Weights of the columns between the nodes."""
+        return CubicHermiteSpline(self.nodes, *np.split(np.eye(self.columns.shape[1]), 2))
+
+    def _inside(self, amplitudes: FloatArray, nodes: FloatArray) -> FloatArray:
+        """The first amplitude of each, between the ends: beyond them a path goes on straight, (t,)."""
+        return np.clip(amplitudes[:, 0], nodes[0], nodes[-1])
 
     def weights(self, amplitudes: FloatArray) -> FloatArray:
         """Of the columns in the change at amplitudes (t, k), (t, c)."""
-        return amplitudes if self.curve is None else self.curve.weights(amplitudes[:, 0])
+        if self.nodes is None:
+            return amplitudes
+        inside = self._inside(amplitudes, self.nodes)
+        beyond = amplitudes - inside[:, None]
+        return np.asarray(self.pieces(inside) + beyond * self.pieces(inside, 1))
 
     def slopes(self, amplitudes: FloatArray) -> FloatArray:
         """Of the columns in the derivatives at amplitudes (t, k), (t, c, k)."""
-        if self.curve is None:
+        if self.nodes is None:
             return np.tile(np.eye(amplitudes.shape[1]), (len(amplitudes), 1, 1))
-        return self.curve.slope_weights(amplitudes[:, 0])[:, :, None]
+        return np.asarray(self.pieces(self._inside(amplitudes, self.nodes), 1)[:, :, None])
 
     @property
     def neutral_slope(self) -> FloatArray:
@@ -90,7 +71,7 @@ class Path:
         fault = self.fault
         low = np.maximum(fault.low - fault.origin, -fault.width)
         high = np.minimum(fault.high - fault.origin, fault.width)
-        if self.curve is not None:
+        if self.nodes is not None:
             return np.linspace(low, high, _POINTS)
         likeliest = np.linalg.solve(square + np.diag(1.0 / fault.width**2), pull)
         return np.clip(likeliest, low, high)[None, :]
@@ -104,10 +85,10 @@ def lay_paths(run: Map, problem: Problem) -> tuple[Path, ...]:
     curved = [f for f in problem.faults if len(f.width) == 1 and f.name not in _SLOW]
     straight = [f for f in problem.faults if f not in curved]
     columns = problem.scaled(problem.columns)
-    paths = [_curved(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
+    paths = [path_through(f, [(1.0, columns[:, f.own])]) for f in curved if f.own >= 0]
     asked = [f for f in curved if f.own < 0]
     changes = run(path_changes, [(f, [sign * _NEAR * float(f.width[0]) for sign in (1.0, -1.0)], 1) for f in asked])
-    paths += [_curved(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
+    paths += [path_through(fault, row) for fault, row in zip(asked, changes, strict=True) if row]
     count = len(problem.nuisances)
     jobs = [((f,), np.zeros(len(f.width) + count), tuple(range(len(f.width)))) for f in straight]
     for fault, found in zip(straight, run(derivatives, jobs), strict=True):
@@ -123,16 +104,18 @@ def lengthened(run: Map, problem: Problem, paths: Sequence[Path], sizes: Sequenc
     for i, (path, size) in enumerate(zip(paths, sizes, strict=True)):
         near = _NEAR * float(path.fault.width[0])
         wanted = [near, -near, *([float(np.copysign(near / _NEAR, size))] if abs(size) > near else [])]
-        if size and path.curve is not None:
-            asked.append((i, path.curve))
-            jobs.append((path.fault, [node for node in wanted if not np.isclose(path.curve.at, node).any()]))
+        if size and path.nodes is not None:
+            asked.append((i, path.nodes))
+            jobs.append((path.fault, [node for node in wanted if not np.isclose(path.nodes, node).any()]))
     out = list(paths)
-    for (i, curve), row in zip(asked, run(path_changes, jobs), strict=True):
-        known = [(at, curve.columns[:, k]) for k, at in enumerate(curve.at) if at != 0.0]
-        out[i] = _curved(paths[i].fault, [*known, *row])
+    for (i, nodes), row in zip(asked, run(path_changes, jobs), strict=True):
+        known = [(node, paths[i].columns[:, k]) for k, node in enumerate(nodes) if node != 0.0]
+        out[i] = path_through(paths[i].fault, [*known, *row])
     return tuple(out)
 
 
-def _curved(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:
-    curve = path_through([float(at) for at, _ in changes], [change for _, change in changes])
-    return Path(fault, curve.columns, curve)
+def path_through(fault: Fault, changes: Sequence[tuple[float, FloatArray]]) -> Path:
+    """Lay a path through what the model said at some amplitudes, counted from the neutral one; changes (n,) each."""
+    rows = sorted([(0.0, np.zeros_like(changes[0][1])), *changes], key=lambda row: row[0])
+    nodes, values = np.array([node for node, _ in rows]), np.array([change for _, change in rows])
+    return Path(fault, np.hstack([values.T, PchipInterpolator(nodes, values, axis=0).derivative()(nodes).T]), nodes)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from tpjb_ident.diagnosis.comparison.evidence import Levels, Linear, posterior
-from tpjb_ident.diagnosis.comparison.fit import Fit, Point, Start, fitted, refined
+from tpjb_ident.diagnosis.comparison.fit import Fit, Start, fitted, refined
 from tpjb_ident.diagnosis.comparison.paths import Path, lay_paths, lengthened
 from tpjb_ident.diagnosis.comparison.problem import Fault, Problem
 from tpjb_ident.diagnosis.comparison.scores import Score, Strain, scores, separation
@@ -28,18 +28,6 @@ from tpjb_ident.diagnosis.forward.workers import Map
 from tpjb_ident.diagnosis.observations.constants import Deciding
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Proposal(Start):
-    """An explanation to be fitted, and from where."""
-
-    estimate: float = 0.0  #: log p(y, model) to first order [nats]
-
-    @property
-    def labels(self) -> frozenset[str]:
-        """What makes two proposals the same explanation."""
-        return frozenset(fault.label for fault in self.faults)
 
 
 @dataclass(frozen=True)
@@ -92,11 +80,9 @@ class _Search:
         self.fits: dict[frozenset[str], Fit] = {}
         self.tried = 0
         self.estimates: dict[frozenset[str], float] = {}
-        self.proposals: dict[frozenset[str], Proposal] = {}
+        self.proposals: dict[frozenset[str], Start] = {}
         self.paths: tuple[Path, ...] = ()
-        self.exchanged: dict[
-            frozenset[str], list[Proposal]
-        ] = {}  #: look-alikes by the leader that they are held against
+        self.exchanged: dict[frozenset[str], list[Start]] = {}  #: look-alikes by the leader that they are held against
         self.whole = True  #: whether paths are known as far as jumps of K and C ask for
         self.clear = -math.inf  #: coarse estimate from which a start comes before all others [nats]
         self.places = Counter(name for name, _ in {(fault.name, fault.label) for fault in problem.faults})
@@ -104,7 +90,7 @@ class _Search:
     def result(self) -> Comparison:
         """Search, and weigh what was fitted."""
         stated = self._stated
-        self._fit(Proposal((), stated.theta, stated.jacobian), rough=True)
+        self._fit(Start((), stated.theta, stated.jacobian), rough=True)
         self.report("every effect of the library", 0.1)
         self._propose_singles()
         baseline, best = self.fits[frozenset()], max((p.estimate for p in self.proposals.values()), default=-math.inf)
@@ -116,7 +102,7 @@ class _Search:
             self._fit(proposal)
         return self._weighed()
 
-    def _next(self) -> Proposal | None:
+    def _next(self) -> Start | None:
         """The likeliest proposal; None where none comes near the leader."""
         if self.tried >= self.settings.most_fits:
             return None
@@ -130,7 +116,7 @@ class _Search:
             return None if leader is None else self._look_alike(leader) or self._passed_over(leader)
         return self.proposals.pop(order[0].labels)
 
-    def _look_alike(self, leader: Fit) -> Proposal | None:
+    def _look_alike(self, leader: Fit) -> Start | None:
         """The leader with a fault exchanged for what the campaign hardly tells from it; None where all were fitted."""
         if leader.labels not in self.exchanged:
             pairs = [(fault, path) for fault in leader.faults for path in self._alike(leader, fault)]
@@ -142,7 +128,7 @@ class _Search:
                 return proposal
         return None
 
-    def _passed_over(self, leader: Fit) -> Proposal | None:
+    def _passed_over(self, leader: Fit) -> Start | None:
         """A coarse start that others came before: one cause that does it all is likelier than several."""
         waiting = [p for p in self.proposals.values() if p.coarse and p.labels not in self.fits]
         if len(leader.faults) < 2 or not waiting:
@@ -166,19 +152,18 @@ class _Search:
         ends = np.cumsum([count, *(path.columns.shape[1] for path in others)])
         return [p for p, part in zip(others, np.split(nearest, ends[:-1])[1:]) if part.min() < Deciding.visible]
 
-    def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Proposal:
+    def _exchange(self, fit: Fit, fault: Fault, path: Path) -> Start:
         """A fit with another fault in the place of one of its own."""
         faults, linear = self._without(fit, fault)
         score = scores(self.problem.errors, linear, [path], Strain(np.zeros((0, len(linear.theta))), np.zeros(0)))[0]
-        predicted = self.problem.measured - linear.residual
-        return replace(self._with(score, faults, Point(linear.theta, predicted, linear.jacobian)), solved=None)
+        return replace(self._with(score, faults, linear), solved=None)
 
     @property
     def _passed(self) -> bool:
         """Whether a fit, tenable or not, has found its way past the jumps of K and C."""
         return any(fit.posterior.scale <= self.settings.suspect for fit in self.fits.values())
 
-    def _comes_first(self, proposal: Proposal) -> bool:
+    def _comes_first(self, proposal: Start) -> bool:
         """Whether a start is coarse, and has no clearly better ones: once a fit is past the jumps these have been."""
         return proposal.coarse and (proposal.estimate >= self.clear or (self.whole and not self._passed))
 
@@ -189,7 +174,7 @@ class _Search:
             self._lengthen([end * float(path.fault.width[0]) for path in self.paths])
         self._propose_alone()
 
-    def _promising(self, proposal: Proposal, leader: Fit) -> bool:
+    def _promising(self, proposal: Start, leader: Fit) -> bool:
         """Whether a proposal may change the answer: as a rival of a right leader, or by a fault beside it."""
         plain = leader.has_terms and not any(fault.is_term for fault in proposal.faults)
         if proposal.coarse:
@@ -208,10 +193,10 @@ class _Search:
 
     def _past_jumps(self, fit: Fit) -> Fit:
         """A fit that leads and is surely wrong, or stopped at a jump, begun coarsely where that makes it better."""
-        again = fitted(self.run, self.problem, Start(fit.faults, fit.point.theta, fit.point.jacobian, coarse=True))
+        again = fitted(self.run, self.problem, Start(fit.faults, fit.linear.theta, fit.linear.jacobian, coarse=True))
         return fit if again is None or again.posterior.total <= fit.posterior.total else again
 
-    def _fit(self, proposal: Proposal, rough: bool = False) -> None:
+    def _fit(self, proposal: Start, rough: bool = False) -> None:
         fit = fitted(self.run, self.problem, proposal)
         self.tried += 1
         if fit is None:
@@ -271,16 +256,17 @@ class _Search:
         self._lengthen([sizes.get(id(path), 0.0) for path in self.paths])
 
     @functools.cached_property
-    def _stated(self) -> Point:
-        problem = self.problem
-        return Point(np.zeros(len(problem.nuisances)), problem.scaled(problem.base), problem.scaled(problem.columns))
+    def _stated(self) -> Linear:
+        problem, count = self.problem, len(self.problem.nuisances)
+        residual = problem.measured - problem.scaled(problem.base)
+        return Linear(residual, np.zeros(count), problem.scaled(problem.columns), np.ones(count))
 
     def _singles(self, coarse: bool = False) -> list[Score]:
         """Scores of every fault beside the baseline as stated; coarse: every element off by itself, tolerances held."""
-        errors, stated = self.problem.errors, self._stated
-        width = np.full(len(stated.theta), self.settings.held if coarse else 1.0)
-        linear = Linear(self.problem.measured - stated.prediction, stated.theta, stated.jacobian, width)
-        return scores(errors.coarse if coarse else errors, linear, self.paths, self.fits[frozenset()].strain)
+        errors, linear = self.problem.errors, self._stated
+        if coarse:
+            errors, linear = errors.coarse, replace(linear, width=self.settings.held * linear.width)
+        return scores(errors, linear, self.paths, self.fits[frozenset()].strain)
 
     def _propose_alone(self) -> float:
         """Propose every fault by itself, with coarse starts where the likeliest is surely wrong; its scale."""
@@ -300,7 +286,7 @@ class _Search:
         if len(fit.faults) < len(self.settings.prior) - 1:
             further = [self._beside(path, fit) for path in self.paths if path.fault.label not in fit.labels]
             for score in scores(self.problem.errors, fit.linear, further, fit.strain):
-                self._propose(score, fit.faults, fit.point)
+                self._propose(score, fit.faults, fit.linear)
         if len(fit.faults) > 1:
             for fault in fit.faults:
                 self._propose_without(fit, fault)
@@ -310,41 +296,41 @@ class _Search:
         members = self.problem.said_by(path.fault)
         if not members:
             return path
-        own = fit.point.jacobian[:, fit.unknowns.amplitudes :]
+        own = fit.linear.jacobian[:, fit.unknowns.amplitudes :]
         column = np.sum([share * own[:, i] for i, share in members.items()], axis=0)
         return Path(path.fault, column[:, None])
 
-    def _propose(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> None:
+    def _propose(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> None:
         """Add a fault to a model."""
         if np.any(score.amplitudes):
-            self._offer(self._with(score, faults, point, coarse))
+            self._offer(self._with(score, faults, linear, coarse))
 
-    def _with(self, score: Score, faults: tuple[Fault, ...], point: Point, coarse: bool = False) -> Proposal:
+    def _with(self, score: Score, faults: tuple[Fault, ...], linear: Linear, coarse: bool = False) -> Start:
         """A model with one fault more."""
         fault = score.path.fault.turned()
         faults = (*faults, fault)
         estimate = score.total + self._log_prior(faults)
         if score.p < self.settings.untenable:  # it would have to be a step on the way
             estimate -= self.settings.near
-        theta, jacobian = point.theta, point.jacobian
+        theta, jacobian, unknowns = linear.theta, linear.jacobian, Unknowns(self.problem, faults)
         if fault.own < 0:
             first = len(theta) - len(self.problem.nuisances)
             theta = np.insert(theta, [first] * len(fault.width), 0.0)
             jacobian = np.insert(jacobian, [first] * len(fault.width), 0.0, axis=1)
-        start = Unknowns(self.problem, faults).slices[-1].start
+        start = unknowns.slices[-1].start
         at = slice(start, start + len(score.amplitudes))
         jacobian = jacobian.copy()
         jacobian[:, at] = score.path.columns @ score.path.slopes(score.amplitudes[None, :])[0]
-        solved = Point(theta, point.prediction, jacobian)
+        solved = Linear(linear.residual, theta, jacobian, unknowns.width)
         theta = theta.copy()
         theta[at] = score.amplitudes  # counted from where nothing happens: what its tolerance had found is in it
-        return Proposal(faults, theta, jacobian, coarse, solved, estimate)
+        return Start(faults, theta, jacobian, coarse, solved, estimate)
 
     def _propose_without(self, fit: Fit, fault: Fault) -> None:
         """Take a fault from a model."""
         faults, linear = self._without(fit, fault)
         estimate = posterior(self.problem.errors, linear).promised + self._log_prior(faults)
-        self._offer(Proposal(faults, linear.theta, linear.jacobian, estimate=estimate))
+        self._offer(Start(faults, linear.theta, linear.jacobian, estimate=estimate))
 
     def _without(self, fit: Fit, fault: Fault) -> tuple[tuple[Fault, ...], Linear]:
         """A model without one of its faults, whose tolerance has its stated prior again and stays where it is."""
@@ -356,7 +342,7 @@ class _Search:
             theta, jacobian = np.delete(theta, at), np.delete(jacobian, at, axis=1)
         return faults, Linear(residual, theta, jacobian, Unknowns(self.problem, faults).width)
 
-    def _offer(self, proposal: Proposal) -> None:
+    def _offer(self, proposal: Start) -> None:
         """Keep the likeliest start of every explanation that was not fitted yet, or less well than from there."""
         known, fit = self.proposals.get(proposal.labels), self.fits.get(proposal.labels)
         better = fit is None or proposal.coarse or proposal.estimate > self._log_probability(fit) + Deciding.better

@@ -26,7 +26,7 @@ class Unknowns:
     """The free numbers of a model with some faults beside all tolerances."""
 
     def __init__(self, problem: Problem, faults: Sequence[Fault]) -> None:
-        self.faults = tuple(faults)
+        self.problem, self.faults = problem, tuple(faults)
         effects = [fault for fault in faults if fault.own < 0]
         count = len(problem.nuisances)
         reach = np.full(count, Deciding.reach)
@@ -48,9 +48,10 @@ class Unknowns:
         #: (t,): where tolerances with their stated prior are
         self.tolerances = self.amplitudes + np.array([i for i in range(count) if i not in taken], dtype=int)
 
-    def is_reading(self, problem: Problem) -> list[bool]:
+    @property
+    def is_reading(self) -> list[bool]:
         """Which numbers act on readings alone: their derivative is known without a prediction, (k,)."""
-        return [False] * self.amplitudes + [nuisance.column is not None for nuisance in problem.nuisances]
+        return [False] * self.amplitudes + [nuisance.column is not None for nuisance in self.problem.nuisances]
 
     def effects(self, theta: FloatArray) -> tuple[Effect, ...]:
         """The faults as effects."""
@@ -58,11 +59,12 @@ class Unknowns:
         values = [fault.values(amplitudes[at]) for fault, at in zip(self.faults, self.slices, strict=True)]
         return tuple(Effect(fault.name, **table) for fault, table in zip(self.faults, values, strict=True))
 
-    def predict(self, forward: ForwardModel, problem: Problem, theta: FloatArray) -> FloatArray | None:
+    def predict(self, forward: ForwardModel, theta: FloatArray) -> FloatArray | None:
         """Prediction in units of sigma, (n,); None where the model has no equilibrium."""
         amplitudes = theta + self.origin
         pairs = zip(self.faults, self.slices, strict=True)
         effects = [fault.candidate.effect(amplitudes[at]) for fault, at in pairs if fault.own < 0]
+        problem = self.problem
         try:
             return problem.scaled(predict(forward, effects, problem.nuisances, amplitudes[self.amplitudes :]))
         except (ValueError, ArithmeticError, TpjbError):
@@ -73,7 +75,7 @@ def prediction(
     forward: ForwardModel, problem: Problem, faults: tuple[Fault, ...], theta: FloatArray
 ) -> FloatArray | None:
     """Job: the prediction at a point."""
-    return Unknowns(problem, faults).predict(forward, problem, theta)
+    return Unknowns(problem, faults).predict(forward, theta)
 
 
 def derivatives(
@@ -81,29 +83,26 @@ def derivatives(
 ) -> list[FloatArray | None]:
     """Job: derivatives of the prediction by some numbers, each from the point's own solved state, (n,) each."""
     unknowns = Unknowns(problem, faults)
-    at_point = unknowns.predict(forward, problem, theta)
+    at_point = unknowns.predict(forward, theta)
     out: list[FloatArray | None] = []
     for index in indices:
         step = _SHARE * unknowns.width[index]
         if index >= unknowns.amplitudes:  # towards zero: there the model surely has an equilibrium
             step = -max(step, _DEVIATIONS) if theta[index] > 0.0 else max(step, _DEVIATIONS)
-        out.append(
-            None if at_point is None else _difference(forward, problem, unknowns, theta, at_point, (index, step))
-        )
+        out.append(None if at_point is None else _difference(forward, unknowns, theta, at_point, (index, step)))
     return out
 
 
 def _difference(
-    forward: ForwardModel, problem: Problem, unknowns: Unknowns, theta: FloatArray, at_point: FloatArray,
-    moved: tuple[int, float],
-) -> FloatArray | None:  # fmt: skip
+    forward: ForwardModel, unknowns: Unknowns, theta: FloatArray, at_point: FloatArray, moved: tuple[int, float]
+) -> FloatArray | None:
     """One difference; the other way where the first is out of bounds or has no equilibrium."""
     index, step = moved
     for signed in (step, -step):
         there = theta.copy()
         there[index] += signed
         if unknowns.low[index] <= there[index] <= unknowns.high[index]:
-            changed = unknowns.predict(forward.fresh(), problem, there)
+            changed = unknowns.predict(forward.fresh(), there)
             if changed is not None:
                 return np.asarray((changed - at_point) / signed)
     return None
@@ -120,7 +119,7 @@ def path_changes(
         theta = np.zeros(len(unknowns.width))
         theta[at] = node
         if len(out) < most and unknowns.low[at] <= node <= unknowns.high[at]:
-            changed = unknowns.predict(forward.fresh(), problem, theta)
+            changed = unknowns.predict(forward.fresh(), theta)
             if changed is not None:
                 out.append((node, changed - base))
     return out

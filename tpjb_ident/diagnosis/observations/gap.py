@@ -72,16 +72,6 @@ def gap_at(gaps: Mapping[str, float], end: str) -> float:
     return next((float(v) for k, v in gaps.items() if k.endswith(end)), 0.0)
 
 
-def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
-    """Mean direct coefficient of every element's point and part (k or omega c); 1 outside ``h``, (n,)."""
-    sums: dict[tuple[object, ...], list[float]] = {}
-    for e, v in zip(elements, value, strict=True):
-        if e.family == "h" and e.observable[1] == e.observable[2]:
-            sums.setdefault((e.observable[0], e.where), []).append(abs(float(v)))
-    rows = [sums.get((e.observable[0], e.where), [1.0]) if e.family == "h" else [1.0] for e in elements]
-    return np.array([float(np.mean(row)) for row in rows])
-
-
 def coordinate(elements: Sequence[Element], name: str) -> FloatArray:
     """A coordinate of every element, spread over -1 .. 1; 0 where it has none or all are alike, (n,)."""
     values = np.array([e.place(name) for e in elements])

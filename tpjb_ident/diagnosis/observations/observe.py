@@ -150,28 +150,47 @@ class Observations:
         return np.sqrt(np.diag(self.covariance) + self.sigma**2)
 
 
+def direct_scale(elements: Sequence[Element], value: FloatArray) -> FloatArray:
+    """Mean direct coefficient of every element's point and part (k or omega c), of all where none is direct, (n,)."""
+    parts = [(e.observable[0], e.where) if e.family == "h" else None for e in elements]
+    sums: dict[object, list[float]] = {}
+    for direct in (True, False):
+        present = set(sums)
+        for e, part, v in zip(elements, parts, value, strict=True):
+            if part not in present and direct == (e.observable[1] == e.observable[2]):
+                sums.setdefault(part, []).append(abs(float(v)))
+    sums[None] = [1.0]
+    return np.array([float(np.mean(sums[part])) for part in parts])
+
+
+def stated_sigma(elements: Sequence[Element], value: FloatArray, tolerance: Tolerance) -> FloatArray:
+    """Stated model tolerance of every element, (n,)."""
+    table = {
+        "h": tolerance.stiffness, "temperature": tolerance.temperature, "locus": tolerance.position,
+        "load": tolerance.load, "dry": tolerance.dry, "clearance": tolerance.position,
+    }  # fmt: skip
+    rows = [tolerance.angle if e.observable == "side_angle" else table[e.family] for e in elements]
+    return np.array(rows) * direct_scale(elements, value)
+
+
 @dataclass
 class _Builder:
     value: list[float] = field(default_factory=list)
-    sigma: list[float] = field(default_factory=list)
     elements: list[Element] = field(default_factory=list)
     covariance: list[FloatArray] = field(default_factory=list)
 
-    def add(
-        self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray, tolerance: FloatArray | float
-    ) -> None:
+    def add(self, elements: Sequence[Element], value: FloatArray, covariance: FloatArray) -> None:
         value = np.atleast_1d(value)
         finite = np.isfinite(value) & np.isfinite(np.diag(covariance))
-        sigma = np.broadcast_to(np.asarray(tolerance, float), value.shape)
         self.value += list(value[finite])
-        self.sigma += list(sigma[finite])
         self.elements += [e for e, k in zip(elements, finite, strict=True) if k]
         self.covariance.append(covariance[np.ix_(finite, finite)])
         self.kept = finite
 
-    def observed(self, layout: Layout) -> Observations:
-        value, sigma = np.array(self.value), np.array(self.sigma)
-        return Observations(layout, value, block_diag(*self.covariance), sigma, tuple(self.elements))
+    def observed(self, layout: Layout, tolerance: Tolerance) -> Observations:
+        value, elements = np.array(self.value), tuple(self.elements)
+        sigma = stated_sigma(elements, value, tolerance)
+        return Observations(layout, value, block_diag(*self.covariance), sigma, elements)
 
 
 def observe(
@@ -184,15 +203,15 @@ def observe(
     """Gather a campaign's results into one vector."""
     tolerance = tolerance or Tolerance()
     builder = _Builder()
-    dynamic = _add_dynamic(builder, identification, tolerance)
+    dynamic = _add_dynamic(builder, identification)
     locus_tests = _add_locus(builder, locus, identification, tolerance) if locus is not None else ()
     usable = [c for c in curves if c.valid_from < c.valid_to < math.inf]
-    dry = tuple(_add_dry(builder, curve, tolerance) for curve in usable)
-    push = _add_clearance(builder, polygon, tolerance) if polygon is not None else None
-    return builder.observed(Layout(dynamic, locus_tests, dry, push))
+    dry = tuple(_add_dry(builder, curve) for curve in usable)
+    push = _add_clearance(builder, polygon) if polygon is not None else None
+    return builder.observed(Layout(dynamic, locus_tests, dry, push), tolerance)
 
 
-def _add_dynamic(builder: _Builder, identification: Identification, tolerance: Tolerance) -> tuple[DynamicTest, ...]:
+def _add_dynamic(builder: _Builder, identification: Identification) -> tuple[DynamicTest, ...]:
     tests: dict[tuple[float, float, float], list[int]] = {}
     points = [p for p in identification.points if not _mains_on_excitation(p)] or list(identification.points)
     for i, p in enumerate(points):
@@ -202,14 +221,13 @@ def _add_dynamic(builder: _Builder, identification: Identification, tolerance: T
     for (load, direction, speed), members in tests.items():
         place = _at_point(load, direction, speed)
         for i in members:
-            _add_stiffness(builder, points[i], place, tolerance)
+            _add_stiffness(builder, points[i], place)
         kelvin = pad_means([points[i].temperatures for i in members])
         temperature = {pad: t - 273.15 for pad, t in kelvin.items()}
         names = _temperature_elements(place, temperature)
         if temperature:
             noise = np.eye(len(names)) * Deciding.temperature**2
-            value = np.array(list(temperature.values()))
-            builder.add(names, value, noise, tolerance.temperature)
+            builder.add(names, np.array(list(temperature.values())), noise)
         out.append(
             DynamicTest(load, direction, speed, tuple(points[i].point.excitation for i in members), tuple(temperature))
         )
@@ -221,15 +239,14 @@ def _mains_on_excitation(result: PointResult) -> bool:
     return MAINS_ON_LINE in result.quality and MAINS_CORRECTED not in result.quality
 
 
-def _add_stiffness(builder: _Builder, result: PointResult, place: Where, tolerance: Tolerance) -> None:
+def _add_stiffness(builder: _Builder, result: PointResult, place: Where) -> None:
     h = result.stiffness.h
     elements = _stiffness_elements((*place, ("excitation", result.point.excitation)))
-    scale = np.repeat(result.stiffness.direct, 4)
     value = np.concatenate([h.real.ravel(), h.imag.ravel()])
     covariance = np.asarray(result.stiffness.covariance)
     if "no-spare-direction" in result.quality:  # the interval knows repeats only, not what runs differ by
-        covariance = covariance + np.diag((Deciding.unseen * scale) ** 2)
-    builder.add(elements, value, covariance, tolerance.stiffness * scale)
+        covariance = covariance + np.diag((Deciding.unseen * direct_scale(elements, value)) ** 2)
+    builder.add(elements, value, covariance)
 
 
 def _add_locus(
@@ -238,40 +255,57 @@ def _add_locus(
     """Positions and load readings; a load that misses its set point moves both, so they share an error."""
     out = []
     spread = np.diag([tolerance.load_miss**2, tolerance.direction_miss**2])
-    stated = (tolerance.position, tolerance.position, tolerance.load, tolerance.load)
-    for p, give in zip(locus.points, moved_by_miss(locus, identification), strict=True):
-        test = LocusTest(p.point.static_load, p.point.static_load_direction, p.point.spin)
+    points = [p.point for p in locus.points]
+    tests = [LocusTest(point.static_load, point.static_load_direction, point.spin) for point in points]
+    chosen, moved = _spread(tests), moved_by_miss(locus, identification)
+    for test, p, give in zip(tests, locus.points, moved, strict=True):
+        if test not in chosen:
+            continue
         turn = math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi)
         stacked = np.vstack([give, np.eye(2)])
         covariance = stacked @ spread @ stacked.T
         covariance[:2, :2] += p.covariance
         value = np.array([*p.position, p.load / test.load, turn])
-        builder.add(_locus_elements(_at_point(*astuple(test))), value, covariance, np.array(stated))
+        builder.add(_locus_elements(_at_point(*astuple(test))), value, covariance)
         out.append(test)
     return tuple(out)
 
 
-def _add_dry(builder: _Builder, curve: PivotCurve, tolerance: Tolerance) -> DryTest:
+def _spread(tests: Sequence[LocusTest]) -> set[LocusTest]:
+    """Every second, third .. direction where a load and a speed have more than `_DIRECTIONS`."""
+    groups: dict[tuple[float, float], list[LocusTest]] = {}
+    for test in dict.fromkeys(tests):
+        groups.setdefault((test.load, test.speed), []).append(test)
+    chosen: set[LocusTest] = set()
+    for group in groups.values():
+        around = sorted(group, key=lambda test: test.direction % (2 * math.pi))
+        chosen.update(around[:: -(-len(around) // _DIRECTIONS)])
+    return chosen
+
+
+def _add_dry(builder: _Builder, curve: PivotCurve) -> DryTest:
     load = np.array([curve.valid_from + s * (curve.valid_to - curve.valid_from) for s in Deciding.dry_shares])
     value = -np.log(np.asarray(curve.stiffness(load), float))
     covariance = curve.relative_stiffness_covariance(load)
     covariance = covariance + np.diag(Deciding.dry_shape**2 * np.diag(covariance))
-    builder.add(_dry_elements(curve.pad, load), value, covariance, tolerance.dry)
+    builder.add(_dry_elements(curve.pad, load), value, covariance)
     used_loads = load[builder.kept]
     return DryTest(curve.pad, tuple(float(w) for w in used_loads))
 
 
-def _add_clearance(builder: _Builder, polygon: ClearancePolygon, tolerance: Tolerance) -> float:
+def _add_clearance(builder: _Builder, polygon: ClearancePolygon) -> float:
     turn = np.array([math.remainder(t, 2 * math.pi) for t in polygon.fitted_angle - polygon.angles])
     rows = (
-        ("clearance_pushed", polygon.clearance_pushed, polygon.clearance_pushed_se, tolerance.position),
-        ("side_angle", turn, polygon.fitted_angle_se, tolerance.angle),
+        ("clearance_pushed", polygon.clearance_pushed, polygon.clearance_pushed_se),
+        ("side_angle", turn, polygon.fitted_angle_se),
     )
-    for name, value, error, stated in rows:
-        builder.add(_clearance_elements(name, polygon.angles), value, np.diag(np.asarray(error) ** 2), stated)
+    for name, value, error in rows:
+        builder.add(_clearance_elements(name, polygon.angles), value, np.diag(np.asarray(error) ** 2))
     return float(polygon.push_load)
 
 
+#: Load directions per load and speed that are enough: the locus of five pads has five waves, two directions to each.
+_DIRECTIONS = 10
 #: Harmonics of the load's direction that a locus of many directions is described by.
 _HARMONICS = 3
 
@@ -325,7 +359,6 @@ def _largest_gap(angle: FloatArray) -> float:
 
 def observe_table(path: Path, reading_error: float | None = None, tolerance: Tolerance | None = None) -> Observations:
     """Read a table of coefficients."""
-    tolerance = tolerance or Tolerance()
     builder = _Builder()
     tests: dict[tuple[float, float, float], list[float]] = {}
     for entry in read_coefficients(path, reading_error):
@@ -336,10 +369,9 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
         for part in "kc":
             factor = point.excitation if part == "c" else 1.0
             part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
-            direct = [abs(v) for name, (v, _) in part_coefficients.items() if name in {f"{part}xx", f"{part}yy"}]
-            scale = factor * float(np.mean(direct or [abs(v) for v, _ in part_coefficients.values()] or [1.0]))
-            least = Deciding.axis * scale * (reading_error or 0.0)
             elements = [Element("h", name, where) for name in part_coefficients]
             value, error = factor * np.array(list(part_coefficients.values())).reshape(-1, 2).T
-            builder.add(elements, value, np.diag(np.maximum(error, least) ** 2), tolerance.stiffness * scale)
-    return builder.observed(Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items())))
+            least = Deciding.axis * (reading_error or 0.0) * direct_scale(elements, value)
+            builder.add(elements, value, np.diag(np.maximum(error, least) ** 2))
+    layout = Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items()))
+    return builder.observed(layout, tolerance or Tolerance())

@@ -121,7 +121,7 @@ def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect,
         if fault.is_term:
             continue
         parameters = parameters_of(fit, index)
-        change = float(np.linalg.norm(fit.point.jacobian[:, at] @ fit.point.theta[at]))
+        change = float(np.linalg.norm(fit.linear.jacobian[:, at] @ fit.linear.theta[at]))
         words = _stands_in(fault, parameters[fault.candidate.parameter.name])
         rows.append((change, FoundEffect(fault.name, parameters, words, round(shares[fault.name], 4))))
     return tuple(effect for _, effect in sorted(rows, key=lambda row: -row[0]))
@@ -129,26 +129,19 @@ def _effects(comparison: Comparison, judgement: Judgement) -> tuple[FoundEffect,
 
 def parameters_of(fit: Fit, index: int) -> dict[str, Estimate]:
     """Parameters of one fault of a fit with their 95 % intervals."""
-    fault, amplitudes, errors = fit.faults[index], fit.amplitudes[index], fit.errors[index]
-    if fault.candidate.basis:
-        return _term_parameters(fault, amplitudes, errors)
+    fault, amplitudes = fit.faults[index], fit.amplitudes[index]
     value, out = fault.values(amplitudes), {}
-    for k, parameter in enumerate(fault.candidate.free):
-        step = np.zeros(len(amplitudes))
-        step[k] = 1.96 * errors[k]
-        ends = [fault.values(amplitudes + sign * step)[parameter.name] for sign in (-1.0, 1.0)]
-        out[parameter.name] = Estimate(value[parameter.name], min(ends), max(ends), parameter.unit)
+    steps = 1.96 * np.diag(fit.errors[index])
+    ends = [[fault.values(amplitudes + sign * step) for sign in (-1.0, 1.0)] for step in steps]
+    for parameter in fault.candidate.free:
+        size = value[parameter.name]
+        moved = np.array([[end[parameter.name] for end in pair] for pair in ends]) - size
+        below, above = np.linalg.norm(moved.min(axis=1)), np.linalg.norm(moved.max(axis=1))
+        out[parameter.name] = Estimate(size, size - float(below), size + float(above), parameter.unit)
     for name, fixed in fault.candidate.fixed.items():
         unit = next((p.unit for p in kind_of(fault.name).parameters if p.name == name), "1")
         out[name] = Estimate(fixed, fixed, fixed, "1" if unit == "pad" else unit)
     return out
-
-
-def _term_parameters(fault: Fault, amplitudes: FloatArray, errors: FloatArray) -> dict[str, Estimate]:
-    value = fault.values(amplitudes)
-    spread = 1.96 * np.sqrt((np.asarray(fault.candidate.basis).T ** 2) @ errors**2)
-    pairs = zip(fault.candidate.free, map(float, spread), strict=True)
-    return {p.name: Estimate(value[p.name], value[p.name] - s, value[p.name] + s, p.unit) for p, s in pairs}
 
 
 def _below_floor(problem: Problem, comparison: Comparison, settings: DiagnoseSettings) -> tuple[str, ...]:

@@ -103,7 +103,7 @@ def _alone(fit: Fit, theta: FloatArray, faults: Sequence[Fault]) -> tuple[tuple[
 
 def _touched(fit: Fit, fault: Fault, without: FloatArray, whole: FloatArray) -> Touched:
     """Project the gap on what a fault moves, seen through noise, model error and all tolerances that are stated."""
-    held, stated = fit.problem.held, fit.point.jacobian[:, fit.unknowns.tolerances]
+    held, stated = fit.problem.held, fit.linear.jacobian[:, fit.unknowns.tolerances]
     for rows in (held, np.ones_like(held)):
         moved = (whole - without)[rows]
         weights = np.linalg.solve(_covariance(fit, rows, stated[rows]), moved)
@@ -126,8 +126,9 @@ def free_gap(fit: Fit) -> float:
 
 def free_prediction(fit: Fit) -> FloatArray:
     """What a fit predicts with all numbers where the points that are not held out put them, SI, (n,)."""
-    moved = _from_others(fit) - fit.point.theta
-    return np.asarray((fit.point.prediction + fit.point.jacobian @ moved) * fit.problem.sigma)
+    problem, linear = fit.problem, fit.linear
+    moved = linear.jacobian @ (_from_others(fit) - linear.theta)
+    return np.asarray((problem.measured - linear.residual + moved) * problem.sigma)
 
 
 def _gap(fit: Fit, predicted: FloatArray) -> float:
@@ -138,7 +139,7 @@ def _from_others(fit: Fit) -> FloatArray:
     """Free numbers as the points that are not held out tell them, (k,); as all do where none are left."""
     held = fit.problem.held
     rows = ~held if not held.all() else held
-    linear, width = fit.linear, fit.unknowns.width
+    linear, width = fit.linear, fit.linear.width
     columns = (linear.jacobian * width)[rows]
     residual = (linear.residual + linear.jacobian @ linear.theta)[rows]
     return np.asarray(width * (columns.T @ np.linalg.solve(_covariance(fit, rows, columns), residual)))
