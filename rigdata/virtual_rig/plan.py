@@ -51,13 +51,10 @@ class ClearanceSweep:
 
     push: float = 200.0
     seconds: float = 20.0
-    start: float = 0.0
-    slide_lag: float = radians(5.0)
-    slide_width: float = radians(3.0)
 
     def __post_init__(self) -> None:
-        if self.push <= 0 or self.seconds <= 0 or self.slide_width <= 0:
-            raise VirtualRigError("push, seconds and slide_width must be positive")
+        if self.push <= 0 or self.seconds <= 0:
+            raise VirtualRigError("push and seconds must be positive")
 
 
 @dataclass(frozen=True)

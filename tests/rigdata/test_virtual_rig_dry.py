@@ -139,7 +139,7 @@ def test_contact_is_missing_on_upper_pads_only():
 
 def swept(truth: RigTruth, push: float = 200.0, lag: float = math.radians(5)) -> tuple[np.ndarray, np.ndarray]:
     direction = np.linspace(0.0, 2 * np.pi, 7201)
-    return direction, swept_position(truth, push, direction, lag, math.radians(3))
+    return direction, swept_position(truth, push, direction, lag)
 
 
 def test_rigid_pivots_give_the_polygon_of_the_clearances():
