@@ -288,12 +288,16 @@ def _sides(truth: RigTruth) -> list[int]:
     By duality a pad has a side of the polygon where normal / clearance is a corner of the convex hull of all pads;
     the polygon is closed where that hull holds the origin.
     """
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
+    open_bearing = "the pads leave half the circle open: the shaft would fall out of the bearing"
     every_pad = list(range(len(truth.pivot_angles)))
-    hull = ConvexHull(_normals(truth, every_pad) / np.array(truth.clearance)[:, None])
+    try:
+        hull = ConvexHull(_normals(truth, every_pad) / np.array(truth.clearance)[:, None])
+    except QhullError as error:  # all pads are on one line
+        raise VirtualRigError(open_bearing) from error
     if np.max(hull.equations[:, -1]) * min(truth.clearance) >= -1e-6:
-        raise VirtualRigError("the pads leave half the circle open: the shaft would fall out of the bearing")
+        raise VirtualRigError(open_bearing)
     return sorted(hull.vertices.tolist(), key=lambda pad: truth.pivot_angles[pad] % (2 * np.pi))
 
 
