@@ -20,6 +20,8 @@ from rigdata.virtual_rig.plan import ClearanceSweep, DryTest, PlannedRun
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, load_vector, point_facts
 
 _SETTLING = 0.1  # time constant of an overshoot [s]
+#: How far the load passes a pad before the shaft slides along it, and over which angle it does [rad].
+_SLIDE_LAG, _SLIDE_WIDTH = np.radians([5.0, 3.0]).tolist()
 _UPPER = 0.3  # sine of a pivot's angle above which its pad counts as an upper one
 
 
@@ -236,18 +238,18 @@ def clearance_motion(run: PlannedRun, sweep: ClearanceSweep, truth: RigTruth, no
     rng = stream(seed, run.record, "dry")
     push = sweep.push * (1 + noise.dry.push_scatter * rng.standard_normal())
     time = np.arange(round(sweep.seconds * run.rate)) / run.rate
-    direction = sweep.start + 2 * np.pi * time / sweep.seconds
-    position = swept_position(truth, push, direction, sweep.slide_lag, sweep.slide_width)
+    direction = 2 * np.pi * time / sweep.seconds
+    position = swept_position(truth, push, direction)
     load = push * directions(direction)
     return Motion(time, position, load, truth.cold_temperatures, {"push_N": push})
 
 
-def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float, width: float) -> FloatArray:
+def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: float = _SLIDE_LAG) -> FloatArray:
     """Shaft position (n, 2) [m] under a load `push` [N] toward `direction` (n,) [rad].
 
     The shaft rests in the corner between the two pads that the load points between; each pivot carries its share
     of the load and gives by its own law. It slides along a pad's side to the next corner when the load has
-    passed that pad by `lag`, over about `width` (friction). On its way that pad alone carries, push times the cosine
+    passed that pad by `lag`, over a few degrees (friction). On its way that pad alone carries, push times the cosine
     of the angle between them: there the side is at clearance + deflection(that).
     """
     pads = _sides(truth)
@@ -258,7 +260,7 @@ def swept_position(truth: RigTruth, push: float, direction: FloatArray, lag: flo
         angle, next_angle = truth.pivot_angles[pad], truth.pivot_angles[after]
         gap = (next_angle - angle) % (2 * np.pi)
         passed, remaining = _wrapped(direction - angle - lag), _wrapped(next_angle + lag - direction)
-        share = 0.25 * (1 + np.tanh(passed / width)) * (1 + np.tanh(remaining / width))
+        share = 0.25 * (1 + np.tanh(passed / _SLIDE_WIDTH)) * (1 + np.tanh(remaining / _SLIDE_WIDTH))
         turned = np.clip(_wrapped(direction - angle), 0.0, gap)
         forces = push * np.stack([np.sin(gap - turned), np.sin(turned)]) / np.sin(gap)
         reach = np.stack([truth.clearance[k] + truth.deflection(k + 1, f) for k, f in zip((pad, after), forces)])
@@ -281,25 +283,22 @@ def _wrapped(angle: FloatArray) -> FloatArray:
 
 
 def _sides(truth: RigTruth) -> list[int]:
-    """Pads in counter-clockwise order, less those that the shaft cannot touch between their neighbours."""
-    pads = sorted(range(len(truth.pivot_angles)), key=lambda k: truth.pivot_angles[k] % (2 * np.pi))
-    removed = True
-    while removed and len(pads) > 3:
-        removed = False
-        for i, k in enumerate(pads):
-            before, after = pads[i - 1], pads[(i + 1) % len(pads)]
-            if (truth.pivot_angles[after] - truth.pivot_angles[before]) % (2 * np.pi) >= np.pi:
-                continue
-            clearances = np.array([truth.clearance[before], truth.clearance[after]])
-            corner = np.linalg.solve(_normals(truth, [before, after]), clearances)
-            if corner @ directions(truth.pivot_angles[k]) <= truth.clearance[k]:
-                pads.remove(k)
-                removed = True
-                break
-    angles = np.array([truth.pivot_angles[k] for k in pads])
-    if np.max((np.roll(angles, -1) - angles) % (2 * np.pi)) >= np.pi - 1e-6:
-        raise VirtualRigError("the pads leave half the circle open: the shaft would fall out of the bearing")
-    return pads
+    """Pads in counter-clockwise order, less those that the shaft cannot touch between their neighbours.
+
+    By duality a pad has a side of the polygon where normal / clearance is a corner of the convex hull of all pads;
+    the polygon is closed where that hull holds the origin.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    open_bearing = "the pads leave half the circle open: the shaft would fall out of the bearing"
+    every_pad = list(range(len(truth.pivot_angles)))
+    try:
+        hull = ConvexHull(_normals(truth, every_pad) / np.array(truth.clearance)[:, None])
+    except QhullError as error:  # all pads are on one line
+        raise VirtualRigError(open_bearing) from error
+    if np.max(hull.equations[:, -1]) * min(truth.clearance) >= -1e-6:
+        raise VirtualRigError(open_bearing)
+    return sorted(hull.vertices.tolist(), key=lambda pad: truth.pivot_angles[pad] % (2 * np.pi))
 
 
 def _normals(truth: RigTruth, pads: list[int]) -> FloatArray:

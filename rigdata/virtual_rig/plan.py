@@ -51,13 +51,10 @@ class ClearanceSweep:
 
     push: float = 200.0
     seconds: float = 20.0
-    start: float = 0.0
-    slide_lag: float = radians(5.0)
-    slide_width: float = radians(3.0)
 
     def __post_init__(self) -> None:
-        if self.push <= 0 or self.seconds <= 0 or self.slide_width <= 0:
-            raise VirtualRigError("push, seconds and slide_width must be positive")
+        if self.push <= 0 or self.seconds <= 0:
+            raise VirtualRigError("push and seconds must be positive")
 
 
 @dataclass(frozen=True)
@@ -134,7 +131,7 @@ class RigPlan:
     def _dynamic_runs(self) -> Iterable[PlannedRun]:
         for point in self.dynamic:
             self._check_dynamic(point)
-            together = [p for p in self.dynamic if _unexcited(p) == _unexcited(point)]
+            together = [p for p in self.dynamic if p.static_key == point.static_key]
             if not self.joint_frequencies:
                 together = [point]
             amplitude = self.dynamic_fraction * point.static_load / len(together) ** 0.5
@@ -205,10 +202,6 @@ def operating_points(
 def locus_points(count: int, load: float = 5000.0) -> tuple[OperatingPoint, ...]:
     """Give `count` directions of one load [N], evenly all around, counter-clockwise from straight down, at 22 Hz."""
     return tuple(OperatingPoint(load, _DOWNWARD + 2 * pi * i / count, hz(22.0)) for i in range(count))
-
-
-def _unexcited(point: OperatingPoint) -> tuple[float, float, float]:
-    return point.static_load, point.static_load_direction, point.spin
 
 
 def _load_name(point: OperatingPoint) -> str:

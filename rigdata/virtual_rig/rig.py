@@ -49,30 +49,22 @@ def analogue_readings(
     vectors: dict[tuple[str, float], FloatArray] = {}
     columns = {}
     for sensor, added in zip(instruments.sensors, disturbance):
-        key = (sensor.quantity, sensor.error.delay)
-        if sensor.axis is not None and key not in vectors:
-            # sampled at the delayed time instead of shifted: exact for any fraction of a sample
-            vectors[key] = motion.at(sensor.quantity, time - sensor.error.delay)
-        value = _sensed(sensor, instruments, motion, vectors.get(key))
         error = sensor.error
-        columns[sensor.name] = (
-            sensor.polarity * sensor.scale * (error.gain * value + error.offset + added) + sensor.zero
-        )
+        value: FloatArray | float = abs(motion.speed)
+        if sensor.quantity == "temperature":
+            value = motion.temperature[(sensor.pad or 1) - 1]
+        elif sensor.axis is not None:
+            # sampled at the delayed time instead of shifted: exact for any fraction of a sample
+            late = time - error.delay
+            key = (sensor.quantity, error.delay)
+            if key not in vectors:
+                vectors[key] = motion.at(sensor.quantity, late)
+            value = vectors[key] @ felt_direction(sensor, instruments)
+            if sensor.quantity == "displacement":
+                value = value + motion.runout(sensor.axis + error.angle, late)
+        reading = error.gain * value + error.offset + added
+        columns[sensor.name] = sensor.polarity * sensor.scale * reading + sensor.zero
     return columns
-
-
-def _sensed(sensor: Sensor, instruments: Instruments, motion: Motion, vector: FloatArray | None) -> FloatArray:
-    """Quantity (n,) [SI, degC for temperatures] that a sensor feels, from the vector (n, 2) at its delayed time."""
-    n = len(motion.time)
-    if sensor.quantity == "temperature":
-        return np.full(n, motion.temperature[(sensor.pad or 1) - 1])
-    if sensor.quantity == "speed" or vector is None or sensor.axis is None:
-        return np.full(n, abs(motion.speed))
-    value = vector @ felt_direction(sensor, instruments)
-    if sensor.quantity == "displacement":
-        late = motion.time - sensor.error.delay
-        value = value + motion.runout(sensor.axis + sensor.error.angle, late)
-    return value
 
 
 def felt_direction(sensor: Sensor, instruments: Instruments) -> FloatArray:

@@ -139,7 +139,7 @@ def test_contact_is_missing_on_upper_pads_only():
 
 def swept(truth: RigTruth, push: float = 200.0, lag: float = math.radians(5)) -> tuple[np.ndarray, np.ndarray]:
     direction = np.linspace(0.0, 2 * np.pi, 7201)
-    return direction, swept_position(truth, push, direction, lag, math.radians(3))
+    return direction, swept_position(truth, push, direction, lag)
 
 
 def test_rigid_pivots_give_the_polygon_of_the_clearances():
@@ -178,8 +178,9 @@ def test_a_pad_out_of_reach_has_no_side():
     assert (position @ [math.cos(angle), math.sin(angle)]).max() < 300e-6
 
 
-def test_an_open_bearing_is_refused():
-    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=(0.0, 1.0, 2.0), clearance=(8e-5,) * 3)
+@pytest.mark.parametrize("angles", [(0.0, 1.0, 2.0), (-math.pi / 2, math.pi / 2, math.pi / 2)])
+def test_an_open_bearing_is_refused(angles):
+    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=angles, clearance=(8e-5,) * 3)
     rig = VirtualRig(truth, RigPlan(clearance=(ClearanceSweep(),)), Instruments.like_paper(3), Noise.none())
     with pytest.raises(VirtualRigError, match="fall out"):
         rig.simulate("c-1")
