@@ -9,6 +9,7 @@ import pytest
 
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
 from tests.phasors.phasor_cases import complex_normal
+from tests.seeds import seeds
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 
@@ -151,7 +152,7 @@ def struck(case, runs, size, seed=0):
     return rig, replace(blocks, z=z), truth
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_one_bad_run_of_five_is_given_no_weight(seed):
     case = Case(directions=5)
     rig, blocks, truth = struck(case, [7], 0.2, seed)
@@ -164,7 +165,7 @@ def test_one_bad_run_of_five_is_given_no_weight(seed):
     assert np.median(deviations(solution)[1] / usual[1]) < 2.5
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_two_bad_runs_of_five_leave_a_wide_interval_that_holds(seed):
     case = Case(directions=5)
     rig, blocks, truth = struck(case, [6, 8], 0.1, seed)

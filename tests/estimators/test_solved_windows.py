@@ -114,6 +114,7 @@ def stiffer_runs(seed, g, size):
     return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), 8))
 
 
+@pytest.mark.slow
 def test_runs_that_differ_in_stiffness_widen_its_interval_and_hardly_that_of_damping():
     inside, widths = [], []
     truth = np.concatenate([H.real.ravel(), H.imag.ravel()])

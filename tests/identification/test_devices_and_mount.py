@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.estimate.block_cases import Case, made, solved
+from tests.seeds import seeds
 from tpjb_ident.estimate.sensors import found_mount
 from tpjb_ident.identification.campaign_blocks import with_start
 from tpjb_ident.identification.campaign_solution import learnt_rig
@@ -16,7 +17,7 @@ from tpjb_ident.identification.unstated_clocks import with_found_devices
 CASE = Case(hertz=(30.0, 60.0, 90.0))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 @pytest.mark.parametrize("mount", ["cells", "floating"])
 def test_accelerations_over_displacements_tell_the_mount(mount, seed):
     rig, blocks, _ = made(replace(CASE, mount=mount), seed)
@@ -50,13 +51,13 @@ def test_a_clock_that_nobody_stated_is_found(ppm):
     assert found == {"displacement": "", "force": "cells", "acceleration": "accelerometers"}
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_one_clock_is_one(seed):
     rig, blocks, _ = made(CASE, seed)
     assert with_found_devices(rig.sensors, blocks) == rig.sensors
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_a_beat_of_one_device_is_no_clock(seed):
     """A line 0.4 Hz beside the drive turns every run's cells otherwise, whatever the frequency."""
     rig, blocks, _ = made(CASE, seed)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved, terms_of
+from tests.seeds import seeds
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.temperature import Temperature
 
-SEEDS = range(3)
+SEEDS = seeds(3)
 _WRONG, _LATE = "accelerometers-contradict-cells", "cells-and-accelerometers-out-of-phase"
 
 
