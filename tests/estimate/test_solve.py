@@ -129,7 +129,7 @@ def drawn_gains(rng):
     ids=["records", "gains", "three probes", "scatter"],
 )
 def test_intervals_hold_what_they_say(case, drawn):
-    assert 0.93 <= inside(case, 300, drawn) <= 0.98
+    assert 0.92 <= inside(case, 80, drawn) <= 0.985  # 300 campaigns: 0.93 to 0.98
 
 
 def test_the_scatter_of_the_force_is_found_by_its_size():

@@ -1,7 +1,7 @@
 """Recovery of a known H by every estimator: accuracy, bias, coverage in the study's situation.
 
 With fixed seeds; a table of every method in every case is in `tests/studies/RESULTS.md`.
-The targets are for 400 replicates; fewer leave a Monte-Carlo error of 1/sqrt(2 n) on an RMSE.
+Fewer replicates than its 400 leave a Monte-Carlo error of 1/sqrt(2 n) on an RMSE.
 """
 
 from __future__ import annotations
@@ -38,16 +38,17 @@ def test_default_method_stands_every_fault(case: Case, rmse: float):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "rmse", "bias"),
-    [(Case(), 1.0, 0.15), (Case("lev", 0.3), 1.02, 0.15), (Case(relx=0.2), 3.5, 0.3)],
+    [(Case(), 1.0, 0.3), (Case("lev", 0.3), 1.02, 0.3), (Case(relx=0.2), 3.5, 0.6)],
     ids=lambda value: value.name if isinstance(value, Case) else str(value),
 )
-def test_targets_with_400_replicates(case: Case, rmse: float, bias: float):
+def test_targets_of_error_bias_and_coverage(case: Case, rmse: float, bias: float):
     """Of the second case 1.0 without a scatter of the runs, which is asked for here and costs 1.5 % of efficiency."""
-    result = score(case, "mm-eiv", 400, SEED)
-    assert result.rmse <= rmse
+    n = 100
+    result = score(case, "mm-eiv", n, SEED)
+    assert result.rmse <= rmse * (1 + 1 / np.sqrt(2 * n))
     assert result.worst < 4 * rmse
     assert np.abs(result.bias).max() <= bias
-    assert 93 <= result.coverage <= 98
+    assert 92 <= result.coverage <= 99
 
 
 @pytest.mark.parametrize("directions", [3, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in (4, 8))])
@@ -112,7 +113,7 @@ def _runs_that_differ(seed: int, directions: int = 6, windows: int = 6):
 @pytest.mark.parametrize(("directions", "method"), [(6, "mm-eiv"), (6, "ols"), (4, "mm-eiv")])
 def test_intervals_hold_when_runs_differ_by_more_than_their_repeats(directions: int, method: str):
     inside = []
-    for seed in range(120):
+    for seed in range(90):
         D, F, label = _runs_that_differ(seed, directions)
         est = estimate_dynamic_stiffness(D, F, OMEGA, label, method=method)
         lo, hi = est.interval()
