@@ -12,7 +12,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
-from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
+from tests.rigs.demo_copies import DEMO, scaled_sensors, shortened, written
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.magnitudes import Sizes, _film, _housing, _probes, _weight, check_magnitudes
 from tpjb_ident.check.observation import observe

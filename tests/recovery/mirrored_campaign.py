@@ -60,9 +60,7 @@ def mirrored_bearing(text: str) -> tuple[str, int]:
 
 
 def mirror_campaign(source: Path, target: Path) -> Path:
-    """Write the mirror image of a campaign, a folder of CSV or one HDF5 file."""
-    if source.is_dir():
-        return _mirror_folder(source, target)
+    """Write the mirror image of a campaign, one HDF5 file."""
     shutil.copy(source, target)
     with h5py.File(target, "r+") as file:
         bearing, pads = mirrored_bearing(str(file.attrs["bearing"]))
@@ -71,26 +69,4 @@ def mirror_campaign(source: Path, target: Path) -> Path:
         for run in file["runs"].values():
             for name in negated & set(run):
                 run[name][...] = -run[name][...]
-    return target
-
-
-def _mirror_folder(source: Path, target: Path) -> Path:
-    shutil.copytree(source, target)
-    manifest = target / "campaign.toml"
-    text = manifest.read_text(encoding="utf-8")
-    drawing = target / re.search(r'^bearing = "(.*?)"', text, flags=re.MULTILINE)[1]
-    bearing, pads = mirrored_bearing(drawing.read_text(encoding="utf-8"))
-    drawing.write_text(bearing, encoding="utf-8")
-    text, negated = mirrored_manifest(text, pads)
-    manifest.write_text(text, encoding="utf-8")
-    for file in (target / "runs").glob("*.csv"):
-        lines = file.read_text(encoding="cp1252").split("\n")
-        columns = [i for i, name in enumerate(lines[5].strip().split(";")) if name in negated]
-        for n in range(7, len(lines)):
-            cells = lines[n].split(";")
-            for i in columns:
-                if i < len(cells) and any(c.isdigit() for c in cells[i]):
-                    cells[i] = cells[i][1:] if cells[i].startswith("-") else f"-{cells[i]}"
-            lines[n] = ";".join(cells)
-        file.write_text("\n".join(lines), encoding="cp1252")
     return target

@@ -28,7 +28,6 @@ LOADS = np.array([1000.0, 2000.0, 4000.0])
 CONTACT_LOAD = 500.0
 CONTACT_TOLERANCE = 0.05
 KINDS = ("rocker", "rocker on housing", "sphere", "sphere on housing")
-UPPER_PADS = (3, 4)
 
 
 #: Load programmes, one test each; `dataclasses.replace` gives them another pad.
