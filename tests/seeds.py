@@ -1,4 +1,4 @@
-"""Seeds of a test that draws: the first in the quick run, the others in the whole one."""
+"""What of many cases the quick run takes: the first; the others are of the whole one."""
 
 from __future__ import annotations
 
@@ -7,6 +7,12 @@ from typing import Any
 import pytest
 
 
-def seeds(count: int, first: int = 0) -> list[Any]:
-    """So many seeds for `pytest.mark.parametrize`; all but the first are slow."""
-    return [first, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(first + 1, first + count))]
+def first_quick(*cases: Any) -> list[Any]:
+    """Cases for `pytest.mark.parametrize`, tuples of several arguments or values of one; all but the first are slow."""
+    slow = [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow) for case in cases[1:]]
+    return [cases[0], *slow]
+
+
+def seeds(count: int) -> list[Any]:
+    """So many seeds of a test that draws."""
+    return first_quick(*range(count))

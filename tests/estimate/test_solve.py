@@ -9,7 +9,7 @@ import pytest
 
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
 from tests.phasors.phasor_cases import complex_normal
-from tests.seeds import seeds
+from tests.seeds import first_quick, seeds
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 
@@ -36,7 +36,7 @@ def test_without_noise_and_errors_h_is_exact(case):
     assert np.abs(solution.h / truth - 1).max() < 1e-9
 
 
-@pytest.mark.parametrize("sensor", [0, 2, 5, 6])
+@pytest.mark.parametrize("sensor", first_quick(0, 2, 5, 6))
 def test_a_channel_that_is_missing_in_one_run_costs_nothing_but_its_row(sensor):
     """The third probe, or the housing's equations, stand in for it; nothing is read of the place where it was."""
     rig, blocks, truth = made(replace(EXACT, probes=3))
@@ -132,6 +132,7 @@ def test_intervals_hold_what_they_say(case, drawn):
     assert 0.92 <= inside(case, 80, drawn) <= 0.985  # 300 campaigns: 0.93 to 0.98
 
 
+@pytest.mark.slow
 def test_the_scatter_of_the_force_is_found_by_its_size():
     found = []
     for seed in range(8):

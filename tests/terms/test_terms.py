@@ -221,6 +221,7 @@ def test_how_h_turns_with_the_load_s_direction_is_learnt_from_the_runs_own_misse
     assert np.median(gain) > 2
 
 
+@pytest.mark.slow
 def test_a_miss_that_all_loads_share_is_considered():
     """The runs' scatter over the root of their number is how large it may be."""
     outside = []
