@@ -21,6 +21,7 @@ from rigdata.run import Run
 from rigdata.virtual_rig import Fault, Noise, Sensor
 from tests.good_campaigns import PLAN, directions, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
+from tests.seeds import first_quick
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Finding, Reporter, merge, reach
 from tpjb_ident.check.lines import excitation_line, other_line, steady_level
@@ -199,6 +200,7 @@ def test_a_good_campaign_has_no_problem_and_progress_is_told(campaign_of):
     assert told == [(i + 1, 9) for i in range(9)]
 
 
+@pytest.mark.slow
 def test_noise_free_data_are_not_dead(campaign_of):
     found = check_campaign(campaign_of(stiff_rig(7, plan=TINY, noise=Noise.none())))
     assert {p.severity for p in found} == {"note"}
@@ -282,11 +284,11 @@ SPARE = (Sensor.probe("X1C", math.radians(90.0), 8.1), Sensor.probe("X1D", 0.0, 
 
 @pytest.mark.parametrize(
     ("gain", "dead", "expected"),
-    [
+    first_quick(
+        (1.1, False, [("error", None, "contradict one another"), ("warning", "c-1", "contradict one another")]),
         (1.0, False, []),
         (1.0, True, [("warning", "p-2-up", "is dead")]),
-        (1.1, False, [("error", None, "contradict one another"), ("warning", "c-1", "contradict one another")]),
-    ],
+    ),
 )
 def test_spare_probes_that_contradict_the_others_are_told_of_dry_runs_and_sweep(campaign_of, gain, dead, expected):
     rig = stiff_rig(4, plan=replace(TINY, dynamic=(), dry=PLAN.dry), pivot_stiffness=1e8)

@@ -13,6 +13,7 @@ import rigdata
 from rigdata.virtual_rig import Fault, Noise
 from tests.good_campaigns import DAMPING, PLAN, RUN, STIFFNESS, stiff_rig, written
 from tests.rigs.held_run import HeldReader, channels, run_of
+from tests.seeds import seeds
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.lines import excitation_line
 from tpjb_ident.check.observation import observe
@@ -132,7 +133,7 @@ def test_what_no_gain_explains_names_nothing(readings):
     assert wrong_gains(readings) == {}
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8))
 def test_a_bearing_that_wanders_from_run_to_run_is_learnt(seed):
     made = point(8, scatter=1e-3, seed=seed)
     share = 1 + 0.03 * np.random.default_rng(seed).standard_normal((8, 1))
@@ -182,7 +183,7 @@ def test_stiffness_of_the_others_is_theirs():
     assert spoilt(point(), 2, 0, 2.0).stiffness([0, 1, 3, 4, 5]) == pytest.approx(H, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(5))
 def test_estimates_scatter_as_their_standard_errors_say(seed):
     others = [0, 1, 3, 4, 5]
     points = [point(scatter=2e-3, seed=100 * seed + i) for i in range(20)]

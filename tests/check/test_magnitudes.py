@@ -12,7 +12,7 @@ import pytest
 from rigdata.campaign import load_campaign
 from rigdata.operating_point import OperatingPoint
 from tests.good_campaigns import SMALL_PLAN, rocker_rig
-from tests.studies.descriptions import DEMO, scaled_sensors, shortened, written
+from tests.rigs.demo_copies import DEMO, scaled_sensors, shortened, written
 from tpjb_ident.check.campaign import check_campaign
 from tpjb_ident.check.findings import Reporter
 from tpjb_ident.check.magnitudes import Sizes, check_magnitudes, check_sizes, check_weight

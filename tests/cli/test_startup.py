@@ -47,7 +47,7 @@ print("once")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("place", ["in_a_callback", "swallowed"])
+@pytest.mark.parametrize("place", [pytest.param("in_a_callback", marks=pytest.mark.slow), "swallowed"])
 def test_an_interrupt_that_is_dropped_is_delivered_again(place):
     script = SCRIPT.replace("PLACE", place)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=True)

@@ -16,7 +16,7 @@ from tpjb_ident.diagnosis.forward.candidates import TERMS
 from tpjb_ident.diagnosis.forward.forward import Forward
 from tpjb_ident.diagnosis.planned import planned_observations
 
-TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "probe_rotation", *TERMS}
+TRIED = {"thermal_growth", "pivot_flexibility", "probe_rotation", *TERMS}
 SETTINGS = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)
 OTHER_LOADS = (2500.0, 3750.0, 7500.0, 8750.0)
 ROTATED = Effect("probe_rotation", angle=0.12)

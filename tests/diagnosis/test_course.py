@@ -62,23 +62,19 @@ def test_slopes_are_those_of_the_course():
 
 
 @pytest.mark.slow  # seconds: the bearing model itself
-@pytest.mark.parametrize(
-    ("name", "parameter", "size"),
-    [("thermal_growth", "clearance_change", 1.1e-5), ("preload_error", "pad_clearance_change", -3.4e-5)],
-)
-def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact(name, parameter, size):
+def test_a_comparison_finds_its_way_past_pads_that_come_out_of_contact():
     """Upper pads leave the shaft at another clearance for every load: K and C jump on the way."""
     setup = rocker_setup(Mesh(48, 4), accuracy=1e-5)
     layout = whole_layout(np.arange(2500.0, 8751.0, 1250.0), (10.0, 20.0, 30.0, 40.0, 50.0), sweep_first=False)
     planned = planned_observations(setup, layout)
     forward = Forward(setup, planned.layout, planned.elements)
-    hidden = forward.fresh()([Effect(name, **{parameter: size})])
+    hidden = forward.fresh()([Effect("preload_error", pad_clearance_change=-3.4e-5)])
     settings = DiagnoseSettings(workers=1)
     problem = pose(noisy(planned, hidden, 7), forward, settings)
     with workers(forward, problem, 1) as run:
         best = compare(run, problem, settings).best
-    assert best.label == name
-    assert best.effects[0].parameters[parameter] == pytest.approx(size, rel=0.03)
+    assert best.label == "preload_error"
+    assert best.effects[0].parameters["pad_clearance_change"] == pytest.approx(-3.4e-5, rel=0.03)
 
 
 class Narrow(Forward):

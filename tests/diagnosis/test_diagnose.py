@@ -28,9 +28,9 @@ from tpjb_ident.diagnosis.planned import dynamic, planned_observations
 TRIED = {"thermal_growth", "soft_pivot", "pivot_flexibility", "oil_viscosity", "probe_gain", "channel_delay"}
 
 
-def few() -> DiagnoseSettings:
-    """Settings that try `TRIED` only, whatever other tests have registered."""
-    return DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED)
+def few(*more: str) -> DiagnoseSettings:
+    """Settings that try `TRIED` and some more only, whatever other tests have registered."""
+    return DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - TRIED - {*more})
 
 
 @pytest.fixture(scope="module")
@@ -178,12 +178,11 @@ def test_a_hidden_effect_is_named_sized_and_closes_the_gap(setup, observations, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("other", [Effect("channel_delay", delay=3e-4), Effect("probe_rotation", angle=0.06)])
-def test_two_effects_are_named_where_a_tolerance_first_did_the_work_of_one(setup, observations, other):
+def test_two_effects_are_named_where_a_tolerance_first_did_the_work_of_one(setup, observations):
     """Upper pads leave the shaft on the way, and the oil's own tolerance went as far as ten deviations."""
-    hidden = (Effect("oil_viscosity", factor=0.6), other)
-    skip = frozenset(known_effects()) - TRIED - {"probe_rotation", "pivot_offset_error", "clearance_error"}
-    verdict = diagnose(campaign(observations, setup, hidden, 7), setup, DiagnoseSettings(workers=1, skip=skip)).verdict
+    hidden = (Effect("oil_viscosity", factor=0.6), Effect("probe_rotation", angle=0.06))
+    settings = few("probe_rotation", "pivot_offset_error", "clearance_error")
+    verdict = diagnose(campaign(observations, setup, hidden, 7), setup, settings).verdict
     assert verdict.verdict == "named"
     assert {e.name for e in verdict.effects} == {e.name for e in hidden}
 
@@ -192,9 +191,8 @@ def test_two_effects_are_named_where_a_tolerance_first_did_the_work_of_one(setup
 def test_one_thermometer_is_named_where_workshop_scatter_is_most_of_the_gap(setup, observations):
     workshop = [Effect("pad_offset", pad=pad, radial_offset=size) for pad, size in ((1, 4e-6), (3, -4e-6), (4, 3e-6))]
     hidden = Effect("thermometer_offset", pad=2, offset=3.5)
-    skip = frozenset(known_effects()) - TRIED - {"thermometer_offset"}
     hurt = campaign(observations, setup, (*workshop, hidden), seed=5)
-    verdict = diagnose(hurt, setup, DiagnoseSettings(workers=1, skip=skip)).verdict
+    verdict = diagnose(hurt, setup, few("thermometer_offset")).verdict
     assert (verdict.verdict, [e.label for e in verdict.effects]) == ("named", ["thermometer_offset pad 2"])
     assert verdict.gap["heldout_after"] > 0.5 * verdict.gap["heldout_before"]
     assert verdict.gap["touched_after"] < 0.3 * verdict.gap["touched_before"]
@@ -216,7 +214,9 @@ def test_an_effect_outside_the_library_is_not_named(setup, observations):
     for i, e in enumerate(hurt.elements):  # stiffness that falls with frequency and rises with load: no effect does
         if e.observable in {"kxx", "kyy"}:
             value[i] *= 1.0 + 0.2 * math.sin(3 * e.place("excitation") / 60.0 + e.place("load") / 900.0)
-    verdict = diagnose(replace(hurt, value=value), setup, few()).verdict
+    tried = {"thermal_growth", "oil_viscosity", "probe_gain"}
+    settings = DiagnoseSettings(workers=1, skip=frozenset(known_effects()) - tried)
+    verdict = diagnose(replace(hurt, value=value), setup, settings).verdict
     assert verdict.verdict == "unexplained"
     assert not verdict.effects
     assert np.isfinite(residuals(hurt, hurt.value)).all()

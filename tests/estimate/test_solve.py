@@ -9,6 +9,7 @@ import pytest
 
 from tests.estimate.block_cases import Case, away, deviations, film_slope, made, numbers, solved, terms_of
 from tests.phasors.phasor_cases import complex_normal
+from tests.seeds import first_quick, seeds
 from tpjb_ident.estimate.blocks import RigStiffness
 from tpjb_ident.estimate.solve import Solver
 
@@ -35,7 +36,7 @@ def test_without_noise_and_errors_h_is_exact(case):
     assert np.abs(solution.h / truth - 1).max() < 1e-9
 
 
-@pytest.mark.parametrize("sensor", [0, 2, 5, 6])
+@pytest.mark.parametrize("sensor", first_quick(0, 2, 5, 6))
 def test_a_channel_that_is_missing_in_one_run_costs_nothing_but_its_row(sensor):
     """The third probe, or the housing's equations, stand in for it; nothing is read of the place where it was."""
     rig, blocks, truth = made(replace(EXACT, probes=3))
@@ -128,9 +129,10 @@ def drawn_gains(rng):
     ids=["records", "gains", "three probes", "scatter"],
 )
 def test_intervals_hold_what_they_say(case, drawn):
-    assert 0.93 <= inside(case, 300, drawn) <= 0.98
+    assert 0.92 <= inside(case, 80, drawn) <= 0.985  # 300 campaigns: 0.93 to 0.98
 
 
+@pytest.mark.slow
 def test_the_scatter_of_the_force_is_found_by_its_size():
     found = []
     for seed in range(8):
@@ -151,7 +153,7 @@ def struck(case, runs, size, seed=0):
     return rig, replace(blocks, z=z), truth
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_one_bad_run_of_five_is_given_no_weight(seed):
     case = Case(directions=5)
     rig, blocks, truth = struck(case, [7], 0.2, seed)
@@ -164,7 +166,7 @@ def test_one_bad_run_of_five_is_given_no_weight(seed):
     assert np.median(deviations(solution)[1] / usual[1]) < 2.5
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_two_bad_runs_of_five_leave_a_wide_interval_that_holds(seed):
     case = Case(directions=5)
     rig, blocks, truth = struck(case, [6, 8], 0.1, seed)

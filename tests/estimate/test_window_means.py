@@ -39,6 +39,7 @@ def test_without_noise_means_are_exact():
     assert found.wandering == 0
 
 
+@pytest.mark.slow
 def test_noise_is_unbiased_and_means_scatter_by_it():
     noises, means = [], []
     for seed in range(200):

@@ -80,6 +80,7 @@ def test_order_of_windows_and_names_of_directions_do_not_matter():
     np.testing.assert_allclose(second.weights, first.weights[order], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_mm_eiv_is_free_of_the_attenuation_that_regressions_have():
     D, F, label, command = sample(5, directions=8, windows=60, noise=0.1)
     bias = {m: abs(run(m, D, F, label, command).h[1, 1] / H[1, 1] - 1) for m in ("ols", "mm", "mm-eiv", "iv")}
@@ -209,6 +210,7 @@ def test_rlm_traps_are_guarded():
     assert "zero-scale" in rlm_fit(D / np.abs(D).max(), F / np.abs(F).max()).conditions
 
 
+@pytest.mark.slow
 def test_thousands_of_windows_start_from_a_share_of_them():
     """Two robust answers from 2400 windows, 30 % of them bad: within 0.3 %, and memory for hundreds, not thousands."""
     import tracemalloc

@@ -44,6 +44,7 @@ def test_exchanging_cause_and_effect_inverts_h():
     assert np.abs(np.linalg.inv(back.h) - result.h).max() < 0.5 * width
 
 
+@pytest.mark.slow
 def test_noise_of_the_displacements_does_not_pull_h_towards_zero():
     noise = np.diag([0.15, 0.15, 1e-4, 1e-4]).astype(complex)
     errors, pulls = [], []
@@ -62,6 +63,7 @@ def test_attenuation_is_noise_over_noise_and_signal():
     np.testing.assert_allclose(found, power / (1 + power), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_where_directions_agree_the_interval_is_that_of_generalised_least_squares():
     """Covariance (sum V^-1 (x) D* D)^-1, V of F - H D, by the noise that was put in."""
     noise = 1e-4 * hermitian(np.random.default_rng(27), 4)
@@ -114,6 +116,7 @@ def stiffer_runs(seed, g, size):
     return phasor_table(z[:, :2], z[:, 2:], np.repeat(np.arange(g), 8))
 
 
+@pytest.mark.slow
 def test_runs_that_differ_in_stiffness_widen_its_interval_and_hardly_that_of_damping():
     inside, widths = [], []
     truth = np.concatenate([H.real.ravel(), H.imag.ravel()])

@@ -554,7 +554,9 @@ def test_ross_itself_reads_what_was_written(tmp_path):
     assert done.stdout.count("read ross_") == len(list(tmp_path.glob("ross_*.toml")))
 
 
-@pytest.mark.parametrize("form", ["excel", "mat", "parquet"])
+@pytest.mark.parametrize(
+    "form", [*(pytest.param(form, marks=pytest.mark.slow) for form in ("excel", "mat")), "parquet"]
+)
 def test_the_same_results_are_the_same_bytes(form, tmp_path):
     if form == "excel":
         pytest.importorskip("openpyxl")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigdata.problem import RigDataError
+from tests.seeds import seeds
 from tpjb_ident.phasors import line_fit, run_phasors
 from tpjb_ident.phasors.line_fit import LineFitter
 from tpjb_ident.phasors.lines import LineSettings, known_lines
@@ -58,7 +59,7 @@ def test_phasors_have_the_sign_of_a_positive_damper():
     assert (f / d).imag / omega == pytest.approx(c, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_leaving_out_few_samples_gives_what_the_long_robust_way_gives(seed: int, monkeypatch: pytest.MonkeyPatch):
     rng = np.random.default_rng(seed)
     values = record(8000, 0.02, seed)

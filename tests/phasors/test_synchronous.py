@@ -9,19 +9,19 @@ import pytest
 
 from rigdata import load_campaign
 from rigdata.run import pulse_times
-from tests.rigs.campaign_file import plans_of, write_campaign
-from tests.rigs.field_rig import Rig
+from tests.rigs.closed_form import Rig, write_rig
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.phasors.shaft import shaft_order
 
-TURNING = replace(Rig(), locked=True, runout=(6e-6, 2e-6, 1e-6), miss=(0.0, 0.0), seconds=2.0)
+SIX = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+TURNING = Rig(locked=True, runout=0.075, load_scatter=0.0, seconds=2.0, frequencies=(22.0,), directions=SIX)
+PULSED = replace(TURNING, keyphasor=True)
 
 
-def identified(path, rig, seed=5, **plans):
-    write_campaign(path, rig, plans_of(loads=(5000.0,), **plans), seed)
-    (point,) = identify(load_campaign(path), IdentifySettings(methods=())).points
+def identified(folder, rig):
+    (point,) = identify(load_campaign(write_rig(folder, rig, seed=5)), IdentifySettings(methods=())).points
     return point
 
 
@@ -44,11 +44,11 @@ def test_pulses_tell_times_between_samples():
 @pytest.mark.parametrize(("order", "keyphasor"), [(1, True), (2, True), (2, False), (3, False)])
 def test_runout_is_told_from_motion_by_the_shaft_s_phase(tmp_path, order, keyphasor):
     """Without it kxx would be off by tens of per cent: 6 um of runout beside 2 um of motion."""
-    point = identified(tmp_path / "f.h5", replace(TURNING, keyphasor=keyphasor), frequencies=(22.0 * order,))
+    point = identified(tmp_path, replace(TURNING, keyphasor=keyphasor, frequencies=(22.0 * order,)))
     assert "shaft lines fitted" in point.quality
     assert not untrusted(point.quality)
     assert point.n_records == 6
-    h = TURNING.bearing.h(2 * np.pi * 22.0 * order, 5000.0)
+    h = TURNING.film.h(22.0 * order, 5000.0)
     away = point.stiffness.vector - np.concatenate([h.real.ravel(), h.imag.ravel()])
     assert np.abs(away).max() < 0.02 * np.abs(h).max()
     assert np.mean(np.abs(away) <= 1.3 * point.stiffness.half_width()) > 0.85
@@ -56,14 +56,14 @@ def test_runout_is_told_from_motion_by_the_shaft_s_phase(tmp_path, order, keypha
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("rig", "plans", "cure"),
+    ("rig", "cure"),
     [
-        (TURNING, {"frequencies": (22.0,)}, "no keyphasor"),
-        (replace(TURNING, keyphasor=True), {"frequencies": (22.0,), "directions": 2}, "3 directions at least"),
-        (replace(TURNING, keyphasor=True), {"frequencies": (22.0,), "directions": 2, "repeats": 2}, "half a turn"),
+        (TURNING, "no keyphasor"),
+        (replace(PULSED, directions=(0.0, 90.0)), "3 directions at least"),
+        (replace(PULSED, directions=(0.0, 90.0), repeats=2), "half a turn"),
     ],
 )
-def test_what_cannot_be_told_stays_refused_and_the_message_says_which_test_would(tmp_path, rig, plans, cure):
-    point = identified(tmp_path / "f.h5", rig, **plans)
+def test_what_cannot_be_told_stays_refused_and_the_message_says_which_test_would(tmp_path, rig, cure):
+    point = identified(tmp_path, rig)
     (told,) = [c for c in untrusted(point.quality) if c == "1X on excitation line"]
     assert cure in told.detail

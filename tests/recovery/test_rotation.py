@@ -25,7 +25,6 @@ from rigdata.operating_point import ROTATIONS
 from rigdata.virtual_rig import ClearanceSweep, Instruments, RigPlan, VirtualRig, locus_points, operating_points
 from tests.command_line import tpjb
 from tests.good_campaigns import BEARINGS, directions
-from tests.recovery.mirrored_campaign import mirror_campaign
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.compare.rig_from_model import rig_truth
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
@@ -35,6 +34,68 @@ MIRROR = np.diag([-1.0, 1.0])
 
 
 DEMO = Path(rigdata.__file__).parent / "samples" / "demo.h5"
+
+
+#: A campaign is mirrored along the y axis as a person would do it, texts and numbers, with nothing of the toolkit:
+#: cells and accelerometers along x keep their axis, and their readings change sign; the others turn.
+_ANGLES = re.compile(r'^(axis|static_load_direction|excitation_direction) = "([-+.\d]+) deg"', re.MULTILINE)
+_SENSE = re.compile(r'^rotation = "(.*)"', re.MULTILINE)
+_CHANNEL = re.compile(r"^\[channels\.(\w+)\]$", re.MULTILINE)
+
+
+def _turned(degrees: str) -> str:
+    return f"{(360.0 - float(degrees)) % 360.0 - 180.0:.12g}"
+
+
+def _turning_back(text: str) -> str:
+    return _SENSE.sub(lambda found: f'rotation = "{"counter-" if found[1] == "clockwise" else ""}clockwise"', text)
+
+
+def mirrored_manifest(text: str, pads: int) -> tuple[str, set[str]]:
+    """The manifest, and the channels whose readings change sign."""
+    negated = set()
+    blocks = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    for i, block in enumerate(blocks):
+        channel = _CHANNEL.match(block)
+        if channel and 'axis = "0 deg"' in block:
+            negated.add(channel[1])
+        else:
+            block = _ANGLES.sub(lambda found: f'{found[1]} = "{_turned(found[2])} deg"', block)
+        blocks[i] = re.sub(
+            r"^pad = (\d+)", lambda found: f"pad = {pads + 1 - int(found[1])}", block, flags=re.MULTILINE
+        )
+    text = _turning_back("".join(blocks))
+    if "[shaft]" not in text:
+        text = text.replace("[", '[shaft]\nrotation = "clockwise"\n\n[', 1)
+    return text, negated
+
+
+def mirrored_bearing(text: str) -> tuple[str, int]:
+    """The bearing file, and its number of pads: angles in the mirror, lists in reverse order."""
+    pads = 0
+
+    def turn(found: re.Match[str]) -> str:
+        nonlocal pads
+        entries = [entry.strip() for entry in found[2].split(",")][::-1]
+        if found[1] == "pivot_angles":
+            pads = len(entries)
+            entries = [f'"{_turned(entry.strip(chr(34)).removesuffix(" deg"))} deg"' for entry in entries]
+        return f"{found[1]} = [{', '.join(entries)}]"
+
+    return _turning_back(re.sub(r"^(\w+) = \[(.*?)\]", turn, text, flags=re.MULTILINE)), pads
+
+
+def mirror_campaign(source: Path, target: Path) -> Path:
+    """Write the mirror image of a campaign, one HDF5 file."""
+    shutil.copy(source, target)
+    with h5py.File(target, "r+") as file:
+        bearing, pads = mirrored_bearing(str(file.attrs["bearing"]))
+        manifest, negated = mirrored_manifest(str(file.attrs["manifest"]), pads)
+        file.attrs["bearing"], file.attrs["manifest"] = bearing, manifest
+        for run in file["runs"].values():
+            for name in negated & set(run):
+                run[name][...] = -run[name][...]
+    return target
 
 
 def with_mirror_image(campaign, folder):

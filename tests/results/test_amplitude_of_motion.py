@@ -1,14 +1,15 @@
 """A film that was shaken too hard: what its second harmonic says of one amplitude, what several amplitudes mend."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rigdata import load_campaign
 from tests.phasors.phasor_cases import FILM_H as H
 from tests.results.test_figures import stiff
-from tests.rigs.campaign_file import plans_of, write_campaign
-from tests.rigs.closed_form_bearing import Bearing
-from tests.rigs.field_rig import Rig
+from tests.rigs.acquisition import EXACT, Acquisition
+from tests.rigs.closed_form import USUAL, Rig, write_rig
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.results.harmonics import MAX_AMPLITUDE, NEVER_LINEAR, FilmChange, change_conditions
@@ -33,15 +34,14 @@ def test_a_large_motion_is_flagged_only_where_the_harmonics_do_not_show_a_linear
 
 @pytest.mark.slow
 def test_three_amplitudes_are_right_where_one_is_refused(tmp_path):
-    film = Bearing(second=3.0, third=5.0)
-    rig = Rig(bearing=film, amplitude=0.35, seconds=2.0, rate=1000.0)
-    for amplitudes, refused in (((1.0,), True), ((0.3, 0.6, 1.0), False)):
-        path = tmp_path / "field.h5"
-        write_campaign(path, rig, plans_of(loads=(5000.0,), amplitudes=amplitudes), 5)
+    film = replace(USUAL, square=3.0, cube=5.0)
+    rig = Rig(film=film, frequencies=(25.0,), amplitude=0.12, seconds=2.0)
+    for sizes, refused in (((1.0,), True), ((0.3, 0.6, 1.0), False)):
+        path = write_rig(tmp_path, replace(rig, sizes=sizes), setup=Acquisition(rate=1000.0, uncertainty=EXACT))
         (point,) = identify(load_campaign(path), IdentifySettings(clearance=80e-6)).points
         assert ("film-not-linear" in point.quality) is refused
         if not refused:
-            truth = film.h(2 * np.pi * 25, 5000.0)
+            truth = film.h(25.0, 5000.0)
             off = point.stiffness.vector - np.concatenate([truth.real.ravel(), truth.imag.ravel()])
             assert (np.abs(off) < 1.5 * point.stiffness.half_width()).all()
             assert "amplitude" in point.budget

@@ -5,20 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import h5py
 import numpy as np
 
-from tests.rigs.band_rig import BandPlan, BandRig, record
-from tests.rigs.campaign_file import UNITS, write_records
-from tests.rigs.field_rig import CHANNELS
+from tests.rigs.band_rig import CHANNELS, BandPlan, BandRig, record
 
+BEARING = Path(__file__).parents[2] / "model" / "bearings" / "rocker.toml"
+#: What the manifest states, and how many of it make one of SI.
+UNITS = {"displacement": ("um", 1e6), "force": ("N", 1.0), "acceleration": ("m/s^2", 1.0)}
 #: What the manifest calls the kinds of excitation.
 STATED = {"periodic random": "random"}
 
 
 def write_band_campaign(path: Path, rig: BandRig, plans: Sequence[BandPlan], seed: int) -> None:
-    """Write one HDF5 file."""
+    """Write one HDF5 file, channels in the units of the manifest, beside the rocker's bearing file."""
     rng = np.random.default_rng(seed)
-    write_records(path, band_manifest(rig, plans), rig.rate, ((plan.id, record(rig, plan, rng)) for plan in plans))
+    with h5py.File(path, "w") as file:
+        file.attrs["manifest"], file.attrs["bearing"] = band_manifest(rig, plans), BEARING.read_text(encoding="utf-8")
+        for plan in plans:
+            group = file.create_group(f"runs/{plan.id}")
+            group.attrs["sample_rate_hz"] = rig.rate
+            for name, values in record(rig, plan, rng).items():
+                group.create_dataset(name, data=values * (UNITS[CHANNELS[name][0]][1] if name in CHANNELS else 1.0))
 
 
 def band_manifest(rig: BandRig, plans: Sequence[BandPlan]) -> str:

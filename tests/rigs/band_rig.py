@@ -7,15 +7,25 @@ runout, unbalance, mains and noise of every channel are those of `rig`; neither 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from tests.rigs.closed_form_bearing import Bearing
-from tests.rigs.field_rig import CHANNELS, NOISE
+from tests.rigs.closed_form import Film
 
 #: The long record over the one that is kept.
 LONGER = 3
+#: Channels of the rig: quantity and axis [deg]; noise of a sample by quantity, SI.
+CHANNELS = {
+    "D1": ("displacement", 45.0),
+    "D2": ("displacement", 135.0),
+    "F1": ("force", 0.0),
+    "F2": ("force", 90.0),
+    "A1": ("acceleration", 0.0),
+    "A2": ("acceleration", 90.0),
+}
+NOISE = {"displacement": 0.04e-6, "force": 3.0, "acceleration": 0.02}
+FILM = Film(((1.6e8, 1.5e7), (-1.2e7, 2.4e8)), ((4.2e5, -2e4), (-2.5e4, 5.5e5)), ((12.0, 1.0), (-1.0, 16.0)))
 
 
 @dataclass(frozen=True)
@@ -24,12 +34,12 @@ class BandRig:
 
     `kind` is multisine, periodic random, random, sweep or impact; `period` [s] of the periodic ones; `command` how many
     command channels there are (0, 1: along the excitation, 2: both actuators at once); `noise` by quantity, times
-    that of `rig.NOISE`; `run_gain` scatter of the runs' cells; `generator` by how much the generator's clock is fast,
+    that of `NOISE`; `run_gain` scatter of the runs' cells; `generator` by how much the generator's clock is fast,
     `cells` by how much that of cells and accelerometers.
     """
 
     kind: str = "random"
-    bearing: Bearing = field(default_factory=Bearing)
+    bearing: Film = FILM
     band: tuple[float, float] = (10.0, 110.0)
     rate: float = 1000.0
     seconds: float = 16.0
@@ -99,11 +109,10 @@ def _noise(n: int, rig: BandRig, rng: np.random.Generator, flat: bool) -> np.nda
     return values / values.std()
 
 
-def stiffness(bearing: Bearing, omega: np.ndarray, load: float, aside: float = 0.0) -> np.ndarray:
-    """Dynamic stiffness (n, 2, 2) [N/m] at many frequencies: it is K - omega^2 M + i omega C."""
-    at_zero, at_one = bearing.h(0.0, load, aside), bearing.h(1.0, load, aside)
-    w = omega[:, None, None]
-    return at_zero.real + w**2 * (at_one.real - at_zero.real) + 1j * w * at_one.imag
+def stiffness(bearing: Film, omega: np.ndarray, load: float, aside: float = 0.0) -> np.ndarray:
+    """Dynamic stiffness (n, 2, 2) [N/m] at many frequencies, turned by `aside` [rad]."""
+    turn = np.array([[np.cos(aside), -np.sin(aside)], [np.sin(aside), np.cos(aside)]])
+    return turn @ bearing.h(omega / (2 * np.pi), load) @ turn.T
 
 
 def record(rig: BandRig, plan: BandPlan, rng: np.random.Generator) -> dict[str, np.ndarray]:

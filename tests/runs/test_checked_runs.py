@@ -9,8 +9,8 @@ from rigdata import load_campaign
 from rigdata.readers import series
 from rigdata.readers.hdf5.reader import Hdf5Reader
 from rigdata.readers.text import csv
-from tests.rigs.campaign_file import BEARING, manifest_text, plans_of, write_campaign
-from tests.rigs.field_rig import Device, Rig, record
+from tests.rigs.acquisition import EXACT, Acquisition
+from tests.rigs.closed_form import Rig, channels_of, with_entries, write_rig
 from tpjb_ident.check.findings import Reporter, verdicts
 from tpjb_ident.check.observation import observe
 from tpjb_ident.identification.identify import identify
@@ -19,18 +19,21 @@ from tpjb_ident.phasors.reading_cache import beginning_of, with_kept_beginning
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.run_store import packed, unpacked
 
-QUICK = replace(Rig(), seconds=1.5, rate=1000.0)
-ONE_LOAD = plans_of(loads=(5000.0,))
+QUICK = Rig(frequencies=(25.0,), directions=(0.0, 30.0, 60.0, 90.0, 120.0, 150.0), seconds=1.5)
+HDF5 = Acquisition(rate=1000.0, uncertainty=EXACT)
 
 
-def written(path, rig, plans=ONE_LOAD, seed=3):
-    write_campaign(path, rig, plans, seed)
-    return load_campaign(path)
+def written(folder, rig, setup=HDF5, **sensors):
+    """The campaign of a rig; `sensors` are what is different with channels of these first letters."""
+    channels = channels_of(rig)
+    for names, entries in sensors.items():
+        channels = with_entries(channels, names, **entries)
+    return load_campaign(write_rig(folder, rig, channels, setup, seed=3))
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    return written(tmp_path_factory.mktemp("field") / "field.h5", QUICK)
+    return written(tmp_path_factory.mktemp("field"), QUICK)
 
 
 def test_the_beginning_of_a_record_is_read_once(campaign, monkeypatch):
@@ -50,25 +53,17 @@ def test_the_beginning_of_a_record_is_read_once(campaign, monkeypatch):
 @pytest.mark.slow
 def test_a_long_csv_file_gives_the_same_and_is_parsed_a_few_times_only(tmp_path, monkeypatch):
     """Its columns wait in files; a look at its beginning must not cost one parse a channel."""
-    rig, plans = replace(QUICK, keyphasor=True), ONE_LOAD[:3]
-    rng = np.random.default_rng(4)
-    text = manifest_text(rig, plans, {})
-    for plan in plans:
-        text = text.replace(f'id = "{plan.id}"\n', f'id = "{plan.id}"\nfile = "{plan.id}.csv"\n')
-        columns = record(rig, plan, rng)
-        scaled = np.stack([v * (1e6 if n.startswith("D") else 1.0) for n, v in columns.items()], axis=1)
-        np.savetxt(tmp_path / f"{plan.id}.csv", scaled, "%.9g", ";", header=";".join(columns), comments="")
-    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
-    (tmp_path / "rocker.toml").write_text(BEARING.read_text(encoding="utf-8"), encoding="utf-8")
-    small = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
+    rig = replace(QUICK, keyphasor=True, directions=QUICK.directions[:3])
+    campaign = written(tmp_path, rig, replace(HDF5, form="csv"))
+    small = identify(campaign, IdentifySettings(methods=()))
     parsed = []
     plain = csv.read_table
     monkeypatch.setattr(series, "IN_MEMORY", 1000)
     monkeypatch.setattr(csv, "read_table", lambda source, wanted: parsed.append(len(wanted)) or plain(source, wanted))
-    large = identify(load_campaign(tmp_path), IdentifySettings(methods=()))
+    large = identify(load_campaign(campaign.path), IdentifySettings(methods=()))
     np.testing.assert_array_equal(large.points[0].stiffness.h, small.points[0].stiffness.h)
     assert large.points[0].quality == small.points[0].quality
-    assert len(parsed) <= 5 * len(plans)
+    assert len(parsed) <= 5 * len(rig.directions)
 
 
 def test_kept_readings_are_those_of_the_file(campaign):
@@ -79,9 +74,9 @@ def test_kept_readings_are_those_of_the_file(campaign):
         np.testing.assert_array_equal(kept.time(start, stop), run.time(start, stop))
     short = replace(kept, reader=type(kept.reader)(run.reader, list(run.channels), 400))
     assert beginning_of(short).length == 400
-    np.testing.assert_array_equal(short.record("F1").values, run.record("F1").values)
+    np.testing.assert_array_equal(short.record("L1H").values, run.record("L1H").values)
     with pytest.raises(ValueError, match="read-only"):
-        kept.reader.read(["F1"], 0, 10)[0][0] = 1.0
+        kept.reader.read(["L1H"], 0, 10)[0][0] = 1.0
 
 
 def test_an_observation_that_was_kept_is_the_same(campaign):
@@ -111,12 +106,9 @@ def test_a_third_of_the_runs_share_a_finding(campaign):
 
 @pytest.mark.slow
 def test_the_probes_zero_stands_in_the_positions_errors(tmp_path):
-    path = tmp_path / "zero.h5"
-    write_campaign(
-        path, QUICK, ONE_LOAD, 3, {"D1": {"zero_uncertainty": '"3 um"'}, "D2": {"zero_uncertainty": '"4 um"'}}
-    )
-    (stated,) = identify(load_campaign(path), IdentifySettings(methods=())).points
-    (silent,) = identify(written(tmp_path / "none.h5", QUICK), IdentifySettings(methods=())).points
+    zeros = {name: {"extra": (f'zero_uncertainty = "{size} um"',)} for name, size in (("X1A", 3), ("X1B", 4))}
+    (stated,) = identify(written(tmp_path / "zero", QUICK, **zeros), IdentifySettings(methods=())).points
+    (silent,) = identify(written(tmp_path / "none", QUICK), IdentifySettings(methods=())).points
     # probes at 45 and 135 deg: half of either variance along X and along Y
     expected = np.hypot(silent.position_se, 5e-6 / np.sqrt(2))
     np.testing.assert_allclose(stated.position_se, expected, rtol=1e-12)
@@ -124,35 +116,27 @@ def test_the_probes_zero_stands_in_the_positions_errors(tmp_path):
 
 @pytest.mark.slow
 def test_one_inverted_probe_costs_its_run_inverted_cells_all_points(tmp_path):
-    def inverted(values, run, rng):
-        return -values if "-25-2-" in run else values
-
-    one = replace(QUICK, devices={"D1": Device(reading=inverted)})
-    result = identify(written(tmp_path / "one.h5", one), IdentifySettings(methods=()))
+    one = {"fault": lambda values, rng, number: -values if number == 2 else values}
+    result = identify(written(tmp_path / "one", QUICK, X1A=one), IdentifySettings(methods=()))
     assert "run-left-out" in result.points[0].quality
     assert "records-contradicted" not in result.points[0].quality
-    truth = QUICK.bearing.h(2 * np.pi * 25, 5000.0)
+    truth = QUICK.film.h(25.0, 5000.0)
     assert np.abs(result.points[0].stiffness.h - truth).max() < 0.01 * np.abs(truth).max()
-    cells = replace(QUICK, devices={"F2": Device(gain=-1.0)})
-    result = identify(written(tmp_path / "cells.h5", cells), IdentifySettings(methods=()))
+    result = identify(written(tmp_path / "cells", QUICK, L1V={"gain": -1.0}), IdentifySettings(methods=()))
     assert "records-contradicted" in result.points[0].quality
 
 
 @pytest.mark.slow
 def test_records_of_several_excitations_are_checked_at_each(tmp_path):
     """The drive's second harmonic, made strong, serves as the other excitation."""
-    rig = replace(QUICK, seconds=3.0, drive_harmonic=0.5)
-    plans = plans_of(loads=(5000.0,), frequencies=(20.0,))
+    rig = replace(QUICK, seconds=3.0, harmonic=0.5, frequencies=(20.0,))
     settings = IdentifySettings(methods=(), phasors=PhasorSettings(excitation_lines=(20.0, 40.0)))
-    good = identify(written(tmp_path / "good.h5", rig, plans), settings)
+    good = identify(written(tmp_path / "good", rig), settings)
     assert [p.point.excitation_hz for p in good.points] == [20.0, 40.0]
     assert not any({"records-contradicted", "records-doubtful"} & set(p.quality) for p in good.points)
 
-    def dead(values, run, rng):
-        return np.full_like(values, 3.0) if "-20-2-" in run else values
-
-    lost = identify(written(tmp_path / "dead.h5", replace(rig, devices={"F1": Device(reading=dead)}), plans), settings)
+    dead = {"fault": lambda values, rng, number: np.full_like(values, 3.0) if number == 2 else values}
+    lost = identify(written(tmp_path / "dead", rig, L1H=dead), settings)
     assert all("run-left-out" in p.quality for p in lost.points)
-    cells = replace(rig, devices={"F2": Device(gain=-1.0)})
-    turned = identify(written(tmp_path / "cells.h5", cells, plans), settings)
+    turned = identify(written(tmp_path / "cells", rig, L1V={"gain": -1.0}), settings)
     assert all("records-contradicted" in p.quality for p in turned.points)

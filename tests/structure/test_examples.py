@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import tpjb_ident as ti
-from tests.structure.sources import ROOT
+from tests.structure.sources import ROOT, texts
 from tests.structure.test_docstrings import definitions, handed_on
 
 #: Faces without an example; this number may only fall.
@@ -63,17 +63,13 @@ def computed_once():
         yield
 
 
-EXAMPLES = [(path, name) for path, name, text in described() if ">>>" in text]
+FILES = [path for path, text in texts().items() if ">>> " in text]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("path", "name"), EXAMPLES, ids=lambda part: part)
-def test_an_example_runs(path, name, tmp_path, monkeypatch):
+def runs(path: str, name: str) -> str:
+    """Run an example as it stands, that of the module for no name; what it gave in place of what it shows."""
     module = importlib.import_module(path.removesuffix(".py").removesuffix("/__init__").replace("/", "."))
-    shown = module
-    for part in name.split("."):
-        shown = getattr(shown, part)
-    monkeypatch.chdir(tmp_path)
+    shown = functools.reduce(getattr, name.split(".") if name else (), module)
     given = {
         "np": np,
         "ti": ti,
@@ -81,12 +77,20 @@ def test_an_example_runs(path, name, tmp_path, monkeypatch):
         "rocker": ROOT / "model/bearings/rocker.toml",
     }
     parsed = doctest.DocTestParser().get_doctest(
-        getattr(shown, "fget", shown).__doc__, {**vars(module), **given}, name, path, 0
+        getattr(shown, "fget", shown).__doc__ or "", {**vars(module), **given}, name, path, 0
     )
     report: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE, verbose=False)
     runner.run(parsed, out=report.append)
-    assert not runner.failures, "".join(report)
+    return "".join(report)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", FILES)
+def test_examples_run(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = [name for path, name, text in described() if path == file and ">>>" in text]
+    assert [report for name in ["", *names] if (report := runs(file, name))] == []
 
 
 def test_faces_have_an_example():

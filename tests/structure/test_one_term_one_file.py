@@ -10,6 +10,7 @@ import pytest
 
 from rigdata.arrays import ComplexArray
 from tests.estimate.block_cases import Case, away, made, solved
+from tests.seeds import seeds
 from tests.structure.sources import imports_and_calls, texts, trees
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import State
@@ -96,7 +97,7 @@ class Crosstalk(Additive):
         return columns
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_a_user_s_own_term_is_found_with_the_others(seed):
     rig, blocks, truth = made(Case(crosstalk=0.03, hertz=(60.0,)), seed)
     solution = solved(rig, blocks, truth, Crosstalk(rig, blocks))

@@ -21,7 +21,6 @@ import pandas as pd
 from rigdata import load_campaign
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandPlan, BandRig, band_plans, stiffness
-from tests.rigs.closed_form_bearing import NOMINAL
 from tests.studies.results import report, study_parser, table
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
@@ -77,11 +76,9 @@ def band_rows() -> list[BandRow]:
 
 def true_parameters(rig: BandRig, load: float) -> np.ndarray:
     """K, C, M of the rig's bearing at a load, in the order of `FrequencyModel.parameters`."""
-    share = load / NOMINAL
-    bearing = rig.bearing
-    K = np.ravel(bearing.K) * share**bearing.stiffness_exponent
-    C = np.ravel(bearing.C) * share**bearing.damping_exponent
-    return np.concatenate([K, C, np.ravel(bearing.M)])
+    film = rig.bearing
+    still, slow = film.h(0.0, load), film.h(1.0, load)  # at 1 Hz
+    return np.concatenate([still.real.ravel(), slow.imag.ravel() / (2 * np.pi), np.ravel(film.m)])
 
 
 def judged(result: BandResult, rig: BandRig) -> dict[str, object]:

@@ -10,14 +10,12 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 
 from rigdata.campaign import load_campaign
-from tests.studies.field import acquisition
-from tests.studies.field import closed_form as cf
-from tests.studies.field.acquisition import Acquisition, write_campaign
+from tests.rigs import closed_form as cf
+from tests.rigs.acquisition import UNCERTAINTY, Acquisition, write_campaign
 from tests.studies.results import report, study_parser, table
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
@@ -42,8 +40,9 @@ def counted(plan: dict[str, object], seed: int, gains: bool) -> tuple[list[bool]
     rig = cf.Rig(**plan)  # type: ignore[arg-type]
     campaign = cf.campaign(rig, cf.channels_of(rig), [seed, 7])
     inside, half, flags = [], [], []
-    with tempfile.TemporaryDirectory() as folder, patch.dict(acquisition.UNCERTAINTY, clear=not gains):
-        path = write_campaign(Path(folder), campaign, Acquisition(noise=cf.noise_of(rig)), [seed, 11])
+    setup = Acquisition(noise=cf.noise_of(rig), uncertainty=UNCERTAINTY if gains else {})
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_campaign(Path(folder), campaign, setup, [seed, 11])
         result = identify(load_campaign(path), IdentifySettings(methods=()))
     for p in result.points:
         h = campaign.truth(p.point.static_load, p.point.excitation_hz)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from tests.estimate.block_cases import COMPLIANCE, Case, away, deviations, drawn_turning, made, solved, terms_of
+from tests.seeds import seeds
 from tpjb_ident.terms.amplitude import Amplitude
 from tpjb_ident.terms.load_turn import LoadTurn
 from tpjb_ident.terms.registry import learnt_rig
 from tpjb_ident.terms.temperature import Temperature
 
-SEEDS = range(3)
+SEEDS = seeds(3)
 _WRONG, _LATE = "accelerometers-contradict-cells", "cells-and-accelerometers-out-of-phase"
 
 
@@ -238,6 +239,7 @@ def test_how_h_turns_with_the_load_s_direction_is_learnt_from_the_runs_own_misse
     assert np.median(gain) > 2
 
 
+@pytest.mark.slow
 def test_a_miss_that_all_loads_share_is_considered():
     """The runs' scatter over the root of their number is how large it may be."""
     outside = []

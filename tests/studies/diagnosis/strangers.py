@@ -1,6 +1,6 @@
 """Strangers: bearings, plans and faults by a generator that nothing of the decision was made for.
 
-    python -m tests.studies.diagnosis.strangers [--bearings 8] [--count 30] [--seed 0] [--clean] [--rows FILE] [--write]
+    python -m tests.studies.diagnosis.strangers [--bearings 8] [--count 30] [--seed 0] [--rows FILE] [--write]
 
 Every bearing is drawn: 3 to 6 pads, load on or between them, central or offset pivots, journals of 60 to 250 mm, five
 oils. Every plan is drawn: 2 to 12 operating points, one or two speeds, with or without locus, polygon, dry tests and
@@ -13,11 +13,9 @@ the logarithms of K and C), so that the decision is tested and not the model.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,8 +29,8 @@ from model.pivots import pivot_laws
 from model.setup import Mesh, Setup
 from tests.studies.diagnosis.bench import SKIPPED, Bench, Drawn, hidden, measured, noise, said, seen_sizes, solve
 from tests.studies.diagnosis.emulated import emulate
-from tests.studies.diagnosis.tables import all_there, no_false, tables
-from tests.studies.results import Rows, report, study_parser, table
+from tests.studies.diagnosis.tables import tables
+from tests.studies.results import Rows, report, study_parser
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
 from tpjb_ident.diagnosis.diagnose import ACCURACY, pose
 from tpjb_ident.diagnosis.forward.candidates import TERMS, Candidate
@@ -158,22 +156,8 @@ def plan_of(bearing: Bearing, rng: np.random.Generator) -> tuple[Layout, str]:
     return layout, f"{points} points, {', '.join(word for word in rest if word)}"
 
 
-def full_plan(bearing: Bearing, count: int) -> tuple[Layout, str]:
-    """A plan of so many operating points with everything beside them."""
-    pads, size = len(bearing.pads), bearing.journal_diameter
-    speed, area = 50.0 / size, size * bearing.length
-    loads = area * np.linspace(0.4e6, 1.3e6, count // 2 + 1)
-    middle = len(loads) // 2
-    tests = dynamic(loads[[middle]], list(speed * np.linspace(0.5, 2.0, count - len(loads) + 1)), speed, DOWN, pads)
-    tests += dynamic(np.delete(loads, middle), [1.1 * speed], speed, DOWN, pads)
-    top = float(loads[-1])
-    shares = (0.2 * top, 0.5 * top, top)
-    layout = Layout(tests, around(float(loads[middle]), 10, speed), dry(range(1, pads + 1), shares), 0.04 * top)
-    return layout, f"{count} points, all static tests"
-
-
-def stranger(number: int, folder: Path | None, points: int = 0) -> Stranger:
-    """Draw bearings and plans (or one of so many points) until the model has an equilibrium everywhere.
+def stranger(number: int, folder: Path | None) -> Stranger:
+    """Draw bearings and plans until the model has an equilibrium everywhere.
 
     With a folder the model is emulated, and its table kept there.
     """
@@ -181,7 +165,7 @@ def stranger(number: int, folder: Path | None, points: int = 0) -> Stranger:
     while True:
         text, grade, words = bearing_of(rng)
         bearing = load_bearing(text)
-        layout, plan = full_plan(bearing, points) if points else plan_of(bearing, rng)
+        layout, plan = plan_of(bearing, rng)
         setup = Setup(bearing, pivot_laws("kirk", bearing), mesh=Mesh(32, 4), accuracy=ACCURACY)
         try:
             observations = planned_observations(setup, layout)
@@ -190,7 +174,7 @@ def stranger(number: int, folder: Path | None, points: int = 0) -> Stranger:
             break
         except NoEquilibriumError:
             continue
-    table_of = None if folder is None else folder / f"stranger-{number}-{points}.table"
+    table_of = None if folder is None else folder / f"stranger-{number}.table"
     cache = model.cache if table_of is None else emulate(model, table_of)
     forward = Forward(setup, layout, observations.elements, cache)
     problem = pose(observations, forward, DiagnoseSettings(workers=1, skip=SKIPPED))
@@ -272,15 +256,10 @@ def draw(one: Stranger, kind: str, rng: np.random.Generator) -> Drawn | None:
     )  # fmt: skip
 
 
-def drawn_again(one: Stranger, number: int, seed: int) -> tuple[str, Drawn | None]:
-    """Kind and campaign of a seed, the first of twelve that has an equilibrium and can be seen."""
-    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
-    return kind, next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
-
-
 def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> dict[str, Any] | None:
     """Draw and diagnose one campaign; a flat row with what came out."""
-    kind, drawn = drawn_again(one, number, seed)
+    rng, kind = np.random.default_rng([seed, number, 140]), KINDS[seed % len(KINDS)]
+    drawn = next((d for d in (draw(one, kind, rng) for _ in range(12)) if d is not None), None)
     if drawn is None:
         return None
     began = time.process_time()
@@ -295,82 +274,19 @@ def run(one: Stranger, number: int, seed: int, settings: DiagnoseSettings) -> di
     }  # fmt: skip
 
 
-def clean(one: Stranger, place: int, deviations: float, settings: DiagnoseSettings) -> dict[str, Any]:
-    """A bearing as drawn but for one tolerance, off by some stated deviations; what was said."""
-    problem, rng = one.bench.problem, np.random.default_rng([place, int(deviations), 4])
-    nuisance = problem.nuisances[place]
-    fault = next(fault for fault in problem.faults if fault.label == nuisance.effect)
-    size = np.zeros(len(problem.nuisances))
-    size[place] = deviations * float(rng.choice([-1.0, 1.0]))
-    if not fault.low[0] <= size[place] <= fault.high[0]:  # no effect says that: a film of more heat than it makes
-        size[place] *= -1.0
-    truth = Effect(fault.name, **fault.values(size[[place]]))
-    value = measured(one.bench, [], size, 0.0)
-    observations = replace(problem.observations, value=value + noise(problem.observations, value, rng))
-    decision, _ = solve(replace(problem, observations=observations), one.bench.forward, settings)
-    return {
-        "deviations": deviations, "truth": [{"name": truth.name, **truth.parameters}], "shares": [1.0], "outside": "",
-        "words": one.words, **said(decision.verdict), "far": [(d.name, d.size) for d in decision.model.tolerances[:2]],
-    }  # fmt: skip
-
-
-def clean_table(rows: Sequence[dict[str, Any]]) -> str:
-    """What came of clean effects, by size and plan."""
-    lines = []
-    for points, size in sorted({(r["points"], r["deviations"]) for r in rows}):
-        mine = [r for r in rows if (r["points"], r["deviations"]) == (points, size)]
-        right = sum(all_there(r) and no_false(r) for r in mine)
-        wrong = sum(not no_false(r) for r in mine)
-        lines.append([
-            points, f"{size:g}", len(mine), f"{right} ({100 * right / len(mine):.0f} %)", wrong,
-            sum(r["verdict"] == "consistent" for r in mine), sum(r["verdict"] == "unexplained" for r in mine),
-        ])  # fmt: skip
-    head = ["points", "stated deviations", "campaigns", "listed, or in a group of three", "wrong", "consistent"]
-    return table([*head, "unexplained"], lines)
-
-
-def run_clean(folder: Path) -> str:
-    """Every tolerance that has a name, at 4, 6, 10 and 15 stated deviations with 7 points; at 6 with 3 and 13."""
-    stored = Rows(folder / "clean.jsonl", "points", "place", "deviations")
-    settings = DiagnoseSettings(workers=1, skip=SKIPPED)
-    for points, sizes in ((7, (6.0, 4.0, 10.0, 15.0)), (3, (6.0,)), (13, (6.0,))):
-        one = stranger(100, folder, points)
-        first = {n.effect.split()[0]: i for i, n in enumerate(one.bench.problem.nuisances) if n.effect}
-        for size in sizes:
-            for place in first.values():
-                if (points, place, size) in stored.known:
-                    continue
-                with suppress(NoEquilibriumError):  # none there, or beyond what the emulator has solved
-                    stored.add({"points": points, "place": place, **clean(one, place, size, settings)})
-    return clean_table([*stored.known.values()])
-
-
-def every_row(
-    asked: argparse.Namespace, diagnosed: Callable[[Stranger, int, int], dict[str, Any] | None]
-) -> list[dict[str, Any]]:
-    """Rows of all campaigns that were asked for, those of the file and those that it lacks."""
-    stored = Rows(asked.rows, "bearing", "seed")
+def main() -> None:
+    """Draw, diagnose, and print the tables; rows that are there are not drawn again."""
+    options = {"bearings": 8, "count": 30, "seed": 0, "rows": Path("strangers.jsonl")}
+    asked = study_parser(__doc__, **options).parse_args()
+    settings, stored = DiagnoseSettings(workers=1, skip=SKIPPED), Rows(asked.rows, "bearing", "seed")
     for number in range(asked.bearings):
-        seeds = [asked.seed + k for k in range(asked.count)]
-        missing = [seed for seed in seeds if (number, seed) not in stored.known]
+        missing = [seed for seed in range(asked.seed, asked.seed + asked.count) if (number, seed) not in stored.known]
         one = stranger(number, asked.rows.parent) if missing else None
         for seed in missing:
-            row = diagnosed(one, number, seed) if one is not None else None
+            row = None if one is None else run(one, number, seed, settings)
             if row is not None:
                 stored.add(row)
-    return [*stored.known.values()]
-
-
-def main() -> None:
-    """Draw, diagnose, and print the tables."""
-    options = {"bearings": 8, "count": 30, "seed": 0, "clean": False, "rows": Path("strangers.jsonl")}
-    asked = study_parser(__doc__, **options).parse_args()
-    if asked.clean:
-        report(asked, "clean", run_clean(asked.rows.parent))
-    else:
-        settings = DiagnoseSettings(workers=1, skip=SKIPPED)
-        rows = every_row(asked, lambda one, number, seed: run(one, number, seed, settings))
-        report(asked, "strangers", tables(rows))
+    report(asked, "strangers", tables([*stored.known.values()]))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ import pandas as pd
 from scipy.stats import norm
 
 from tests.command_line import tpjb
-from tests.studies.field.acquisition import Array, Campaign, write_campaign
+from tests.rigs.acquisition import Array, Campaign, write_campaign
 from tests.studies.field.conditions import Condition, conditions
 from tests.studies.results import Rows, report, study_parser, table
 

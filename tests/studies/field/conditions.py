@@ -13,9 +13,9 @@ from zlib import crc32
 
 import numpy as np
 
-from tests.studies.field import closed_form as cf
+from tests.rigs import closed_form as cf
+from tests.rigs.acquisition import Acquisition, Campaign, Channel, Fault
 from tests.studies.field import marched as mr
-from tests.studies.field.acquisition import Acquisition, Campaign, Channel, Fault
 
 Entries = dict[str, Any]
 #: Bounds on good data: ordinary instruments; where records tell less; where a delay is uncertain, or blows are short.
@@ -142,6 +142,10 @@ def good_rigs() -> list[Condition]:
         rig("stiff cells, an accelerometer dead", ("A1H", {"fault": FAULTS["dead"]}), **STIFF),
         rig("heavy shaft between shaker and film", shaft_mass=1400.0, directions=(0.0, 60.0, 120.0)),
         rig("two directions", directions=(10.0, 100.0), repeats=2, limits=WIDER),
+        rig("a probe 1 deg off, 1 deg stated", ("X1", {"extra": ('axis_uncertainty = "1 deg"',)}),
+            ("X1A", {"true_axis": 46.0}), limits=WIDER),
+        rig("cells without a static part", static=False),
+        rig("springs beside the film, dry runs", beside=(2e7, 3e7)),
         rig("clearance run in the campaign", with_clearance=True),
     ]  # fmt: skip
 

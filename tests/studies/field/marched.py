@@ -16,8 +16,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from tests.studies.field import closed_form as cf
-from tests.studies.field.acquisition import Array, Campaign, Channel, Signal, unit_vector
+from tests.rigs import closed_form as cf
+from tests.rigs.acquisition import Array, Campaign, Channel, Signal, unit_vector
 
 #: Steps a second, and how long a rig runs before its record [s].
 STEPS, SETTLING = 8000.0, 0.5

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
-from tests.studies.field import closed_form as cf
+from tests.rigs import closed_form as cf
 from tests.studies.field import marched as mr
 
 PLAN = cf.Rig(load_scatter=0.0, frequencies=(25.0,), directions=(0.0, 70.0), seconds=2.0, runout=0.0, speed=97.0)

@@ -1,4 +1,4 @@
-"""Instruments and files of the second field battery: true signals become records of a `tpjb-rig/1` campaign.
+"""Instruments and files of a rig in closed form: true signals become records of a `tpjb-rig/1` campaign.
 
 Nothing of the toolkit is used. A rig hands over runs whose true displacement, cell force and housing acceleration are
 functions of time; every channel samples them at its own times, with its own axis, gain, lateness and faults.
@@ -19,9 +19,11 @@ Array = np.ndarray
 Signal = Callable[[str, Array], Array]
 #: Change of a channel's values [SI]: (values, generator, number of the run).
 Fault = Callable[[Array, np.random.Generator, int], Array]
-UNITS = {"displacement": "V", "force": "N", "acceleration": "m/s^2", "time": "s"}
+UNITS = {"displacement": "V", "force": "N", "acceleration": "m/s^2", "time": "s", "keyphasor": "V"}
 #: Stated calibration uncertainty, one standard deviation; true gains are drawn from it.
 UNCERTAINTY = {"displacement": 0.003, "force": 0.002, "acceleration": 0.005}
+#: Of sensors without any error, which says so.
+EXACT = dict.fromkeys(UNCERTAINTY, 0.0)
 VOLTS_PER_METRE, GAP_VOLTS = 7780.0, 8.2
 BEARING = """
 schema = "tpjb-bearing/1"
@@ -84,6 +86,7 @@ class Acquisition:
 
     rate: float = 2000.0
     noise: dict[str, float] = field(default_factory=dict)  #: standard deviation a sample, SI
+    uncertainty: dict[str, float] = field(default_factory=UNCERTAINTY.copy)
     mains: float = 50.0
     hum: dict[str, float] = field(default_factory=dict)  #: amplitude by quantity, SI
     form: str = "hdf5"  #: or csv
@@ -116,14 +119,14 @@ def bearing_file(diameter: float, clearance: float) -> str:
     return BEARING.format(**scaled, clearance=1e3 * clearance, pad_clearance=2.2e3 * clearance)
 
 
-def channel_lines(channel: Channel) -> list[str]:
+def channel_lines(channel: Channel, uncertainty: dict[str, float]) -> list[str]:
     """Table of one channel in the manifest."""
     q = channel.quantity
     lines = [f'[channels."{channel.name}"]', f'quantity = "{q}"']
-    lines += [f'axis = "{channel.axis:g} deg"'] if q != "time" else []
+    lines += [f'axis = "{channel.axis:g} deg"'] if q not in ("time", "keyphasor") else []
     lines += [f'unit = "{UNITS[q]}"'] if q in UNITS else []
     lines += ['sensitivity = "7.78 mV/um"', "polarity = -1"] if q == "displacement" else []
-    lines += [f'uncertainty = "{100 * UNCERTAINTY[q]:g} %"'] if q in UNCERTAINTY else []
+    lines += [f'uncertainty = "{100 * uncertainty[q]:g} %"'] if q in uncertainty else []
     return lines + list(channel.extra)
 
 
@@ -156,7 +159,7 @@ def readings(campaign: Campaign, setup: Acquisition, seed: list[int]) -> dict[st
     rng = np.random.default_rng(seed)
     gains = {}
     for channel in campaign.channels:
-        gains[channel.name] = 1 + UNCERTAINTY.get(channel.quantity, 0.0) * rng.standard_normal()
+        gains[channel.name] = 1 + setup.uncertainty.get(channel.quantity, 0.0) * rng.standard_normal()
     records: dict[str, dict[str, Array]] = {}
     for number, run in enumerate(campaign.runs):
         columns = {}
@@ -178,7 +181,7 @@ def write_campaign(folder: Path, campaign: Campaign, setup: Acquisition, seed: l
     if setup.time_digits is not None:
         text += ["[channels.Time]", 'quantity = "time"', 'unit = "s"']
     for channel in campaign.channels:
-        text += channel_lines(channel)
+        text += channel_lines(channel, setup.uncertainty)
     for run in campaign.runs:
         text += ["[[runs]]", f'id = "{run.name}"', f'file = "runs/{run.name}.csv"', *run.lines]
     manifest, records = "\n".join(text) + "\n", readings(campaign, setup, seed)

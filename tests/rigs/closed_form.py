@@ -1,19 +1,31 @@
-"""Rigs of the second field battery in closed form: H(w) = K - w^2 M + i w C between an actuator and a housing.
+"""Rigs in closed form: H(w) = K - w^2 M + i w C between an actuator and a housing, nothing of the toolkit in it.
 
 The housing stands on its load cells or floats on stingers; shafts have inertia and compliance. The actuator makes lines
 or a course in time (late, switched, wandering, noise, sweep, multi-sine, blows), both taken through transfer functions
-in closed form. The truth of a point is H of the film at the set load.
+in closed form. The truth of a point is H of the film at the set load. `write_rig` makes a campaign of one in one call.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tests.studies.field.acquisition import Array, Campaign, Channel, Run, Signal, bearing_file, unit_vector
+from tests.rigs.acquisition import (
+    EXACT,
+    Acquisition,
+    Array,
+    Campaign,
+    Channel,
+    Run,
+    Signal,
+    bearing_file,
+    unit_vector,
+    write_campaign,
+)
 
 Matrix = tuple[tuple[float, float], tuple[float, float]]
 NONE: Matrix = ((0.0, 0.0), (0.0, 0.0))
@@ -24,19 +36,25 @@ LOSS = 0.01
 
 @dataclass(frozen=True)
 class Film:
-    """K, C, M at the reference load [SI]; K grows with the load to the power 0.6, C to 0.2."""
+    """K, C, M at the reference load [SI]; K grows with the load to the power 0.6, C to 0.2.
+
+    `square` and `cube` are its next terms: force = k x (1 + square x/c + cube (x/c)^2), along the motion.
+    """
 
     k: Matrix
     c: Matrix
     m: Matrix = NONE
     load: float = 5000.0
+    square: float = 0.0
+    cube: float = 0.0
+    exponents = (0.6, 0.2)
 
     def h(self, frequency: Array | float, load: float) -> Array:
         """Dynamic stiffness (..., 2, 2) [N/m]."""
         w = 2 * np.pi * np.asarray(frequency, dtype=float)[..., None, None]
         ratio = load / self.load if load > 0 and self.load > 0 else 1.0
         k, c, m = np.array(self.k), np.array(self.c), np.array(self.m)
-        return np.asarray(k * ratio**0.6 - w**2 * m + 1j * w * c * ratio**0.2)
+        return np.asarray(k * ratio ** self.exponents[0] - w**2 * m + 1j * w * c * ratio ** self.exponents[1])
 
 
 USUAL = Film(((9.2e7, 5e6), (-7e6, 1.75e8)), ((3.6e5, 1.2e4), (-6e3, 4.5e5)))
@@ -63,6 +81,7 @@ class Rig:
     mount: str = "cells"
     mass: float = 30.0
     springs: tuple[float, float] = (4e8, 6e8)
+    beside: tuple[float, float] = (0.0, 0.0)  #: springs beside the film, which dry runs of the plan tell [N/m]
     shaft_mass: float = 0.0
     shaft_compliance: float = 0.0  #: of a floating stator's shaft [m/N]
     static: bool = True  #: cells show the static load
@@ -70,6 +89,10 @@ class Rig:
     band: tuple[float, float] = (6.0, 90.0)
     notch: tuple[float, float] = (0.0, 0.0)  #: part of the band without power [Hz]
     amplitude: float = 0.015  #: of the displacement: of a sine the amplitude, of a band the deviation
+    sizes: tuple[float, ...] = (1.0,)  #: of the runs' amplitudes, in turn
+    harmonic: float = 0.0  #: of the drive's force, at twice its frequency
+    locked: bool = False  #: the drive turns with the shaft: every run begins at the same angle
+    keyphasor: bool = False
     share: tuple[float, float] = (0.0, 1.0)  #: of the record with drive
     wander: float = 0.0  #: of the drive's frequency [Hz]
     senses: tuple[float, ...] = (1.0, -1.0)  #: of blows
@@ -94,11 +117,13 @@ class Test:
     load: float
     frequency: float
     direction: float
+    size: float = 1.0  #: of the amplitude
+    dry: bool = False  #: without film and rotation
 
 
 def response(rig: Rig, frequency: Array, load: float, scale: float = 1.0) -> dict[str, Array]:
     """Motion and cell force per actuator force, by quantity (..., 2, 2); signs of the contract."""
-    h = rig.film.h(frequency, load) * scale
+    h = rig.film.h(frequency, load) * scale + np.diag(rig.beside)
     w2, unit = (2 * np.pi * frequency[..., None, None]) ** 2, np.eye(2)
     if rig.mount == "floating":
         moved = unit + rig.shaft_compliance * h  # housing against shaft, per displacement
@@ -158,39 +183,77 @@ def course_signals(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[f
     return {q: CubicSpline(t, rig.amplitude * rig.clearance / size * values) for q, values in signals.items()}
 
 
-def lines_of(rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float]) -> list[tuple[float, Any]]:
-    """Every steady line: frequency and phasors by quantity (2,); the drive's first."""
+def lines_of(
+    rig: Rig, test: Test, rng: np.random.Generator, film: tuple[float, float], shaft: float
+) -> list[tuple[float, Any]]:
+    """Every steady line: frequency and phasors by quantity (2,); the drive's first. `shaft`: its angle at 0 s [rad]."""
     f, circle = np.array(test.frequency + rig.detune), np.array([1.0, -1.0j])
-    matrices = response(rig, f, *film)
-    aside = unit_vector(test.direction + 90) * 0.04 * np.exp(1j * rng.uniform(0, 6.28))
-    push = (unit_vector(test.direction) + aside) * np.exp(1j * rng.uniform(0, 6.28))
-    push = push * rig.amplitude * rig.clearance / np.linalg.norm(matrices["displacement"] @ push)
-    force = float(np.linalg.norm(rig.film.h(f, test.load) @ matrices["displacement"] @ push))
+    phase, aside = (0.7, 1.6) if rig.locked else rng.uniform(0, 6.28, 2)
+    amplitude = rig.amplitude * test.size
+    stiffer = film[0], film[1] * (1 + 0.75 * rig.film.cube * amplitude**2)
+    matrices = response(rig, f, *stiffer)
+    push = unit_vector(test.direction) + 0.04 * unit_vector(test.direction + 90) * np.exp(1j * aside)
+    push = push * np.exp(1j * phase)
+    push = push * amplitude * rig.clearance / np.linalg.norm(matrices["displacement"] @ push)
+    motion = matrices["displacement"] @ push
     lines = [(float(f), {q: m @ push for q, m in matrices.items()})]
+    if test.dry:
+        return lines
+    lines += overtones(rig, f, motion, film)
+    if rig.harmonic:
+        again = rig.harmonic * push * np.exp(1j * (phase + 0.5))
+        lines.append((2 * float(f), {q: m @ again for q, m in response(rig, 2 * f, *film).items()}))
     for frequency, share in ((rig.speed, rig.unbalance), *rig.lines):
-        on_film = share * force * circle * np.exp(1j * rng.uniform(0, 6.28))
+        angle = shaft + 0.3 if frequency == rig.speed else rng.uniform(0, 6.28)
+        on_film = share * usual_force(rig, test.frequency, test.load) * circle * np.exp(1j * angle)
         matrices = response(rig, np.array(frequency), *film)
         d = np.linalg.solve(rig.film.h(frequency, film[0]) * film[1], on_film)
         push = np.linalg.solve(matrices["displacement"], d)
         lines.append((frequency, {q: m @ push for q, m in matrices.items()}))
     for order in (1, 2, 3):
-        eccentric = rig.runout / order * rig.clearance * circle * np.exp(1j * rng.uniform(0, 6.28))
-        lines.append((order * rig.speed, {"displacement": eccentric}))
+        # waves of the shaft's surface, as probes at 45 and 135 deg see them
+        waves = sum(unit_vector(at) * np.exp(1j * order * (shaft - np.radians(at))) for at in (45.0, 135.0))
+        lines.append((order * rig.speed, {"displacement": rig.runout / order * rig.clearance * waves}))
     return lines
+
+
+def usual_force(rig: Rig, frequency: float, load: float) -> float:
+    """What a drive of the usual amplitude pushes the film with [N], whatever its direction."""
+    return rig.amplitude * rig.clearance * float(np.abs(np.diag(rig.film.h(frequency, load))).mean())
+
+
+def overtones(rig: Rig, f: Array, d: Array, film: tuple[float, float]) -> list[tuple[float, Any]]:
+    """Motion (2,) at two and three times the drive's frequency by which a curved film makes up for its own force."""
+    lines, direct = [], np.abs(np.diag(rig.film.h(f, film[0]))) * film[1]
+    if rig.film.square:
+        product = np.array([0.5 * d[0] ** 2 + 1.2 * d[0] * d[1], d[1] ** 2 + 0.4 * d[0] ** 2])
+        on_film = 0.5 * rig.film.square / rig.clearance * direct * product
+        lines.append((2, on_film))
+    if rig.film.cube:
+        share = np.linalg.norm(d) / rig.clearance
+        lines.append((3, 0.25 * rig.film.cube * share**2 * direct * d * np.exp(2j * np.angle(d))))
+    return [
+        (order * float(f), {"displacement": -np.linalg.solve(rig.film.h(order * f, film[0]) * film[1], on_film)})
+        for order, on_film in lines
+    ]
 
 
 def signal(rig: Rig, test: Test, rng: np.random.Generator) -> Signal:
     """Everything that a run's sensors could see."""
     load = test.load * (1 + rig.load_scatter * rng.standard_normal())
     pull = unit_vector(rig.load_direction + np.degrees(rig.load_scatter * rng.standard_normal()))
-    film = (load, 1 + rig.stiffness_scatter * rng.standard_normal())
-    steady = lines_of(rig, test, rng, film)
+    film = (load, (1 + rig.stiffness_scatter * rng.standard_normal()) * (not test.dry))
+    shaft = 0.0 if rig.locked else rng.uniform(0, 6.28)
+    steady = lines_of(rig, test, rng, film, shaft)
     courses: dict[str, CubicSpline] = {}
     if (rig.excitation, rig.share, rig.wander, rig.switch) != ("sine", (0.0, 1.0), 0.0, 1.0):
         steady, courses = steady[1:], course_signals(rig, test, rng, film)
     means = {"displacement": 0.5 * rig.clearance * pull * (test.load > 0), "force": load * pull * rig.static}
 
     def values(quantity: str, times: Array) -> Array:
+        if quantity == "keyphasor":  # a pulse at three tenths of a turn
+            away = np.abs((rig.speed * times + shaft / (2 * np.pi)) % 1.0 - 0.3)
+            return np.array([5.0 * np.clip(20 * (0.05 - away), 0, 1), 0 * times])
         total = np.zeros((2, len(times))) + means.get(quantity, np.zeros(2))[:, None]
         for frequency, phasors in steady:
             if quantity in phasors:
@@ -229,20 +292,25 @@ def channels_of(rig: Rig, probes: tuple[float, ...] = (45.0, 135.0), stage: floa
         channels += [Channel(letter + "1H", quantity, stage), Channel(letter + "1V", quantity, stage + 90)]
     if rig.excitation != "sine":
         channels += [Channel("CMDX", "command", 0.0), Channel("CMDY", "command", 90.0)]
+    if rig.keyphasor:
+        channels.append(Channel("KEY", "keyphasor", 0.0))
     return tuple(channels)
 
 
 def noise_of(rig: Rig) -> dict[str, float]:
     """Usual noise of a sample, by quantity."""
-    force = rig.amplitude * rig.clearance * float(np.abs(np.diag(rig.film.h(rig.frequencies[0], rig.film.load))).mean())
-    return {"displacement": 3e-4 * rig.clearance, "force": 0.01 * force, "acceleration": 4e-3, "command": 2e-3 * force}
+    force = usual_force(rig, rig.frequencies[0], rig.film.load)
+    return {"displacement": 3e-4 * rig.clearance, "force": 0.01 * force, "acceleration": 4e-3, "command": 2e-3 * force,
+            "keyphasor": 0.05}  # fmt: skip
 
 
 def tests_of(rig: Rig) -> list[Test]:
     """The plan."""
     frequencies = rig.frequencies if rig.excitation == "sine" else (sum(rig.band) / 2,)
     points = [(load, f) for load in rig.loads for f in frequencies]
-    return [Test(load, f, direction) for load, f in points for direction in rig.directions * rig.repeats]
+    runs = [(direction, size) for direction in rig.directions * rig.repeats for size in rig.sizes]
+    dry = [Test(0.0, f, direction, dry=True) for f in frequencies * any(rig.beside) for direction in rig.directions]
+    return [Test(*point, *run) for point in points for run in runs] + dry
 
 
 def campaign(rig: Rig, channels: tuple[Channel, ...], seed: list[int]) -> Campaign:
@@ -257,6 +325,7 @@ def campaign_of(rig: Rig, signals: list[Signal], channels: tuple[Channel, ...]) 
     for i, (test, values) in enumerate(zip(tests_of(rig), signals)):
         lines = [f'kind = "dynamic"\nshaft_speed = "{rig.speed:g} Hz"\nstatic_load = "{test.load:g} N"']
         lines += [f'static_load_direction = "{rig.load_direction:g} deg"']
+        lines = ['kind = "baseline"\nshaft_speed = "0 Hz"'] if test.dry else lines
         lines += [f'excitation_direction = "{test.direction:g} deg"']
         if rig.excitation == "sine":
             lines += [f'excitation_frequency = "{test.frequency:g} Hz"']
@@ -279,3 +348,12 @@ def with_entries(channels: tuple[Channel, ...], names: str, **entries: Any) -> t
     """The same channels, those whose name begins with one of the words of `names` with other entries."""
     starts = tuple(names.split())
     return tuple(replace(c, **entries) if c.name.startswith(starts) else c for c in channels)
+
+
+def write_rig(
+    folder: Path, rig: Rig, channels: tuple[Channel, ...] = (), setup: Acquisition | None = None, seed: int = 1
+) -> Path:
+    """Write a campaign of a rig, with its usual sensors unless others are given, exact but for noise; its path."""
+    setup = replace(setup or Acquisition(uncertainty=EXACT), noise=noise_of(rig))
+    folder.mkdir(parents=True, exist_ok=True)
+    return write_campaign(folder, campaign(rig, channels or channels_of(rig), [seed]), setup, [seed, 1])
