@@ -88,17 +88,14 @@ class Command(Terminal):
         self._opened.append(campaign)
         return campaign
 
-    def file(self, path: Path, refuses_changed: bool = False) -> Path:
+    def file(self, path: Path) -> Path:
         """Note an ordinary file that the command reads; devices and pipes are refused.
 
-        A result that is not what run.json beside it recorded is named, and refused where the command `refuses_changed`.
+        A result that is not what run.json beside it recorded is named.
         """
         refuse_special(path)
         if reason := contradiction(path):
-            message = f"{path}: {reason}"
-            if refuses_changed:
-                raise BadInputError(f"{message}. Run the command again, or move the file out of its results.")
-            self.warn(message)
+            self.warn(f"{path}: {reason}")
         self._opened.append(path)
         return path
 
