@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rigdata.near_names import hint
 from rigdata.problem import Severity
@@ -37,7 +37,8 @@ _LINES = (
 
 def _registered() -> dict[str, ConditionKind]:
     text = Path(__file__).with_suffix(".csv").read_text(encoding="utf-8")
-    kinds = [ConditionKind(*row) for row in csv.reader(text.splitlines()[1:])]
+    rows: Any = csv.reader(text.splitlines()[1:])
+    kinds = [ConditionKind(*row) for row in rows]
     meaning = "Another line is on the excitation and cannot be separated from it. Excite elsewhere."
     kinds += [ConditionKind("warning", f"{line} on excitation line", meaning) for line in _LINES]
     return {kind.name: kind for kind in kinds}

@@ -27,7 +27,7 @@ import typer
 
 from rigdata.problem import RigError
 from tpjb_ident.cli.options import option
-from tpjb_ident.cli.terminal import Terminal
+from tpjb_ident.cli.terminal import Progress, Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.interrupts import heard, interrupt_behind
@@ -134,11 +134,15 @@ class Command(Terminal):
         return hashes
 
     @contextlib.contextmanager
-    def results(self, entry: str = "") -> Iterator[Path]:
-        """Give a temporary folder; when the block ends well it gets a run.json and moves to the output folder."""
+    def results(self, activity: str = "", entry: str = "") -> Iterator[Progress]:
+        """Fill a temporary folder; when the block ends well it gets a run.json and moves to the output folder.
+
+        With an activity the block's progress is shown.
+        """
         entry = entry or self.name
-        with output_folder(self.target, entry, tuple(self._sources)) as self.folder:
-            yield self.folder
+        shown = self.progress(activity) if activity else contextlib.nullcontext(lambda *_: None)
+        with output_folder(self.target, entry, tuple(self._sources)) as self.folder, shown as show:
+            yield show
             notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": self.given}
             names = write_record(self.folder, self.target, entry, self.options, self.inputs, notes)
         self.wrote(*names)

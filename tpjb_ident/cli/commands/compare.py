@@ -85,7 +85,7 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
     """Hold two campaigns against each other."""
     from tpjb_ident.compare.difference import difference_of, difference_sentences
 
-    with c.results() as folder:
+    with c.results():
         difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
         from tpjb_ident.report.difference_page import write_difference_report
 
@@ -93,7 +93,7 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
             c.table(name, frame)
         on_records = difference.b.campaign is not None
         following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
-        write_difference_report(folder, difference, named(c.options), c.inputs, following)
+        write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
     rows = []
     for row in difference.points.to_dict("records"):
         judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}

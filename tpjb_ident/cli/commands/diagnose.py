@@ -52,7 +52,7 @@ def diagnose(
     source, drawing = open_source(c, campaign, coefficients, bearing)
     model = model_settings(c, start, thermal, effects, drawing)
     baseline = Baseline(start, thermal, model.effects)
-    with c.results() as folder:
+    with c.results():
         from tpjb_ident.compare.static_tests import measure_static
         from tpjb_ident.runtime.executors import background_job, cores, forks
 
@@ -67,12 +67,12 @@ def diagnose(
         if result.identification is not None:
             write_identification(c, result.identification)
         verdict = result.diagnosis.verdict
-        _write_verdict(folder, baseline, verdict)
+        _write_verdict(c.folder, baseline, verdict)
         from tpjb_ident.report.diagnosis_page import next_command, write_diagnosis_report
 
         typed = str(campaign or f"--coefficients {coefficients}")
         following = next_command(typed, str(bearing or ""), verdict, str(c.target))
-        write_diagnosis_report(folder, source, result, named(c.options), c.inputs, following)
+        write_diagnosis_report(c.folder, source, result, named(c.options), c.inputs, following)
     _show_verdict(c, source.id, result, following)
     if result.identification is not None:
         refuse_untrusted(result.identification)

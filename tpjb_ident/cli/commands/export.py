@@ -42,8 +42,8 @@ def export(
 
     check_format(to)
     coefficients, name = _coefficients(c, source, method, norm)
-    with c.results(f"export {to}") as folder:
-        written = write_export(coefficients, to, folder, force=force, name=name, ross=ross)
+    with c.results(entry=f"export {to}"):
+        written = write_export(coefficients, to, c.folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
     c.print(f"{written}: {listed(written.files, 4)}")
     c.next("verify", c.target)

@@ -64,7 +64,7 @@ def identify(
     from tpjb_ident.runtime.executors import open_workers
 
     count, start = _worker_count(source, workers, scheduler)
-    with c.results() as folder:
+    with c.results():
         with (
             open_workers(count, scheduler, start) as team,
             _finished_runs(c.target) as store,
@@ -79,7 +79,7 @@ def identify(
             points = plain_points(source, plain_settings)
             c.table("plain", plain_frame(points, plain_settings))
             if keep_r:
-                write_r_matrices(folder / "r_matrices.h5", points)
+                write_r_matrices(c.folder / "r_matrices.h5", points)
         c.remarks = result.remarks()
     show_identification(c, result)
     if source.bearing_text:

@@ -67,10 +67,9 @@ def simulate(
         faults=tuple(Fault(**_fault_arguments(text)) for text in fault or ()),
     )
     file = "campaign.h5" if layout == "hdf5" else "campaign"
-    with c.results() as folder:
-        with c.progress("simulating") as show:
-            truth = write_campaign(folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
-        truth.write(folder / "truth.json")
+    with c.results("simulating") as show:
+        truth = write_campaign(c.folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
+        truth.write(c.folder / "truth.json")
     c.print(f"{name}: {len(rig.runs())} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
     c.next("check", c.target / file)
 

@@ -112,9 +112,9 @@ def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refr
     from tpjb_ident.report.watch_page import write_watch_page
 
     c.inputs = dict(snapshot.hashes)
-    with c.results() as staging:
+    with c.results():
         settings = {name: str(value) for name, value in c.options.items()}
-        write_watch_page(staging, snapshot, refresh, settings, c.following, drawing)
+        write_watch_page(c.folder, snapshot, refresh, settings, c.following, drawing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
         c.json("watch.json", _state_document(snapshot))
