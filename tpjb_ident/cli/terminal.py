@@ -225,9 +225,11 @@ def wrapped(text: str, width: int) -> list[str]:
 
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
     """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers."""
-    sizes = []
-    for i, column in enumerate(columns):  # headings break at spaces
-        sizes.append(max(map(cell_len, [*column.split(), *(row[i] for row in rows)]), default=0))
+    cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
+    sizes = [max(cell, cell_len(column)) for cell, column in zip(cells, columns, strict=True)]
+    if _total(sizes) > width:  # headings break at spaces first
+        longest = [max(map(cell_len, column.split()), default=0) for column in columns]
+        sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
     beside = list(range(len(columns)))
     while len(beside) > 1 and _total([sizes[i] for i in beside]) > width:
         beside.remove(max([i for i in beside[1:] if i in words] or beside))
