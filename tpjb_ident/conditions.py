@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any, Self, get_args
 
 from rigdata import problem
-from tpjb_ident.condition_kinds import ERRORS, condition_kind
+from tpjb_ident.condition_kinds import KINDS, condition_kind
 
 #: How grave a condition or a finding can be, the gravest first.
 SEVERITIES = get_args(problem.Severity)
@@ -52,4 +52,5 @@ def sentences(conditions: Iterable[Condition]) -> tuple[str, ...]:
 
 def errors_in(quality: object) -> list[str]:
     """Names in a cell of a column `quality` that forbid trust in its row."""
-    return [name for name in str(quality).split("; ") if name in ERRORS]
+    names = str(quality).split("; ")
+    return [name for name in names if name in KINDS and KINDS[name].severity == "error"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 MINUS = "\N{MINUS SIGN}"
 #: An interval that reaches this many times further to one side than to the other is told by its ends.
@@ -16,6 +17,16 @@ def counted(number: int, thing: str) -> str:
     ('1 error', '0 errors')
     """
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def listed(things: Sequence[str], most: int = 5, between: str = ", ") -> str:
+    """The first of many things, and how many more there are.
+
+    >>> listed(["a", "b", "c"], most=2)
+    'a, b and 1 more'
+    """
+    rest = len(things) - most
+    return between.join(things[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def plain(value: float, digits: int) -> str:

@@ -27,7 +27,7 @@ import typer
 
 from rigdata.problem import RigError
 from tpjb_ident.cli.options import option
-from tpjb_ident.cli.terminal import Terminal
+from tpjb_ident.cli.terminal import Progress, Terminal
 from tpjb_ident.columns import in_us_units, use_units
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.interrupts import heard, interrupt_behind
@@ -88,17 +88,14 @@ class Command(Terminal):
         self._opened.append(campaign)
         return campaign
 
-    def file(self, path: Path, refuses_changed: bool = False) -> Path:
+    def file(self, path: Path) -> Path:
         """Note an ordinary file that the command reads; devices and pipes are refused.
 
-        A result that is not what run.json beside it recorded is named, and refused where the command `refuses_changed`.
+        A result that is not what run.json beside it recorded is named.
         """
         refuse_special(path)
         if reason := contradiction(path):
-            message = f"{path}: {reason}"
-            if refuses_changed:
-                raise BadInputError(f"{message}. Run the command again, or move the file out of its results.")
-            self.warn(message)
+            self.warn(f"{path}: {reason}")
         self._opened.append(path)
         return path
 
@@ -137,11 +134,15 @@ class Command(Terminal):
         return hashes
 
     @contextlib.contextmanager
-    def results(self, entry: str = "") -> Iterator[Path]:
-        """Give a temporary folder; when the block ends well it gets a run.json and moves to the output folder."""
+    def results(self, activity: str = "", entry: str = "") -> Iterator[Progress]:
+        """Fill a temporary folder; when the block ends well it gets a run.json and moves to the output folder.
+
+        With an activity the block's progress is shown.
+        """
         entry = entry or self.name
-        with output_folder(self.target, entry, tuple(self._sources)) as self.folder:
-            yield self.folder
+        shown = self.progress(activity) if activity else contextlib.nullcontext(lambda *_: None)
+        with output_folder(self.target, entry, tuple(self._sources)) as self.folder, shown as show:
+            yield show
             notes = {"remarks": list(self.remarks), "arithmetic": list(self.arithmetic), "options": self.given}
             names = write_record(self.folder, self.target, entry, self.options, self.inputs, notes)
         self.wrote(*names)

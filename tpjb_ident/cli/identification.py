@@ -10,6 +10,7 @@ from tpjb_ident.cli.options import refuse_unknown
 from tpjb_ident.columns import UNITS, Column, amount, size, symbol, words
 from tpjb_ident.conditions import sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -112,9 +113,8 @@ def refuse_untrusted(result: Identification) -> None:
     if lost and not bad:
         raise NotTrustedError("; ".join(lost))
     if bad:
-        more = f"\n... and {len(bad) - 5} more" if len(bad) > 5 else ""
         total = len(result.points) + sum(not band.points for band in result.bands)
-        raise NotTrustedError(f"{len(bad)} of {total} points:\n" + "\n".join([*bad[:5], *lost]) + more)
+        raise NotTrustedError("\n".join([f"{len(bad)} of {total} points:", *lost, listed(bad, between="\n")]))
 
 
 def show_identification(c: Command, result: Identification) -> None:
@@ -199,9 +199,7 @@ def _show_frequency_fits(c: Command, result: Identification) -> None:
 def _print_rejecting(c: Command, loads: list[str], instead: str) -> None:
     """Say at which loads no model over frequency holds, and what to use."""
     if loads:
-        more = f" and {len(loads) - 6} more loads" if len(loads) > 6 else ""
-        at = f"{', '.join(loads[:6])} {symbol('load')}{more}"
-        c.print(f"note: at {at} the data refuse K-C and K-C-M; use {instead}")
+        c.print(f"note: at {listed(loads)} {symbol('load')} the data refuse K-C and K-C-M; use {instead}")
 
 
 def _model_rows(load: float, models: Mapping[str, FrequencyModel], supported: str) -> list[list[object]]:
@@ -217,8 +215,8 @@ def _model_rows(load: float, models: Mapping[str, FrequencyModel], supported: st
 def _show_bands(c: Command, result: Identification) -> None:
     """Print K, C and M of every point that was excited over a band, and h at some of its lines."""
     bad = sum(bool(untrusted(band.quality)) for band in result.bands)
-    n = len(result.bands)
-    c.print(f"{result.campaign}: {n} operating point{'s' if n > 1 else ''} excited over a band, {_trust(bad)}.")
+    points = counted(len(result.bands), "operating point")
+    c.print(f"{result.campaign}: {points} excited over a band, {_trust(bad)}.")
     models, lines, rejecting = [], [], []
     for band in result.bands:
         load = band.point.static_load

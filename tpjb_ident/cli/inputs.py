@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import hint
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.units import LONGEST, UnitError, parse_quantity
 from tpjb_ident.cli.command import Command
@@ -27,7 +27,6 @@ from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
     from model.bearing import Bearing
-    from model.effects import Effect
     from tpjb_ident.compare.predictions import ModelSettings
 
 #: More values than this in one option are a slip of the keyboard.
@@ -40,6 +39,8 @@ _EXAMPLES = {
     "angle": "-90 deg",
     "stiffness": "4e8 N/m",
     "temperature": "40 degC",
+    "time": "0.2 ms",
+    "ratio": "3 %",
 }
 
 
@@ -52,7 +53,7 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
         )
     items = [item for item in re.split(r"[,;]", text) if item.strip()]
     if not items:
-        raise BadInputError(f'{option}: is empty. Write, for instance, {option} "{_EXAMPLES[dimension]}".')
+        raise BadInputError(f'{option}: is empty. Write, for instance, "{_EXAMPLES[dimension]}".')
     values: list[float] = []
     unit = ""
     for item in reversed(items):
@@ -70,20 +71,14 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
     return tuple(values)
 
 
-def parse_value(text: str, dimension: str, option: str) -> float:
-    """Read one quantity; like `parse_values`."""
+def parse_value(text: str, dimension: str, option: str, least: float = -math.inf) -> float:
+    """Read one quantity, as `parse_values` does."""
     values = parse_values(text, dimension, option)
     if len(values) != 1:
         raise BadInputError(f"{option}: takes one value, got {len(values)} from {text!r}.")
+    if values[0] < least:
+        raise BadInputError(f"{option} {text!r}: must not be below {least:g}.")
     return values[0]
-
-
-def parse_amount(text: str, dimension: str, place: str, example: str) -> float:
-    """Read one quantity in the words of a manifest; `place` says where it was typed, `example` how it is written."""
-    try:
-        return parse_quantity(text, dimension)
-    except UnitError as error:
-        raise BadInputError(f"{place}: {error}. Write, for instance, {example}.") from error
 
 
 def _range(quantities: Sequence[float], where: str) -> list[float]:
@@ -102,14 +97,14 @@ def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float,
     match = _PART.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise BadInputError(
-            f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. Write, for instance, "
-            f'{option} "{_EXAMPLES[dimension]}".'
+            f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. "
+            f'Write, for instance, "{_EXAMPLES[dimension]}".'
         )
     unit = match[2] or unit
     try:
         return parse_quantity(f"{match[1]} {unit}".strip(), dimension, option), unit
     except UnitError as error:
-        raise BadInputError(f'{error}. Write, for instance, {option} "{_EXAMPLES[dimension]}".') from error
+        raise BadInputError(f'{error}. Write, for instance, "{_EXAMPLES[dimension]}".') from error
 
 
 _PIVOTS = ("rigid", "kirk", "kirk-secant")
@@ -154,37 +149,32 @@ def pivot_choice(c: Command, text: str) -> str | float | Path:
         return c.file(path)
     if text[:1].isdigit():
         return parse_value(text, "stiffness", "--pivots")
-    near = nearest_name(text, _PIVOTS)
-    hint = f"Did you mean {near!r}?" if near else "Use rigid, kirk, kirk-secant, a pivots.toml or a stiffness."
-    raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {hint}")
+    use = hint(text, _PIVOTS, "Give a pivots.toml, a stiffness, or one of")
+    raise BadInputError(f"--pivots: {text!r} is no such file and no pivot model. {use}")
 
 
-def model_settings(c: Command, pivots: str | float | Path, thermal: str, effects: Path | None) -> ModelSettings:
-    """Build `ModelSettings` from options."""
+def model_settings(
+    c: Command, pivots: str | float | Path, thermal: str, path: Path | None, bearing: Bearing | None
+) -> ModelSettings:
+    """Build `ModelSettings` from options; effects that the bearing cannot have, or that count twice, are refused."""
     refuse_unknown(thermal, THERMAL, "--thermal")
-    from tpjb_ident.compare.predictions import ModelSettings
+    from tpjb_ident.compare.predictions import ModelSettings, refuse_counted_twice
 
-    if effects is None:
-        return ModelSettings(pivots, thermal)
-    from model.effects import load_effects
-
-    return ModelSettings(pivots, thermal, load_effects(c.file(effects)))
-
-
-def refuse_impossible(effects: Sequence[Effect], path: Path | None, bearing: Bearing | None) -> None:
-    """Refuse effects of a file that a bearing cannot have, such as one of a pad that it lacks."""
     if path is None:
-        return
-    if bearing is None:
-        raise BadInputError("--effects: effects are of a bearing. Add --bearing FILE, or leave them out.")
-    from model.effects import EffectError, apply_effects
+        return ModelSettings(pivots, thermal)
+    from model.effects import EffectError, apply_effects, load_effects
     from model.pivots import pivot_laws
     from model.setup import Setup
 
+    effects = load_effects(c.file(path))
+    refuse_counted_twice(pivots, effects, path)
+    if bearing is None:
+        raise BadInputError("--effects: effects are of a bearing. Add --bearing FILE, or leave them out.")
     try:
         apply_effects(Setup(bearing, pivot_laws("rigid", bearing)), effects)
     except EffectError as error:
         raise BadInputError(f"--effects {path.name}: {error}") from error
+    return ModelSettings(pivots, thermal, effects)
 
 
 def open_source(
@@ -207,10 +197,3 @@ def open_source(
     if bearing is None and not predicted:
         raise BadInputError(f"{c.name} --coefficients: a table names no bearing. Add --bearing FILE.")
     return TableSource(table.stem), None if bearing is None else c.bearing(bearing)
-
-
-def parse_share(text: str | None, option: str) -> float | None:
-    """Read a share such as 5 %."""
-    from rigdata.units import parse_quantity
-
-    return None if text is None else float(parse_quantity(text, "ratio", option))

@@ -9,7 +9,7 @@ from typer import Argument, Option
 from typer.core import TyperCommand
 from typer.models import ParameterInfo
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import hint
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.exports.formats import FORMATS
@@ -133,13 +133,19 @@ def named(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: getattr(value, "name", value) for name, value in options.items()}
 
 
-def refuse_unknown(value: str, known: Iterable[str], option: str, several: bool = False) -> None:
+def refuse_unknown(value: str, known: Iterable[str], option: str) -> None:
     """Let a known name pass; answer another with the nearest."""
     names = tuple(known)
     if value not in names:
-        near = nearest_name(value, names)
-        hint = f"Did you mean {near!r}?" if near else f"Use {'some' if several else 'one'} of {', '.join(names)}."
-        raise BadInputError(f"{option}: {value!r} is not known. {hint}")
+        raise BadInputError(f"{option}: {value!r} is not known. {hint(value, names, 'Use one of')}")
+
+
+def known_names(text: str, known: Iterable[str], option: str) -> tuple[str, ...]:
+    """Names in a list with commas, each once."""
+    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    for name in names:
+        refuse_unknown(name, known, option)
+    return names
 
 
 #: Parameters from which on headings help more than they cost.

@@ -194,17 +194,15 @@ def _width() -> int:
 
 def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> tuple[str, list[str]]:
     """Title and lines of a table; of one that is too wide, columns of one and the same number go to the title."""
-    common = [i for i in range(len(headings)) if i not in words and rows and len({row[i] for row in rows}) == 1]
-    columns = list(range(len(headings)))
-    while True:
-        chosen = [[row[i] for i in columns] for row in rows]
-        texts = [columns.index(i) for i in words]
-        lines = table_lines([headings[i] for i in columns], chosen, texts, _width(), whole=bool(common))
-        if not common or max(map(cell_len, lines)) <= _width():
-            return "\n".join(wrapped(title, _width())), lines
-        constant = common.pop(0)
-        columns.remove(constant)
-        title += f"; {headings[constant]} {rows[0][constant].strip()}"
+    constant: list[int] = []
+    if rows and max(map(cell_len, table_lines(headings, rows, words, sys.maxsize))) > _width():
+        constant = [i for i in range(len(headings)) if i not in words and len({row[i] for row in rows}) == 1]
+    columns = [i for i in range(len(headings)) if i not in constant]
+    title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
+    chosen = [[row[i] for i in columns] for row in rows]
+    texts = [columns.index(i) for i in words]
+    lines = table_lines([headings[i] for i in columns], chosen, texts, _width())
+    return "\n".join(wrapped(title, _width())), lines
 
 
 def _fitted(text: str, wraps: bool = True) -> str:
@@ -225,24 +223,16 @@ def wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False) or [""]
 
 
-def table_lines(
-    columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int, whole: bool = False
-) -> list[str]:
-    """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers.
-
-    Numbers of a `whole` one stay in their row, however wide it is.
-    """
+def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
+    """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers."""
     cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
     sizes = [max(cell, cell_len(column)) for cell, column in zip(cells, columns, strict=True)]
     if _total(sizes) > width:  # headings break at spaces first
-        longest = [max((cell_len(word) for word in column.split()), default=0) for column in columns]
+        longest = [max(map(cell_len, column.split()), default=0) for column in columns]
         sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
     beside = list(range(len(columns)))
-    movable = [i for i in beside[1:] if i in words or not whole]
-    while movable and _total([sizes[i] for i in beside]) > width:
-        last = max([i for i in movable if i in words] or movable)
-        movable.remove(last)
-        beside.remove(last)
+    while len(beside) > 1 and _total([sizes[i] for i in beside]) > width:
+        beside.remove(max([i for i in beside[1:] if i in words] or beside))
     headings = [textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False) for i in beside]
     height = max(map(len, headings))
     layout = [(sizes[i], i in words) for i in beside]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import hint
 from tpjb_ident.columns import in_us_units, place_of
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.errors import TpjbError
@@ -148,8 +148,6 @@ FORMATS = {
 def check_format(name: str) -> None:
     """Refuse a form that is not known, or that cannot be written in the units in use."""
     if name not in FORMATS:
-        near = nearest_name(name, FORMATS)
-        hint = f"Did you mean {near!r}?" if near else f"Use one of {', '.join(FORMATS)}."
-        raise ExportError(f"--to: {name!r} is not known. {hint}")
+        raise ExportError(f"--to: {name!r} is not known. {hint(name, FORMATS, 'Use one of')}")
     if name == "ross" and in_us_units():
         raise ExportError(f"--units us: --to {name} writes SI, all that its program reads. Leave --units us out.")

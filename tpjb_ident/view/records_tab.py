@@ -1,4 +1,4 @@
-"""Records: pick a run, see its channels over time, their spectra, a waterfall, and the orbit of the shaft."""
+"""Records: pick a run, see its channels over time, their spectra, and the orbit of the shaft."""
 
 from __future__ import annotations
 
@@ -22,15 +22,12 @@ if TYPE_CHECKING:
 _MOST_POINTS = 6000
 #: Of the running speed, taken off the orbit together: unbalance and runout.
 _HARMONICS = 2
-#: Stretches of a waterfall that do not overlap, and samples of one at most.
-_STRETCHES, _MOST_LINES = 12, 2048
 _INK, _BLUE, _RED = "#1c2024", "#0072b2", "#d55e01"
 _COLOURS = (_INK, _BLUE, "#d98c00", "#009e73", _RED, "#b9609a", "#7a828b")
 
 
 #: Columns of what is drawn.
-_COLUMNS = {"orbit": "x y", "without": "x y", "time": "x y colour name", "spectrum": "x y colour name",
-            "waterfall": "image x y dw dh"}  # fmt: skip
+_COLUMNS = {"orbit": "x y", "without": "x y", "time": "x y colour name", "spectrum": "x y colour name"}
 
 
 def _nothing(name: str) -> dict[str, Any]:
@@ -57,7 +54,6 @@ def records_tab(campaign: Campaign) -> Any:
         plot.multi_line("x", "y", source=data[name], color="colour", legend_field="name")
         plot.add_layout(plot.legend[0], "below")  # covers nothing
         plot.legend.orientation = "horizontal"
-    fall = _waterfall_plot(data["waterfall"])
     x, y = (f"{axis}, {symbol('length')}" for axis in "xy")
     orbit = _new_plot("shaft in the housing", x, y, match_aspect=True, height=420, name="orbit-plot")
     orbit.line("x", "y", source=data["orbit"], color=_BLUE, line_width=0.7, legend_label="as measured")
@@ -74,8 +70,6 @@ def records_tab(campaign: Campaign) -> Any:
         try:
             records = [run.record(channel.value), *(run.record(n) for n in further.value if n != channel.value)]
             message = _show_channels(records, (time, spectrum), data)
-            fall.title.text = f"waterfall of {records[0].name}"
-            data["waterfall"].data = waterfall(records[0])
             data["orbit"].data, data["without"].data = _orbits(run)
         except RigDataError as error:
             message = str(error)
@@ -84,12 +78,9 @@ def records_tab(campaign: Campaign) -> Any:
         facts.text = html.escape(printable(f"{text}. {message}"))
 
     follow(update, pick, channel, further)
-    left_column, right = (
-        column(*pair, sizing_mode="stretch_width", min_width=340) for pair in ((time, spectrum), (orbit, fall))
-    )
-    return column(
-        _side_by_side(pick, channel, further), facts, _side_by_side(left_column, right), sizing_mode="stretch_width"
-    )
+    over = column(time, spectrum, sizing_mode="stretch_width", min_width=340)
+    widgets = _side_by_side(pick, channel, further)
+    return column(widgets, facts, _side_by_side(over, orbit), sizing_mode="stretch_width")
 
 
 def follow(update: Callable[[], None], *widgets: Any, event: str = "value") -> None:
@@ -122,31 +113,6 @@ def _show_channels(records: Sequence[Record], plots: tuple[Any, Any], data: dict
         f"{first.name}: {len(first.values)} samples at {first.rate:g} Hz, {missing} missing; lines: {lines or 'none'}"
     )
     return message + (f"; of another quantity, not drawn: {not_shown}" if not_shown else "")
-
-
-def _waterfall_plot(source: Any) -> Any:
-    """An empty waterfall: amplitude over frequency and time."""
-    from bokeh.models import ColorBar, LinearColorMapper
-
-    plot = _new_plot("waterfall", "frequency, Hz", "time, s", name="waterfall-plot")
-    mapper = LinearColorMapper(palette="Viridis256", low=-60.0, high=0.0)
-    plot.image("image", x="x", y="y", dw="dw", dh="dh", source=source, color_mapper=mapper)
-    plot.add_layout(ColorBar(color_mapper=mapper, title="dB", width=12), "right")
-    plot.x_range.range_padding = plot.y_range.range_padding = 0.0
-    return plot
-
-
-def waterfall(record: Record) -> dict[str, Any]:
-    """Spectra of short stretches one above the other, in dB below the strongest line."""
-    values = np.nan_to_num(record.values - np.nanmean(record.values))
-    length = min(_MOST_LINES, len(values) // _STRETCHES * 2)
-    if length < 64:
-        return _nothing("waterfall")
-    starts = np.linspace(0, len(values) - length, 2 * _STRETCHES).astype(int)
-    spectra = np.stack([amplitude_spectrum(values[i : i + length], record.rate)[1] for i in starts])
-    level = 20.0 * np.log10(np.maximum(spectra / max(float(spectra[:, 2:].max()), 1e-300), 1e-6))
-    seconds = float(record.time[-1] - record.time[0])
-    return {"image": [level], "x": [0.0], "y": [0.0], "dw": [0.5 * record.rate], "dh": [seconds]}
 
 
 def _orbits(run: Any) -> tuple[dict[str, Any], dict[str, Any]]:

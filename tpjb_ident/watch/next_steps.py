@@ -17,6 +17,7 @@ from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.results.point_result import PointResult
+from tpjb_ident.rounding import counted, listed
 
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
@@ -118,7 +119,6 @@ def _test(run: Run) -> tuple[object, ...]:
 _IN_A_ROW = 2
 #: Kinds of runs with a turning shaft.
 _TURNING = ("dynamic", "locus")
-_LISTED = 4
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def next_steps(
     repairs = []
     for group in common:
         problem, runs = group[0].problem, tuple(dict.fromkeys(str(f.problem.run) for f in group))
-        text = f"Look into this, it is in {len(runs)} runs alike ({_named(runs)}): {located(problem)}. {problem.cure}."
+        text = f"Look into this, it is in {len(runs)} runs alike ({listed(runs)}): {located(problem)}. {problem.cure}."
         repairs.append(Step("mend", text, runs))
     return [
         *stop,
@@ -216,7 +216,7 @@ def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
             stopped.update(row)
             runs = tuple(reversed(row))
             p = finding.problem
-            text = f"Stop: {located(p)}, in the last {len(row)} records ({_named(runs)}). {p.cure}, then repeat them."
+            text = f"Stop: {located(p)}, in the last {len(row)} records ({listed(runs)}). {p.cure}, then repeat them."
             steps.append(Step("stop", text, runs))
     return steps, stopped
 
@@ -258,7 +258,7 @@ def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: fl
             steps.append(Step("more", f"{place}: {share}; calibration sets that, more records do not help."))
             continue
         more = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
-        many = f"about {more} more record{'s' if more > 1 else ''} like those there would do"
+        many = f"about {counted(more, 'more record')} like those there would do"
         steps.append(Step("more", f"{place}: {share}; {many}.", point.runs))
     return steps
 
@@ -300,7 +300,7 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
             directions_of.setdefault(run.point, set()).add(run.excitation_direction)
     lonely = [p for p, directions in directions_of.items() if len(directions) == 1 and None not in directions]
     if lonely:
-        first = "; ".join(place_of(p.static_load, p.excitation_hz) for p in lonely[:3])
+        first = listed([place_of(p.static_load, p.excitation_hz) for p in lonely], 3, "; ")
         lacks.append(f"{len(lonely)} operating points have one excitation direction ({first}): K and C need two.")
     pads = {run.pad for run in runs if run.kind == "dry_pivot"}
     without = [f"#{pad}" for pad in range(1, n_pads + 1) if pad not in pads]
@@ -309,7 +309,3 @@ def plan_lacks(runs: Sequence[Run], n_pads: int) -> list[str]:
     if not any(run.kind == "clearance" for run in runs):
         lacks.append("No clearance sweep: positions count from the probes' zero, and clearances stay the drawing's.")
     return lacks
-
-
-def _named(runs: Sequence[str]) -> str:
-    return ", ".join(runs[:_LISTED]) + (", .." if len(runs) > _LISTED else "")

@@ -13,7 +13,7 @@ from tpjb_ident.cli.options import DEMO
 from tpjb_ident.columns import Column, words
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.errors import BadInputError
-from tpjb_ident.rounding import counted
+from tpjb_ident.rounding import counted, listed
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -109,8 +109,8 @@ def problem_lines(problems: Sequence[Problem]) -> list[str]:
             lines += [f"{severity}: {p}" for p in group]
             continue
         runs = list(dict.fromkeys(p.run or p.file for p in group[1:]))
-        names = ", ".join([*runs[:3], "..."] if len(runs) > 3 else runs)
-        lines.append(f"{severity}: {group[0]} (the like {len(group) - 1} more times: {names}; see check.json)")
+        times = f"{len(group) - 1} more times: {listed(runs, 3)}; see check.json"
+        lines.append(f"{severity}: {group[0]} (the like {times})")
     return lines
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, refuse_impossible
-from tpjb_ident.cli.options import DEMO, named, refuse_unknown
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_value
+from tpjb_ident.cli.options import DEMO, known_names, named
 from tpjb_ident.columns import amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.rounding import percent
+from tpjb_ident.rounding import listed, percent
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
@@ -54,16 +54,15 @@ def compare(
         _compare_two(c, (campaign, other), bearing, method, norm)
         return
     c.options["pivots"] = variants = _variants(pivots)
-    model = model_settings(c, "kirk", thermal, effects)
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import counts_from_measured
     from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
-    settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     tables = read_predictions([c.file(path) for path in prediction or ()])
     source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
-    refuse_impossible(settings.effects, effects, drawing)
+    model = model_settings(c, "kirk", thermal, effects, drawing)
+    settings = CompareSettings(variants, thermal, model.effects, from_measured=counts_from_measured(effects))
     with c.results():
         job = background_job(model_side, source, drawing, settings) if coefficients is None else nullcontext()
         with job as ahead, c.progress("comparing") as show:
@@ -73,7 +72,7 @@ def compare(
                 settings = replace(settings, identify=identify_settings(c, source, method, norm))
                 result = compare_campaign(source, drawing, settings, show, ahead)
             else:
-                share = parse_share(reading_error, "--reading-error")
+                share = parse_value(reading_error, "ratio", "--reading-error") if reading_error else None
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
             following = next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
@@ -86,7 +85,7 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
     """Hold two campaigns against each other."""
     from tpjb_ident.compare.difference import difference_of, difference_sentences
 
-    with c.results() as folder:
+    with c.results():
         difference = difference_of(*(_side(c, path, bearing, method, norm) for path in paths))
         from tpjb_ident.report.difference_page import write_difference_report
 
@@ -94,7 +93,7 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
             c.table(name, frame)
         on_records = difference.b.campaign is not None
         following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
-        write_difference_report(folder, difference, named(c.options), c.inputs, following)
+        write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
     rows = []
     for row in difference.points.to_dict("records"):
         judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}
@@ -130,9 +129,7 @@ def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str |
 def _variants(text: str) -> tuple[str, ...]:
     from tpjb_ident.compare.comparison import VARIANTS
 
-    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
-    for name in names:
-        refuse_unknown(name, VARIANTS, "--pivots", several=True)
+    names = known_names(text, VARIANTS, "--pivots")
     if not names:
         raise BadInputError(f"--pivots: is empty. Use some of {', '.join(VARIANTS)}.")
     return names
@@ -192,4 +189,4 @@ def refuse_comparison(result: Comparison) -> None:
         points = [p for p in variant.points if not p.converged]
         bad += [f"{variant.name}, {amount(p.point.static_load, 'load')}" for p in points]
     if bad:
-        raise NotTrustedError(f"the model did not converge at {len(bad)} points ({'; '.join(bad[:5])}).")
+        raise NotTrustedError(f"the model did not converge at {len(bad)} points ({listed(bad, between='; ')}).")

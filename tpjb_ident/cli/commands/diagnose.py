@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_share, pivot_choice, refuse_impossible
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_value, pivot_choice
 from tpjb_ident.cli.options import DEMO, named
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError
@@ -47,15 +47,12 @@ def diagnose(
 
         load_library(c.file(library))
     start = pivots if pivots == "measured" else pivot_choice(c, pivots)
-    model = model_settings(c, "kirk", thermal, effects)
-    from tpjb_ident.compare.predictions import refuse_counted_twice
     from tpjb_ident.diagnosis.campaign import Baseline, diagnose_campaign, diagnose_table
 
-    refuse_counted_twice(start, model.effects, effects)
-    baseline = Baseline(start, thermal, model.effects)
     source, drawing = open_source(c, campaign, coefficients, bearing)
-    refuse_impossible(model.effects, effects, drawing)
-    with c.results() as folder:
+    model = model_settings(c, start, thermal, effects, drawing)
+    baseline = Baseline(start, thermal, model.effects)
+    with c.results():
         from tpjb_ident.compare.static_tests import measure_static
         from tpjb_ident.runtime.executors import background_job, cores, forks
 
@@ -65,17 +62,17 @@ def diagnose(
             if coefficients is None:
                 result = diagnose_campaign(source, drawing, baseline, settings, show, ahead)
             else:
-                error = parse_share(reading_error, "--reading-error")
+                error = parse_value(reading_error, "ratio", "--reading-error") if reading_error else None
                 result = diagnose_table(coefficients, drawing, baseline, settings, error, show)
         if result.identification is not None:
             write_identification(c, result.identification)
         verdict = result.diagnosis.verdict
-        _write_verdict(folder, baseline, verdict)
+        _write_verdict(c.folder, baseline, verdict)
         from tpjb_ident.report.diagnosis_page import next_command, write_diagnosis_report
 
         typed = str(campaign or f"--coefficients {coefficients}")
         following = next_command(typed, str(bearing or ""), verdict, str(c.target))
-        write_diagnosis_report(folder, source, result, named(c.options), c.inputs, following)
+        write_diagnosis_report(c.folder, source, result, named(c.options), c.inputs, following)
     _show_verdict(c, source.id, result, following)
     if result.identification is not None:
         refuse_untrusted(result.identification)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
-from tpjb_ident.rounding import counted
+from tpjb_ident.rounding import counted, listed
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from model.bearing import Bearing
     from tpjb_ident.exports.formats import Chosen
 
 
@@ -44,11 +41,11 @@ def export(
     from tpjb_ident.exports.write import export as write_export
 
     check_format(to)
-    frame, name = _coefficients(c, source, method, norm)
-    with c.results(f"export {to}") as folder:
-        written = write_export(frame, to, folder, force=force, name=name, ross=ross)
+    coefficients, name = _coefficients(c, source, method, norm)
+    with c.results(entry=f"export {to}"):
+        written = write_export(coefficients, to, c.folder, force=force, name=name, ross=ross)
         c.remarks = written.chosen.doubtful
-    c.print(f"{written}: {', '.join(written.files[:4])}{' ..' * (len(written.files) > 4)}")
+    c.print(f"{written}: {listed(written.files, 4)}")
     c.next("verify", c.target)
     if FORMATS[to]:
         c.note(FORMATS[to])
@@ -59,23 +56,22 @@ def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
     """End with exit code 3 if a point stayed behind, or left because that was forced."""
     parts = []
     if chosen.left_out:
-        parts.append(f"left out, because their coefficients are not finite: {'; '.join(chosen.left_out[:5])}")
+        parts.append(f"left out, because their coefficients are not finite: {listed(chosen.left_out, between='; ')}")
     if doubtful := chosen.doubtful:
         action = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
-        parts += [f"{counted(len(doubtful), 'point')}, {action}; the first of them:", *doubtful[:5]]
+        parts += [f"{counted(len(doubtful), 'point')}, {action}:", listed(doubtful, between="\n")]
     if parts:
         raise NotTrustedError("\n".join(parts))
 
 
-def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[pd.DataFrame | Bearing, str]:
-    """Table of coefficients of a results folder, or of a campaign that is identified for it, or a bearing; its name."""
+def _coefficients(c: Command, source: Path, method: str, norm: str | None) -> tuple[Any, str]:
+    """What is exported, a file of coefficients, a campaign identified for it or a bearing, and its name."""
     if source.suffix == ".toml" and source.is_file() and b"tpjb-rig/" not in source.read_bytes():
         return c.bearing(source), source.stem
     from tpjb_ident.exports.write import result_table
-    from tpjb_ident.runtime.table_reader import read_table
 
     path = result_table(source)
     if path is not None:
-        return read_table(c.file(path, refuses_changed=True)), path.parent.resolve().name
+        return c.file(path), path.parent.resolve().name
     campaign = c.open(source)
-    return identified(c, campaign, method, norm).to_frame(), campaign.id
+    return identified(c, campaign, method, norm), campaign.id

@@ -16,7 +16,7 @@ from tpjb_ident.cli.identification import (
     show_identification,
     write_identification,
 )
-from tpjb_ident.cli.inputs import parse_amount, parse_values
+from tpjb_ident.cli.inputs import parse_value, parse_values
 from tpjb_ident.cli.options import DEMO, refuse_unknown
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.executors import cores, forks
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 #: Records [bytes] above which several processes are quicker than one though each has to import everything, runs above
 #: which copies of this one are, and how many copies.
 WORTH_PROCESSES, WORTH_COPIES, MOST_COPIES = 100 * 2**20, 12, 4
+#: Length of a window [s] that holds samples at any rate.
+_SHORTEST = 1e-6
 #: Folder in the output folder in which finished runs wait for the others.
 KEPT = ".tpjb-finished-runs"
 
@@ -62,7 +64,7 @@ def identify(
     from tpjb_ident.runtime.executors import open_workers
 
     count, start = _worker_count(source, workers, scheduler)
-    with c.results() as folder:
+    with c.results():
         with (
             open_workers(count, scheduler, start) as team,
             _finished_runs(c.target) as store,
@@ -77,7 +79,7 @@ def identify(
             points = plain_points(source, plain_settings)
             c.table("plain", plain_frame(points, plain_settings))
             if keep_r:
-                write_r_matrices(folder / "r_matrices.h5", points)
+                write_r_matrices(c.folder / "r_matrices.h5", points)
         c.remarks = result.remarks()
     show_identification(c, result)
     if source.bearing_text:
@@ -127,7 +129,7 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
     for text in delays:
         quantity, _, time = text.partition("=")
         refuse_unknown(quantity, QUANTITIES, "--delay")
-        times[quantity] = parse_amount(time, "time", f"--delay {text!r}", "--delay force=0.2ms")
+        times[quantity] = parse_value(time, "time", f"--delay {quantity}")
     return PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=times)
 
 
@@ -135,7 +137,4 @@ def _plain_settings(window: str, norm: str | None) -> PlainSettings:
     """Build `PlainSettings` from ``--window`` and ``--norm``."""
     from tpjb_ident.identification.plain import PlainSettings
 
-    length = parse_amount(window, "time", f"--window {window!r}", "--window '0.5 s'")
-    if not length > 0:
-        raise BadInputError(f"--window {window!r}: must be above zero.")
-    return PlainSettings(length, norm or "huber")
+    return PlainSettings(parse_value(window, "time", "--window", _SHORTEST), norm or "huber")

@@ -34,10 +34,9 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     from tpjb_ident.compare.static_tests import measure_static
     from tpjb_ident.report.panels import position_panels
 
-    with c.results():
-        with c.progress("measuring positions"):
-            static = measure_static(source, drawing)
-            polygons, refused = _other_polygons(source, drawing, static)
+    with c.results("measuring positions"):
+        static = measure_static(source, drawing)
+        polygons, refused = _other_polygons(source, drawing, static)
         if static.clearance is None and static.locus is None:
             raise BadInputError("; ".join(condition.detail for condition in static.left_out))
         _write_tables(c, static, polygons)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
-
-if TYPE_CHECKING:
-    pass
 
 #: Conditions of the campaign rather than of one pad.
 ABOUT_ALL = ("runs-refused",)
@@ -31,15 +27,13 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
 
     source = c.open(campaign)
     drawing = c.bearing_of(source, bearing)
-    with c.results() as folder:
-        with c.progress("fitting pivot curves"):
-            curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], PivotSettings(on_refusal="few"))
+    with c.results("fitting pivot curves"):
+        curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], PivotSettings(on_refusal="few"))
         formula = printed_formula(drawing)
         c.table("pivot_curves", pivot_table(curves, formula=formula))
         c.table("pivot_pads", pads_table(curves))
-        write_pivots(folder / "pivots.toml", curves, source.id)
-        with c.progress("drawing figures"):
-            c.draw(pivot_panels(curves, formula))
+        write_pivots(c.folder / "pivots.toml", curves, source.id)
+        c.draw(pivot_panels(curves, formula))
     tested = {run.pad for run in source.of_kind("dry_pivot")}
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
     full = min((curve.valid_to for curve in curves), default=0.0)  # that all pads were tested at

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,6 @@ from tpjb_ident.cli.inputs import operating_points, pivot_choice, rotation_choic
 from tpjb_ident.cli.options import ROCKER
 from tpjb_ident.columns import Column, words
 from tpjb_ident.rounding import counted, signed
-from tpjb_ident.runtime.tables import write_text
 
 if TYPE_CHECKING:
     from model.effects.kind import Parameter
@@ -58,20 +56,19 @@ def plan(
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
     tests = planned_layout(drawing, points, (locus, dry, push, temperatures))
-    with c.results() as folder:
-        with c.progress("planning") as show:
-            show("every effect of the library", 0, 1)
-            setup = Setup(drawing, pivot_laws(pivot_choice(c, pivots), drawing))
-            result = plan_campaign(setup, tests)
-            plans = {"isolability": result}
-            if data_sets:
-                show("parts of the campaign", 1, 2)
-                plans |= _data_sets(c, setup, tests)
+    with c.results("planning") as show:
+        show("every effect of the library", 0, 1)
+        setup = Setup(drawing, pivot_laws(pivot_choice(c, pivots), drawing))
+        result = plan_campaign(setup, tests)
+        plans = {"isolability": result}
+        if data_sets:
+            show("parts of the campaign", 1, 2)
+            plans |= _data_sets(c, setup, tests)
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())
         c.draw(isolability_panels(plans))
-        write_text(folder / "plan.json", json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n")
+        c.json("plan.json", result.to_dict())
     _show(c, result)
     c.next("simulate", bearing)
 

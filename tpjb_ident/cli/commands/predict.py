@@ -13,10 +13,9 @@ from tpjb_ident.cli.inputs import (
     operating_points,
     parse_value,
     pivot_choice,
-    refuse_impossible,
     rotation_choice,
 )
-from tpjb_ident.cli.options import PHYSICS, ROCKER, refuse_unknown
+from tpjb_ident.cli.options import PHYSICS, ROCKER, known_names
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -72,15 +71,10 @@ def predict(
     combination of load, direction, speed and excitation is predicted. Writes prediction.csv and .parquet.
     """
     c.options["excitation"] = excitation or "synchronous"
-    pivot_model = pivot_choice(c, pivots)
-    settings = model_settings(c, pivot_model, thermal, effects)
-    settings = replace(settings, options=parse_physics(physics, housing_temperature))
-    from tpjb_ident.compare.predictions import refuse_counted_twice
-
-    refuse_counted_twice(pivot_model, settings.effects, effects)
     drawing = c.bearing(bearing)
+    settings = model_settings(c, pivot_choice(c, pivots), thermal, effects, drawing)
+    settings = replace(settings, options=parse_physics(physics, housing_temperature))
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
-    refuse_impossible(settings.effects, effects, drawing)
     with c.results():
         frame = _predicted(c, drawing, points, settings)
         c.table("prediction", frame)
@@ -130,9 +124,7 @@ def _rows(
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
     """Read `--physics` and `--housing-temperature`."""
-    chosen = [part.strip() for part in (names or "").split(",") if part.strip()]
-    for name in chosen:
-        refuse_unknown(name, PHYSICS, "--physics", several=True)
+    chosen = known_names(names or "", PHYSICS, "--physics")
     if housing is not None and "growth" not in chosen:
         raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
     if "jfo" in chosen and "turbulence" in chosen:

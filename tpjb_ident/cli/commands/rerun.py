@@ -13,6 +13,7 @@ from tpjb_ident.cli.command import COMMANDS, Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
 from tpjb_ident.columns import Column, words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
+from tpjb_ident.rounding import listed
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of
 
 #: Commands whose results hang on their options and inputs alone.
@@ -71,7 +72,7 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
         with c.results():
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
-        raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n" + "\n".join(different[:8]))
+        raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n{listed(different, 8, chr(10))}")
 
 
 def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:

@@ -6,15 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigdata.near_names import nearest_name
+from rigdata.near_names import hint
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.inputs import (
-    model_settings,
-    operating_points,
-    pivot_choice,
-    refuse_impossible,
-    rotation_choice,
-)
+from tpjb_ident.cli.inputs import model_settings, operating_points, pivot_choice, rotation_choice
 from tpjb_ident.cli.options import ROCKER, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
@@ -55,12 +49,11 @@ def simulate(
     those of a real rig. Effects that act on the records (probe_gain, ..) spoil the instruments.
     """
     c.options |= {"format": c.options.pop("layout"), "fault": fault or []}
-    settings = model_settings(c, pivot_choice(c, pivots), thermal, effects)
     drawing = c.bearing(bearing)
+    settings = model_settings(c, pivot_choice(c, pivots), thermal, effects, drawing)
     from rigdata.virtual_rig import Fault, Instruments, Noise, VirtualRig, write_campaign
     from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 
-    refuse_impossible(settings.effects, effects, drawing)
     sense = rotation_choice(c, rotation, drawing)
     tests = replace(_plan(plan, len(drawing.pads), load, excitation, speed), repeats=repeats).turning(sense)
     largest = max(point.static_load for point in tests.dynamic)
@@ -74,10 +67,9 @@ def simulate(
         faults=tuple(Fault(**_fault_arguments(text)) for text in fault or ()),
     )
     file = "campaign.h5" if layout == "hdf5" else "campaign"
-    with c.results() as folder:
-        with c.progress("simulating") as show:
-            truth = write_campaign(folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
-        truth.write(folder / "truth.json")
+    with c.results("simulating") as show:
+        truth = write_campaign(c.folder / file, rig, layout, progress=lambda done, total, run: show(run, done, total))
+        truth.write(c.folder / "truth.json")
     c.print(f"{name}: {len(rig.runs())} runs, seed {seed}, in {c.target / file}, the truth in truth.json beside it")
     c.next("check", c.target / file)
 
@@ -103,9 +95,8 @@ def _fault_arguments(text: str) -> dict[str, Any]:
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or key not in FAULT_KEYS:
-            near = nearest_name(key, FAULT_KEYS)
-            hint = f"Did you mean {near}=?" if near else f"Use {', '.join(f'{k}=' for k in FAULT_KEYS)}."
-            raise BadInputError(f"--fault {text!r}: {pair!r} is not understood. {hint}")
+            use = hint(key, FAULT_KEYS, "Write KEY=VALUE, with one of")
+            raise BadInputError(f"--fault {text!r}: {pair!r} is not understood. {use}")
         try:
             arguments[key] = float(value) if key in ("value", "start", "length") else value
         except ValueError:

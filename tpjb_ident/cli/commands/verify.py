@@ -9,6 +9,7 @@ from typing import Any
 from tpjb_ident.cli.command import Command, campaign_place, command, refuse_special
 from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError
+from tpjb_ident.rounding import listed
 from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of
 from tpjb_ident.runtime.provenance import sha256, versions
 
@@ -41,18 +42,14 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    changed = [f for f in files if f["state"] == "differs" or (f["role"], f["state"]) == ("result", "missing")]
+    missing = [f["file"] for f in files if (f["role"], f["state"]) == ("input", "missing")]
+    changed = [f["file"] for f in files if f["state"] != "same" and (f["role"], f["state"]) != ("input", "missing")]
     if changed:
-        differing = [f["file"] for f in changed]
-        more = f" and {len(differing) - 5} more" if len(differing) > 5 else ""
-        raise NotTrustedError(
-            f"{results}: not as it was computed: {', '.join(differing[:5])}{more}. Run the command again."
-        )
-    missing = [f["file"] for f in files if f["state"] == "missing"]
+        raise NotTrustedError(f"{results}: not as it was computed: {listed(changed)}. Run the command again.")
     if missing:
         raise BadInputError(
-            f"{results}: the results are unchanged, but {len(missing)} inputs ({missing[0]}, ..) are not where they "
-            "were. Give --input PATH of the campaign."
+            f"{results}: the results are unchanged, but {len(missing)} inputs ({listed(missing, 1)}) are not where "
+            "they were. Give --input PATH of the campaign."
         )
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.cli.inputs import parse_amount
+from tpjb_ident.cli.inputs import parse_value
 from tpjb_ident.errors import BadInputError, NotTrustedError
-from tpjb_ident.rounding import counted
+from tpjb_ident.rounding import counted, listed
 from tpjb_ident.runtime.interrupts import heard
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ def watch(
     with a repeat's (d-05000-25-03_2.csv). Says what to repeat before the load is changed, what is missing, what comes
     next; writes watch.html (loads itself again), watch.json and coefficients. Ctrl-C ends it, the same command goes on.
     """
-    pause, patience = _amount(every, "time", "--every", "2 s"), _amount(settle, "time", "--settle", "5 s")
-    width = None if within is None else _amount(within, "ratio", "--within", "3 %")
+    pause, patience = parse_value(every, "time", "--every", 0.0), parse_value(settle, "time", "--settle", 0.0)
+    width = None if within is None else parse_value(within, "ratio", "--within", 0.0)
     watcher, drawing = _open_watcher(c, folder, bearing, patience, width)
     c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
@@ -71,8 +71,7 @@ def watch(
     urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
         runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
-        names = ", ".join(runs[:8]) + (", .." if len(runs) > 8 else "")
-        raise NotTrustedError(f"{counted(len(runs), 'run')} to be repeated: {names}")
+        raise NotTrustedError(f"{counted(len(runs), 'run')} to be repeated: {listed(runs, 8)}")
 
 
 def _open_watcher(
@@ -113,9 +112,9 @@ def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refr
     from tpjb_ident.report.watch_page import write_watch_page
 
     c.inputs = dict(snapshot.hashes)
-    with c.results() as staging:
+    with c.results():
         settings = {name: str(value) for name, value in c.options.items()}
-        write_watch_page(staging, snapshot, refresh, settings, c.following, drawing)
+        write_watch_page(c.folder, snapshot, refresh, settings, c.following, drawing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
         c.json("watch.json", _state_document(snapshot))
@@ -164,11 +163,3 @@ def _show_news(c: Command, snapshot: Snapshot, printed: set[str]) -> set[str]:
         if line not in printed:
             c.print(line)
     return set(lines)
-
-
-def _amount(text: str, dimension: str, option: str, example: str) -> float:
-    """A time [s] or a share of an option, not below zero."""
-    value = parse_amount(text, dimension, f"{option} {text!r}", f"{option} {example!r}")
-    if value < 0:
-        raise BadInputError(f"{option} {text!r}: must not be below zero.")
-    return value
