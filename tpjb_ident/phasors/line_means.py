@@ -20,6 +20,8 @@ class FilmLine:
     ratio: float  #: its frequency over that of the excitation
     displacement: ComplexArray  #: (2,) complex, m
     force: ComplexArray  #: (2,) complex, N: oil force
+    displacement_noise: float  #: m^2: mean square of the residual around the line, X and Y together
+    force_noise: float  #: N^2
 
 
 @dataclass(frozen=True)
@@ -28,13 +30,11 @@ class FilmLines:
 
     force: float  #: N: size of the oil force at the excitation
     lines: dict[str, FilmLine]
-    displacement_noise: float  #: m^2: mean square of the residual around the excitation, X and Y together
-    force_noise: float  #: N^2
 
 
 def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
     """Every excitation line of a run with what the film makes of it; None where the whole record was not fitted."""
-    if not len(run.record) or len(run.residual) < len(run.lines.excitation):
+    if not len(run.record) or len(run.residual) < len(run.record):
         return tuple(None for _ in run.lines.excitation)
     displacement, force = run.plane("displacement", run.record), run.film_force(run.record)
     result = []
@@ -46,11 +46,10 @@ def film_lines(run: RunPhasors) -> tuple[FilmLines | None, ...]:
         for name, frequency in wanted.items():
             place = _alone(run, frequency, name)
             if place is not None:
-                lines[name] = FilmLine(frequency / driven.frequency, displacement[place], force[place])
-        noise = [
-            _mean_square(bins) for bins in (run.plane("displacement", run.residual[i]), run.film_force(run.residual[i]))
-        ]
-        result.append(FilmLines(float(np.linalg.norm(force[i])), lines, *noise))
+                bins = run.residual[place]
+                noise = _mean_square(run.plane("displacement", bins)), _mean_square(run.film_force(bins))
+                lines[name] = FilmLine(frequency / driven.frequency, displacement[place], force[place], *noise)
+        result.append(FilmLines(float(np.linalg.norm(force[i])), lines))
     return tuple(result)
 
 

@@ -63,7 +63,7 @@ class RunPhasors:
     device: tuple[str, ...] = ()  #: (n_channels,): clock terms exist between devices only
     #: (n_whole_lines, n_channels) complex, SI: phasors of the whole record's lines, those of the windows first
     record: ComplexArray = field(default_factory=lambda: np.empty((0, 0), complex))
-    #: by excitation line (n_bins, n_channels) complex: residual of the whole record in the bins around it
+    #: by line of the whole record, (n_bins, n_channels) complex: residual in the bins around it
     residual: tuple[ComplexArray, ...] = ()
 
     @cached_property

@@ -99,22 +99,22 @@ def fitted_whole(
 
 
 def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhasors:
-    """The run with the phasors of its whole record, and what that leaves around its excitation lines."""
+    """The run with the phasors of its whole record, and what that leaves around every line."""
     channels = len(result.channels)
     z = np.full((len(records[0].z), channels), np.nan + 0j)
     for record in records:
         z[:, record.places] = record.z
-    residual = tuple(_beside(records, i, channels) for i in range(len(result.lines.excitation)))
+    residual = tuple(_beside(records, i, channels) for i in range(len(z)))
     return replace(result, record=z, residual=residual)
 
 
-def _beside(records: tuple[WholeRecord, ...], driven: int, channels: int) -> ComplexArray:
-    """Residual (n_bins, n_channels) in the bins around an excitation line, those of other lines left out."""
+def _beside(records: tuple[WholeRecord, ...], line: int, channels: int) -> ComplexArray:
+    """Residual (n_bins, n_channels) in the bins around a line, those of other lines left out."""
     first = records[0]
     frequencies = first.lines.whole_frequencies * first.duration
     offsets = np.arange(_BESIDE[0], _BESIDE[1] + 1)
-    bins = round(frequencies[driven]) + np.concatenate([-offsets[::-1], offsets])
-    free = np.abs(bins[:, None] - np.delete(frequencies, driven)).min(axis=1, initial=np.inf) > _CLEAR_OF
+    bins = round(frequencies[line]) + np.concatenate([-offsets[::-1], offsets])
+    free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1, initial=np.inf) > _CLEAR_OF
     bins = bins[free & (bins > 0) & (bins < len(first.spectrum))]
     beside = np.full((len(bins), channels), np.nan + 0j)
     for record in records:

@@ -73,7 +73,7 @@ def _size(runs: Sequence[FilmLines], name: str, h: ComplexArray) -> tuple[float,
         if line is None or not np.isfinite(line.force).all():
             continue
         stiffness = h.real + 1j * line.ratio * h.imag
-        noise = run.force_noise + float(np.linalg.norm(stiffness, 2)) ** 2 * run.displacement_noise
+        noise = line.force_noise + float(np.linalg.norm(stiffness, 2)) ** 2 * line.displacement_noise
         excess = float(np.sum(np.abs(line.force - stiffness @ line.displacement) ** 2))
         squares.append((excess - noise) / run.force**2)
         noises.append(noise / run.force**2)

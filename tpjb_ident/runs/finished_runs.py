@@ -48,7 +48,7 @@ def digest(
 ) -> RunDigest:
     """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
     lines = len(phasors.lines.excitation)
-    excitation = replace(phasors, z=phasors.z[:, :lines].copy())
+    excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
     return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, seen)
 
 

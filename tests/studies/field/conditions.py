@@ -12,6 +12,7 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from scipy.signal import butter, lfilter
 
 from tests.rigs import closed_form as cf
 from tests.rigs.acquisition import Acquisition, Campaign, Channel, Fault
@@ -55,6 +56,7 @@ FAULTS: dict[str, Fault] = {
     "slip": lambda v, r, i: np.concatenate([v[: 4400 + 40 * i], v[4408 + 40 * i :], v[-8:]]),  # 8 samples are lost
     "every other": lambda v, r, i: v * (1.15 if i % 2 else 1.0),
     "every third": lambda v, r, i: v * (0.8 if i % 3 == 0 else 1.0),
+    "input": lambda v, r, i: lfilter(*butter(1, 1.0, "high", fs=2000.0), v - v[0]),
     "first four": lambda v, r, i: v * (7.87 / 7.78 if i < 4 else 1.0),
 }
 
@@ -138,6 +140,8 @@ def good_rigs() -> list[Condition]:
         rig("floating, cells show the pull", **{**FLOATING, "static": True}),
         rig("floating, light, no accelerometers", without="A1", **{**FLOATING, "mass": 0.4}),
         rig("soft cells", **SOFT),
+        rig("accelerometers' inputs have a corner of 1 Hz", ("A1", {"fault": FAULTS["input"]})),
+        rig("the same on soft cells", ("A1", {"fault": FAULTS["input"]}), **SOFT),
         rig("stiff cells, no accelerometers", without="A1", **STIFF),
         rig("stiff cells, an accelerometer dead", ("A1H", {"fault": FAULTS["dead"]}), **STIFF),
         rig("heavy shaft between shaker and film", shaft_mass=1400.0, directions=(0.0, 60.0, 120.0)),
@@ -208,6 +212,7 @@ def good_bands() -> list[Condition]:
         rig("random, no power from 40 to 60 Hz", notch=(40.0, 60.0), **random),
         rig("random over two thirds of the stated band", notch=(62.0, 91.0), **random),
         rig("random, floating, added mass", limits=WIDER, **{**HEAVY, **random}),
+        rig("random, soft cells, accelerometers' corner of 1 Hz", ("A1", {"fault": FAULTS["input"]}), **SOFT, **random),
         rig("random, no command", without="CMD", limits=WIDER, **random),
         rig("sweep with quiet parts", share=(0.15, 0.8), **{**BAND, "excitation": "sweep"}),
         rig("multi-sine", **tones),
