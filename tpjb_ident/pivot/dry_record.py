@@ -136,7 +136,9 @@ def before_contact(blocks: Blocks) -> BoolArray:
     more = blocks.load[None, :] - blocks.load[:, None]
     way = blocks.deflection[None, :] - blocks.deflection[:, None]
     near = (more >= 0.0) & (more < _NEAR * largest)
-    return np.asarray((near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1))
+    loose = np.asarray((near & (way > compliance * (_FREE * more + _NOTABLE_WAY * largest))).any(axis=1))
+    beside = np.convolve(loose, np.ones(3), "same") > 0  # the average in which the way ends holds some of it
+    return np.asarray(beside & (blocks.load < _NEAR * largest))
 
 
 def _push(load: FloatArray) -> FloatArray | None:
