@@ -26,6 +26,7 @@ from tpjb_ident.terms.corner import Corner
 from tpjb_ident.terms.delay import Delay
 from tpjb_ident.terms.gain import Gain
 from tpjb_ident.terms.housing import Housing
+from tpjb_ident.terms.registry import learnt_rig
 from tpjb_ident.terms.tilt import Tilt
 
 #: Degrees of freedom of a line's noise, and blocks that the terms need, at least.
@@ -63,8 +64,16 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     if np.isfinite(start).all(axis=(1, 2)).sum() < _MIN_BLOCKS:
         return None
     shape = replace(shape, scatter=replace(Scatter.none(len(blocks), len(blocks)), together=True))
-    terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
-    return RigFit(seen, rig, blocks, Solver(rig, blocks, terms, start, False, shape).run())
+
+    def solver(rig: Rig) -> Solver:
+        terms = [term(rig, blocks) for term in (Gain, Axis, Delay, Corner, Housing, Tilt)]
+        return Solver(rig, blocks, terms, start, False, shape)
+
+    solution = solver(rig).run()
+    learnt = learnt_rig(rig, solution)
+    if learnt is not rig:
+        solution = solver(learnt).begun(solution).run()
+    return RigFit(seen, learnt, blocks, solution)
 
 
 def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:

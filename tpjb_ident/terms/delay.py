@@ -14,8 +14,8 @@ from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
 
 _MILLISECOND = 1e-3
-#: Standard errors from which cells come late, and not the accelerometers early.
-_CLEAR = 2.0
+#: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
+_CLEAR, _NOTABLE = 2.0, 0.02
 _OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
 
@@ -27,6 +27,7 @@ class Delay(Factor):
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
+        self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
         deviations: dict[str, float] = {}
         for sensor in rig.sensors:
             if sensor.delay_uncertainty:
@@ -45,7 +46,7 @@ class Delay(Factor):
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
-            late = np.abs(fitted.value) > _CLEAR * fitted.deviation
+            late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
             said = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
             return tuple(condition for condition in said if condition == _OUT_OF_STEP and late.any())
         names = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
