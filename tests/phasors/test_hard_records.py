@@ -57,7 +57,7 @@ def test_channels_stand_in_order_and_make_the_vectors():
     assert [line.name for line in result.lines.faint] == ["3X", "4X", "harmonic 3", "2X-f", "2f-X"]
     assert result.record.shape == (len(result.lines.whole), 6)
     assert np.abs(result.record[0, :4] / np.array([Z[n] for n in ALL[:4]]) - 1).max() < 3e-3
-    (beside,) = result.residual
+    beside = result.residual[0]
     variance = np.mean(np.abs(beside) ** 2, axis=0)
     expected = np.array([4 * NOISE[n[0]] ** 2 / len(TIME) for n in ALL])
     assert (variance / expected).min() > 0.4
@@ -145,7 +145,7 @@ def test_cells_at_a_rate_of_their_own_are_fitted_at_their_own_times(rate, stampe
     assert error(result) < 2e-3
     # 25 Hz again and again, error of a probes' phasor: 1e-4, of the cells at 150 Hz 1e-3
     assert not {"clocks-differ", "slower-channels"} & {str(c) for c in result.conditions}
-    (beside,) = result.residual
+    beside = result.residual[0]
     variance = np.mean(np.abs(beside[:, 2:4]) ** 2, axis=0)
     assert variance == pytest.approx(4 * NOISE["F"] ** 2 / len(times), rel=0.7)
     assert np.isfinite(result.record[0]).all()

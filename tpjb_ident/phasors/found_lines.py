@@ -98,12 +98,14 @@ def vertex(three: FloatArray) -> float:
 
 #: Windows that tell a line beside the excitation from its slow change, at least.
 _LEAST = 8
-#: Distances from the excitation at which a line is looked for [1 / record length],
+#: Windows that its slow change and a line take of them,
+_TAKEN = 4
+#: distances from the excitation at which a line is looked for [1 / record length],
 _NEAREST, _FARTHEST, _STEP = 1.0, 4.5, 0.1
 #: power over that of the noise that it must explain, a channel,
 _CLEAR_POWER = 25.0
-#: and share of what is left besides it that there may be: sidebands of a drive that changes come in pairs.
-_LEFT = 0.25
+#: and share of it that may be left a window: sidebands of a drive that changes come in pairs, steps leave more.
+_LEFT = 0.004
 
 
 def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> float | None:
@@ -123,7 +125,8 @@ def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> 
     left, shift, power = _best(windows, time)
     count, channels = windows.shape
     amplitude = float(np.median(np.linalg.norm(windows, axis=1)))
-    clear = power > _CLEAR_POWER * channels and left - count * channels < _LEFT * power
+    spare = count - _TAKEN
+    clear = power > _CLEAR_POWER * channels and left - count * channels < _LEFT * spare * power
     return frequency + shift / duration if clear and power > count * (MIN_SHARE * amplitude) ** 2 else None
 
 
