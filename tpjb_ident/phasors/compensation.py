@@ -27,13 +27,15 @@ from tpjb_ident.phasors.run_data import RunPhasors
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
 #: A reading so many times farther from its neighbours' mean than all but a hundredth is a glitch.
 _GLITCH = 4.0
+#: What is so many times farther from the middle than half of the readings is a blow.
+_LOUD = 12.0
 #: Pairs of bins that tell whether their phases agree, at least; bins that a slow movement may fill.
 _LEAST_PAIRS, _SLOW = 30, 3
 #: Exponent of chance below which phases agree: those of 80 plain records came to 18, of filled ones to 40 and more.
 _CLEAR = 25.0
-#: Sums of frequencies to either side [bins], above whose usual agreement a rate stands so many times (the phases of a
-#: single blow agree at all of them), and the least agreement of a rate: what is folded back has less.
-_BESIDE, _ABOVE, _AGREEMENT = 40, 3.0, 0.35
+#: Sums of frequencies to either side [bins], above whose usual agreement a rate stands so many times (blows agree at
+#: many of them, and come to 5; filled channels to 12 and more), and the least of a rate: what is folded back has less.
+_BESIDE, _ABOVE, _AGREEMENT = 40, 6.0, 0.35
 #: Multiples of a rate that tell it more sharply.
 _MULTIPLES = 4
 #: Part of f_s in which images tell the order of filling, and how far from it they may be, relative.
@@ -93,7 +95,10 @@ def filled_channels(run: Run) -> dict[str, SlowerChannel]:
 
 
 def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | None:
-    """How a channel was filled up, told from the beginning of its readings (n,); None where it was not."""
+    """How a channel was filled up, told from the beginning of its readings (n,); None where it was not.
+
+    Phases agree at twice the rate as well, where the export reaches so far; those of blows do not.
+    """
     clean = _clean_stretch(values)
     n = len(clean)
     if n < 8 * _LEAST_PAIRS:
@@ -104,6 +109,9 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
     for k in peaks[chance[peaks] > _CLEAR].tolist():
         order = _filling_order(size, k)
         beside = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
+        again = agreement[2 * k - 2 : 2 * k + 3]
+        if len(again) == 5 and again.max() < 0.5 * agreement[k]:
+            continue
         if agreement[k] > max(_ABOVE * beside, _AGREEMENT) and order is not None:
             rate = _sharpened(agreement, chance, k) * export_rate / n
             ratio = export_rate / rate
@@ -113,8 +121,9 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
 
 
 def _clean_stretch(values: FloatArray) -> FloatArray:
-    """Longest stretch of readings (n,) without missing ones and glitches, whose phases agree everywhere."""
-    bad = ~np.isfinite(values)
+    """Longest stretch of readings (n,) without missing ones, blows and glitches, whose phases agree everywhere."""
+    middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
+    bad = ~(np.abs(values - middle) <= _LOUD * np.nanmedian(np.abs(values - middle)))
     bend = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
     usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
     bad[1:-1] |= bend > _GLITCH * usual
