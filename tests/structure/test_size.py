@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (124.83, 15_141),
+    "measurement": (124.83, 15_143),
     "model": (87.86, 11_688),
     "rigdata": (68.84, 9_234),
     "diagnosis": (38.71, 4_803),  # 38.48, look-alikes, tolerances that say an effect together

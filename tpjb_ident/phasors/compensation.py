@@ -122,8 +122,10 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
 
 def _clean_stretch(values: FloatArray) -> FloatArray:
     """Longest stretch of readings (n,) without missing ones, blows and glitches, whose phases agree everywhere."""
-    middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
-    bad = ~(np.abs(values - middle) <= _LOUD * np.nanmedian(np.abs(values - middle)))
+    if not np.isfinite(values).any():
+        return values[:0]
+    distance = np.abs(values - np.nanmedian(values))
+    bad = ~(distance <= _LOUD * np.nanmedian(distance))
     bend = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
     usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
     bad[1:-1] |= bend > _GLITCH * usual
