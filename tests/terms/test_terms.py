@@ -149,6 +149,18 @@ def test_accelerometers_that_lead_have_a_corner_or_the_cells_come_late(seed, her
         assert of(solution, "corner").value[0] == pytest.approx(corner, abs=0.3)
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("wrong", [[-1.0, -1.0], [-1.0, 1.0]])
+def test_wrong_accelerometers_stay_wrong_beside_cells_that_come_late(seed, wrong):
+    """What leads may be cells that come late; an accelerometer that is inverted is no corner."""
+    rig, blocks, truth = made(Case(hertz=(25.0, 45.0), late={"force": 5e-4}, noise=2e-4), seed)
+    z = blocks.z.copy()
+    z[:, rig.of("acceleration")] *= wrong
+    blocks = replace(blocks, z=z)
+    learnt = learnt_rig(rig, solved(rig, blocks, truth))
+    assert _WRONG in solved(learnt, blocks, truth).conditions()
+
+
 def test_a_delay_of_the_probes_is_considered_where_cells_carry_the_housing():
     case = Case(late={"displacement": 1e-4}, **stated(displacement={"delay_uncertainty": 1e-4}))
     rig, blocks, truth = made(case)

@@ -17,6 +17,8 @@ from tpjb_ident.estimate.equation import HOUSING_ROWS, State
 
 #: Largest logarithm of a factor.
 _LARGEST = 5.0
+#: Condition of accelerometers that lead the cells: the housing's test finds it, the delay tells whether it stays.
+OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, beyond
 
 _MILLISECOND = 1e-3
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
-_OUT_OF_STEP = "cells-and-accelerometers-out-of-phase"
 
 
 class Delay(Factor):
@@ -48,8 +47,8 @@ class Delay(Factor):
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
             said = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
-            return tuple(condition for condition in said if condition == _OUT_OF_STEP and late.any())
+            return tuple(condition for condition in said if condition == OUT_OF_STEP and late.any())
         names = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
         if not names:
             return ()
-        return (Condition(_OUT_OF_STEP, f"{'; '.join(self.words(fitted))}"),)
+        return (Condition(OUT_OF_STEP, f"{'; '.join(self.words(fitted))}"),)

@@ -6,7 +6,6 @@ Standing on cells, a = -omega^2 C F_cell: swapped, inverted or late acceleromete
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
 from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.term import Fitted, Parameter, Term
+from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
 _NANOMETRE = 1e-9
 #: What is plausible of the springs under a housing, one standard deviation [nm/N]: no fewer rigs stand on 5e7 N/m
@@ -107,8 +106,10 @@ class Housing(Term):
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
-        if self.rig.out_of_step:  # the delay of the cells tells whether that stays
+        if self.rig.out_of_step:  # nothing else is wrong with them; the delay of the cells tells whether that stays
             return ()
+        if self.rig.contradicted.get(self.name):
+            return self.rig.contradicted[self.name]
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if fitted.unexplained > _UNEXPLAINED and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
@@ -151,7 +152,8 @@ class Housing(Term):
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
         """Cells as uncertain in time as accelerometers lead them: a spring's loss is positive, late cells lower it.
 
-        A floating stator tells nothing of the kind: the film's damping lets a shaft that gives lag behind its stator.
+        Accelerometers with which nothing else is wrong may have led by a corner of their own. A floating stator tells
+        nothing of the kind: the film's damping lets a shaft that gives lag behind its stator.
         """
         stated = any(sensor.delay_uncertainty for sensor in sensors)
         if stated or self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
@@ -159,11 +161,12 @@ class Housing(Term):
         loss, error = float(fitted.value[3]), float(fitted.deviation[3])
         if not loss < -2 * error:
             return None
-        changes: dict[str, dict[str, Any]] = {
-            "force": {"delay_uncertainty": -loss / self._omega},
-            "acceleration": {"out_of_step": True},
-        }
-        return tuple(replace(s, **changes.get(s.quantity, {})) for s in sensors)
+        sound = all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
+        widened = []
+        for s in sensors:
+            late = -loss / self._omega if s.quantity == "force" else 0.0
+            widened.append(replace(s, delay_uncertainty=late, out_of_step=sound and s.quantity == "acceleration"))
+        return tuple(widened)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:
@@ -181,7 +184,7 @@ def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tupl
         f"{np.degrees(abs(phase)):.1f} deg, as if the {late} were {1e3 * abs(phase) / omega:.2g} ms late or behind a "
         f"filter; between the {sensors} and the housing there is none. State `delay` or `filter` of the channels"
     )
-    return (Condition("cells-and-accelerometers-out-of-phase", text),)
+    return (Condition(OUT_OF_STEP, text),)
 
 
 def _inertia_share(rig: Rig, blocks: Blocks) -> float:
