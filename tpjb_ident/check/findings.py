@@ -69,7 +69,7 @@ class Reporter:
         self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
-def _is_shared(concerned: int, alike: int) -> bool:
+def is_shared(concerned: int, alike: int) -> bool:
     """Whether a finding is one of the campaign: a third of the runs alike have it, three at least."""
     return concerned >= 3 and 3 * concerned >= alike
 
@@ -89,7 +89,7 @@ def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[P
     for group in _alike(findings):
         concerned = list(dict.fromkeys(f.problem.run for f in group if f.problem.run))
         kinds = {kind_of[r] for r in concerned}
-        if not _is_shared(len(concerned), sum(run.kind in kinds for run in runs)):
+        if not is_shared(len(concerned), sum(run.kind in kinds for run in runs)):
             merged.extend(finding.problem for finding in group)
             continue
         first = group[0].problem
@@ -121,7 +121,7 @@ def reach(reports: Sequence[Reporter]) -> None:
     dynamic = kinds.pop("dynamic", [])
     for alike in kinds.values():
         for group in _alike(f for report in alike for f in report.found if f.channels):
-            if len(group) < len(alike) and not _is_shared(len(group), len(alike)):
+            if len(group) < len(alike) and not is_shared(len(group), len(alike)):
                 continue
             for report in dynamic:
                 if set(group[0].channels) & set(report.run.channels):
@@ -141,7 +141,7 @@ def verdicts(reports: Sequence[Reporter]) -> Verdicts:
             if severity == "warning":
                 warnings = result.run_gains if key.startswith(RUN_GAIN) else result.doubtful
                 warnings.setdefault(run, []).append(problem)
-            elif severity == "error" and _is_shared(len(concerned), alike):
+            elif severity == "error" and is_shared(len(concerned), alike):
                 result.shared.setdefault(run, []).append(problem)
             elif severity == "error":
                 result.unusable.setdefault(run, problem)

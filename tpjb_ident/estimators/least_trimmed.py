@@ -101,7 +101,7 @@ def robust_start(regression: Regression, direction: IntArray, seed: int) -> Init
     repeats = len(direction) / len(np.unique(direction))
     half, exact = _concentrated(regression, seeds, 0.5, repeats)
     if exact:
-        return InitialFit(regression.fit(half), np.zeros((regression.q), dtype=complex), True)
+        return InitialFit(regression.fit(half), np.zeros((regression.q, regression.q), dtype=complex), True)
     majority = InitialFit(*_reweighted(regression, half, 0.5))
     few, exact = _concentrated(regression, seeds, _SMALL_CORE, repeats)
     if exact:

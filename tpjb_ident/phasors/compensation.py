@@ -27,8 +27,6 @@ from tpjb_ident.phasors.run_data import RunPhasors
 _LOOK, _LEAST_POWER, _MOST_POWER = 2.0, 13, 15
 #: A reading so many times farther from its neighbours' mean than all but a hundredth is a glitch.
 _GLITCH = 4.0
-#: What is so many times farther from the middle than half of the readings is a blow.
-_LOUD = 12.0
 #: Pairs of bins that tell whether their phases agree, at least; bins that a slow movement may fill.
 _LEAST_PAIRS, _SLOW = 30, 3
 #: Exponent of chance below which phases agree: those of 80 plain records came to 18, of filled ones to 40 and more.
@@ -110,9 +108,8 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
         order = _filling_order(size, k)
         beside = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
         again = agreement[2 * k - 2 : 2 * k + 3]
-        if len(again) == 5 and again.max() < 0.5 * agreement[k]:
-            continue
-        if agreement[k] > max(_ABOVE * beside, _AGREEMENT) and order is not None:
+        is_repeated = len(again) < 5 or again.max() >= 0.5 * agreement[k]
+        if agreement[k] > max(_ABOVE * beside, _AGREEMENT) and is_repeated and order is not None:
             rate = _sharpened(agreement, chance, k) * export_rate / n
             ratio = export_rate / rate
             even = abs(ratio - round(ratio)) < _EVEN * ratio
@@ -121,11 +118,8 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
 
 
 def _clean_stretch(values: FloatArray) -> FloatArray:
-    """Longest stretch of readings (n,) without missing ones, blows and glitches, whose phases agree everywhere."""
-    if not np.isfinite(values).any():
-        return values[:0]
-    distance = np.abs(values - np.nanmedian(values))
-    bad = ~(distance <= _LOUD * np.nanmedian(distance))
+    """Longest stretch of readings (n,) without missing ones and glitches, whose phases agree everywhere."""
+    bad = ~np.isfinite(values)
     bend = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
     usual = np.quantile(bend[np.isfinite(bend)], 0.99) if np.isfinite(bend).any() else 0.0
     bad[1:-1] |= bend > _GLITCH * usual

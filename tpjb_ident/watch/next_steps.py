@@ -12,7 +12,7 @@ import numpy as np
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from tpjb_ident.check.findings import Finding
+from tpjb_ident.check.findings import Finding, is_shared
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import SEVERITIES
@@ -22,8 +22,6 @@ from tpjb_ident.rounding import counted, listed
 State = Literal["to run", "being written", "good", "look", "repeat", "replaced"]
 #: Warnings of the check that only another record repairs: what was lost cannot be calibrated back.
 _LOST_SAMPLES = ("clipped", "dead", "empty", "missing", "stuck", "gap", "jitter", "short", "no excitation", "step")
-#: A finding in so many runs at least, and in this share of those of their kinds, is not the runs' fault.
-_COMMON_RUNS, _COMMON_SHARE = 3, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
         affected = {finding.problem.run for finding, _ in group}
         kinds = {kind for _, kind in group}
         comparable = sum(observation.run.kind in kinds for observation in observations)
-        if len(affected) >= _COMMON_RUNS and len(affected) >= _COMMON_SHARE * comparable:
+        if is_shared(len(affected), comparable):
             common.append([finding for finding, _ in group])
     return common
 
