@@ -25,6 +25,8 @@ def test_accelerations_over_displacements_tell_the_mount(mount, seed):
     assert found_mount(rig.sensors, blocks, None, 1.0) == mount
     other = {"cells": "floating", "floating": "cells"}[mount]
     assert found_mount(rig.sensors, blocks, other, 1.0) == other
+    rig, blocks, _ = made(replace(CASE, mount=mount, shaft_gives=1.5e-9, gains={"A1": 0.1}), seed)
+    assert found_mount(rig.sensors, blocks, None, 0j) == mount
 
 
 @pytest.mark.parametrize(("ratio", "mount"), [(1.0, "cells"), (-0.9, "cells"), (0.01, "unknown"), (3.0, "unknown")])

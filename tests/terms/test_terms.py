@@ -351,6 +351,36 @@ def test_a_floating_stator_s_accelerometers_are_held_against_the_probes(late, sh
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("gives", [0.0, 1.5e-9])
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({}, ""),
+        ({"gains": {"D1": 0.1}}, "0.9"),
+        ({"gains": {"D1": 0.1, "D2": 0.1}}, "0.9"),
+        ({"turned": {"D1": 0.3, "D2": 0.3}}, "turned by 17 deg"),
+        ({"input_corner": 2.0}, ""),
+    ],
+    ids=["right", "one probe 10 % off", "both", "turned", "accelerometers' corner"],
+)
+def test_a_floating_stator_tells_wrong_probes_from_a_shaft_that_gives(changes, says, gives, seed):
+    """The shaft yields to the film's force, whose damping no gain and no axis has."""
+    case = Case(mount="floating", hertz=(25.0, 45.0), noise=2e-4, shaft_gives=gives, **changes)
+    rig, blocks, truth = made(case, seed)
+    learnt = learnt_rig(rig, solved(rig, blocks, truth))
+    solution = solved(learnt, blocks, truth)
+    details = [condition.detail for condition in solution.conditions() if condition == _WRONG]
+    if says:
+        assert len(details) == 1
+        assert says in details[0]
+        return
+    assert not solution.conditions()
+    assert held(solution, truth)
+    if not changes:
+        assert of(solution, "housing").value[4:6] == pytest.approx(1e9 * gives, abs=0.2)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_shaft_that_tilts_between_two_planes_of_probes_does_no_harm(seed):
     planes = {"D1": 0.03, "D2": 0.03, "D3": -0.03}
     case = Case(probes=3, **stated(**{name: {"plane": plane} for name, plane in planes.items()}))

@@ -7,10 +7,11 @@ free in every block::
     cell j            (  n_j^T h     , -m n_j^T   )       F_cell = F_oil - m a, Eq. (13); h with the bare rig's
     accelerometer j   (  0           ,  n_j^T     )
     housing, cells    (  w^2 C h     ,  I - w^2 m C )     a + w^2 C F_cell = 0: it stands on its cells
-    housing, floating ( -kappa w^2 I ,  I         )       a = w^2 d: it hangs, and the shaft stands still
+    housing, floating (-w^2 (kappa + C h), I      )       a = w^2 d: it hangs, and the shaft gives way by C
 
-With C = [c_xx c_xy; c_xy c_yy] (1 - i loss) the compliance of the cells. Where no accelerometer tells and the manifest
-does not say, kappa is not known: 0 of a housing that stands still, 1 of one that floats.
+With C the compliance of the cells, [c_xx c_xy; c_xy c_yy] (1 - i loss), or of the shaft under a floating housing, whose
+kappa is one but for wrong sensors. Where no accelerometer tells and the manifest does not say, kappa is not known: 0 of
+a housing that stands still, 1 of one that floats.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class State:
     h: ComplexArray  #: (P, 2, 2), N/m: at the set points
     slope: ComplexArray  #: (P, 2, 2), N/m: dH / d ln W
     slope_known: np.ndarray  #: (P,) bool
-    compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing
-    floating: complex  #: kappa
+    compliance: ComplexArray  #: (2, 2), m/N: of the cells under the housing, or of a floating one's shaft
+    floating: ComplexArray  #: (2, 2): kappa
     factor: ComplexArray  #: (n, m): T
     shift: ComplexArray  #: (n, m + 2): s, what does not go with the motion
     u: ComplexArray  #: (n, 4): true motion
@@ -77,7 +78,7 @@ def motion_matrix(rig: Rig, blocks: Blocks, state: State) -> ComplexArray:
         B[:, m:, :2] = square * (state.compliance @ h)
         B[:, m:, 2:] = np.eye(2) - square * rig.mass * state.compliance
     else:
-        B[:, m:, :2] = -state.floating * square * np.eye(2)
+        B[:, m:, :2] = -square * (state.floating + state.compliance @ h)
         B[:, m:, 2:] = np.eye(2)
     B[:, :m][~blocks.present] = 0.0
     return B
@@ -129,7 +130,7 @@ def entry_sizes(h: ComplexArray) -> ComplexArray:
 def film_force_rows(rig: Rig, blocks: Blocks, state: State, force: ComplexArray) -> ComplexArray:
     """Forces of the film (n, 2, ..) as the cells read them and the housing answers, (n, m + 2, ..)."""
     rows = with_factor(state.factor, force_rows(rig, blocks, force))
-    if rig.mount == "cells":
-        square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
-        rows[:, blocks.z.shape[1] :] = square * np.einsum("ij,nj...->ni...", state.compliance, force)
+    square = (blocks.omega**2).reshape((-1,) + (1,) * (force.ndim - 1))
+    sign = 1.0 if rig.mount == "cells" else -1.0
+    rows[:, blocks.z.shape[1] :] = sign * square * np.einsum("ij,nj...->ni...", state.compliance, force)
     return rows

@@ -11,8 +11,10 @@ from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, vector
 
-#: Distance of a / (w^2 d) from one, on both axes, within which the housing floats.
+#: Distance of a / (w^2 d) from what it is of a floating housing, on both axes, within which the housing floats.
 _FLOATS = 0.3
+#: Motion of a floating housing's shaft over that of the housing, at most.
+_SHAFT = 0.4
 #: Cells over set points between which the cells carry the static load.
 _CARRIED = (0.5, 2.0)
 #: A sensor whose phasors are below this share of its quantity's is dead.
@@ -80,8 +82,9 @@ def campaign_rig(
 def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:
     """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
 
-    Without accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the
-    housing stands on them. Cells of a floating stator show none; then it is "unknown".
+    That is -c h of a housing on springs, 1 + g h of one that floats, c and g the compliance of what gives way. Without
+    accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the housing
+    stands on them. Cells of a floating stator show none; then it is "unknown".
     """
     if stated:
         return stated
@@ -90,10 +93,17 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, r
     if len(rig.of("acceleration")) < 2:
         return carried
     a = vector(rig, blocks, "acceleration")
-    d = vector(rig, blocks, "displacement") * (blocks.omega**2)[:, None]
-    told = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1)
-    if not told.any():
+    d = vector(rig, blocks, "displacement")
+    force = vector(rig, blocks, "force")
+    known = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1) & np.isfinite(force).all(axis=1)
+    if not known.any():
         return carried
-    power = np.sum(np.abs(d[told]) ** 2, axis=0)
-    quotient = np.sum(d[told].conj() * a[told], axis=0) / np.maximum(power, 1e-300)
-    return "floating" if np.abs(quotient - 1).max() < _FLOATS else "cells"
+    square = (blocks.omega[known] ** 2)[:, None]
+    d, force, a = square * d[known], square * force[known], a[known]
+    power = np.maximum(np.sum(np.abs(d) ** 2, axis=0), 1e-300)
+    quotient, h = np.sum(d.conj() * a, axis=0) / power, np.sum(d.conj() * force, axis=0) / power
+    size = np.maximum(np.abs(h), 1e-300)
+    springs = np.maximum(-(quotient * h.conj()).real / size**2, 0.0)
+    shaft = np.clip(((quotient - 1) * h.conj()).real / size**2, 0.0, _SHAFT / size)
+    standing, floating = np.abs(quotient + springs * h), np.abs(quotient - 1 - shaft * h)
+    return "floating" if floating.max() < _FLOATS and floating.sum() < standing.sum() else "cells"

@@ -201,7 +201,7 @@ class Solver:
             slope,
             known,
             np.zeros((2, 2), complex),
-            1.0 if self.rig.mount == "floating" else 0.0,
+            np.eye(2, dtype=complex) * (self.rig.mount == "floating"),
             np.ones((n, m), complex),
             np.zeros((n, m + HOUSING_ROWS), complex),
             self.u[places],

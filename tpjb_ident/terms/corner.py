@@ -2,17 +2,20 @@
 
 Data sheets put it at some tenths of a hertz up to a few (charge amplifiers 0.001 to 1 Hz, inputs coupled by a capacitor
 0.5 to 3.4 Hz). Cells that show no static force have one: K times their lead goes into C. Accelerometers are asked for
-theirs where they lead what the springs make of the cells' force; over frequencies it falls, as no delay does.
+theirs where they lead what the springs make of the cells' force; over frequencies it falls, as no delay does. Cells
+never lag by a corner: where they seem to, the accelerometers lead.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.estimate.blocks import Blocks, Rig
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
 from tpjb_ident.estimate.equation import State
-from tpjb_ident.estimate.term import Factor, Parameter
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter
 
 
 class Corner(Factor):
@@ -41,3 +44,9 @@ class Corner(Factor):
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """The high pass itself: its gain falls by half the square of the lead."""
         state.factor /= 1 - self.exponent(blocks) @ value
+
+    def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
+        """Accelerometers asked for theirs where the cells' is negative."""
+        if self.rig.out_of_step or not self.parameters or not fitted.value[0] < -fitted.deviation[0]:
+            return None
+        return tuple(replace(s, out_of_step=s.quantity == "acceleration") for s in sensors)

@@ -1,6 +1,8 @@
 """What the housing stands on: the compliance of its cells and their loss, or whether it floats.
 
 Standing on cells, a = -omega^2 C F_cell: swapped, inverted or late accelerometers break it, whatever the bearing does.
+Floating, a = omega^2 (kappa d + C F_oil): the shaft gives way to the film's force, and kappa is not one where probes or
+accelerometers have another gain, axis or delay than is stated. A shaft's lag grows with the film's damping.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, film_force, vector
 from tpjb_ident.estimate.equation import State
 from tpjb_ident.estimate.term import OUT_OF_STEP, Fitted, Parameter, Term
 
@@ -25,10 +27,11 @@ _CELLS = (2.0, 5.0, 0.3)
 _STIFF = 3.3
 #: Nothing is known of a housing that neither manifest nor accelerometer tells of: it stands still, or it floats.
 _UNKNOWN = 1.0
-#: Motion of a floating stator's shaft over that of the stator, and lag of the accelerometers [rad], one deviation.
-_SHAFT = 0.1
-#: Difference of the two from which one of them is wrong.
-_OTHERWISE = 0.5
+#: Motion of a floating stator's shaft over that of the stator, and what accelerometers may differ from probes there
+#: before anything is known of them, one deviation; where nothing but their phase is wrong, gains and pitch alone.
+_SHAFT, _PITCH = 0.1, 0.03
+#: The difference from which one of them is wrong; from which it is no work of a delay or a corner.
+_OTHERWISE, _GROSS = 0.05, 0.2
 #: A sign is beyond doubt from so many standard errors on.
 _CLEAR = 5.0
 #: Loss of a cell's mount, at most: bolted joints have 0.01. What goes beyond it is a delay.
@@ -44,7 +47,7 @@ HARMLESS = 2e-3
 
 
 class Housing(Term):
-    """Compliance [nm/N] and loss of the cells; kappa where it is not known whether the housing floats."""
+    """Compliance [nm/N] and loss of the cells; of a floating stator kappa, its lag and the shaft's compliance."""
 
     name = "housing"
 
@@ -67,32 +70,44 @@ class Housing(Term):
         elif rig.mount == "unknown":
             self.parameters = (Parameter("inertia not measured", "1", _UNKNOWN),)
         elif len(rig.of("acceleration")) > 1:
-            self.parameters = (Parameter("motion of the shaft", "1", _SHAFT), Parameter("lag", "rad", _SHAFT))
+            lag = Parameter("lag", "rad", _LOSS / 2 if rig.out_of_step else _SHAFT)
+            differs = _PITCH if rig.out_of_step else _SHAFT
+            entries = [Parameter(f"kappa_{name}", "1", differs) for name in ("xx", "xy", "yx", "yy")]
+            shaft = [Parameter(f"c_{name}", "nm/N", _shaft_compliance(rig, blocks)) for name in ("xx", "yy")]
+            self.parameters = (*entries, *shaft, lag)
 
     def apply(self, blocks: Blocks, state: State, value: FloatArray) -> None:
         """Compliance or kappa of the state."""
         if self.rig.mount == "cells":
             state.compliance = _compliance(value)
         elif self.rig.mount == "unknown":
-            state.floating = complex(value[0])
+            state.floating = value[0] * np.eye(2, dtype=complex)
         else:
-            state.floating = complex(1 + value[0], -value[1])
+            state.floating, state.compliance = _kappa(value)
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
         square = (blocks.omega**2)[:, None]
         if self.rig.mount == "cells":
             return np.asarray(-square * vector(self.rig, blocks, "force") @ _compliance(fitted.value))
-        follows = complex(1 + fitted.value[0], -fitted.value[1])
-        return np.asarray(follows * square * vector(self.rig, blocks, "displacement"))
+        kappa, compliance = _kappa(fitted.value)
+        moved = vector(self.rig, blocks, "displacement") @ kappa.T
+        return np.asarray(square * (moved + film_force(self.rig, blocks) @ compliance))
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """In the housing's own rows."""
         columns = self.no_columns(blocks)
         m, square = blocks.z.shape[1], blocks.omega**2
         if self.rig.mount != "cells":
-            columns[:, m:, 0] = -square[:, None] * state.u[:, :2]
-            columns[:, m:, 1:] = -1j * columns[:, m:, :1]
+            moved = -square[:, None] * state.u[:, :2]
+            if self.rig.mount == "unknown":
+                columns[:, m:, 0] = moved
+                return columns
+            columns[:, m, :2], columns[:, m + 1, 2:4] = moved, moved
+            given = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
+            given = -square[:, None] * _NANOMETRE * given
+            columns[:, m, 4], columns[:, m + 1, 5] = given[:, 0], given[:, 1]
+            columns[:, m:, 6] = -1j * moved
             return columns
         force = state.cell_force(self.rig, blocks)
         loss = complex(1 - 1j * state.parameters[self.name][3])
@@ -106,8 +121,9 @@ class Housing(Term):
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
-        if self.rig.out_of_step:  # nothing else is wrong with them; the delay of the cells tells whether that stays
-            return ()
+        if self.rig.out_of_step:  # nothing else is wrong with them; the delay tells whether that stays
+            text = "" if self.rig.mount == "cells" else _otherwise(fitted, _OTHERWISE)
+            return (Condition("accelerometers-contradict-cells", text),) if text else ()
         if self.rig.contradicted.get(self.name):
             return self.rig.contradicted[self.name]
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
@@ -115,11 +131,15 @@ class Housing(Term):
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
             text = f"{min(100 * fitted.unexplained, 100):.0f} % of the housing's motion is not what {moves}; {share}"
             return (Condition("accelerometers-contradict-cells", text),)
-        if self.rig.mount != "cells" and abs(fitted.value[0]) > _OTHERWISE:
-            text = f"they show {1 + fitted.value[0]:.2g} times the motion that the probes show; {share}"
-            return (Condition("accelerometers-contradict-cells", text),)
-        if self.rig.mount != "cells":
-            return _out_of_step(fitted.value[1], fitted.deviation[1], "probes", self._omega)
+        if self.rig.mount == "cells":
+            return self._standing(fitted, share)
+        lag, text = fitted.value[-1], _otherwise(fitted, _OTHERWISE)
+        if text and np.linalg.norm(fitted.value[:4]) > abs(lag):
+            return (Condition("accelerometers-contradict-cells", f"{text}; {share}"),)
+        return _out_of_step(lag, fitted.deviation[-1], "probes", self._omega)
+
+    def _standing(self, fitted: Fitted, share: str) -> tuple[Condition, ...]:
+        """Of accelerometers on a housing on springs; `share`: words for the inertia."""
         (xx, yy, xy, loss), error = fitted.value, fitted.deviation
         faults = []
         if min(xx + _CLEAR * error[0], yy + _CLEAR * error[1]) < 0:
@@ -150,21 +170,24 @@ class Housing(Term):
         return x, y
 
     def widened(self, sensors: tuple[Sensor, ...], fitted: Fitted) -> tuple[Sensor, ...] | None:
-        """Cells as uncertain in time as accelerometers lead them: a spring's loss is positive, late cells lower it.
+        """Cells, or probes of a floating stator, as uncertain in time as accelerometers lead them.
 
-        Accelerometers with which nothing else is wrong may have led by a corner of their own. A floating stator tells
-        nothing of the kind: the film's damping lets a shaft that gives lag behind its stator.
+        A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
+        by a corner of their own.
         """
         stated = any(sensor.delay_uncertainty for sensor in sensors)
-        if stated or self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+        if stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return None
-        loss, error = float(fitted.value[3]), float(fitted.deviation[3])
-        if not loss < -2 * error:
+        lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
+        if not lag < -2 * error:
             return None
-        sound = all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
+        if self.rig.mount == "cells":
+            compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
+        else:
+            compared, sound = "displacement", fitted.unexplained < _UNEXPLAINED and not _otherwise(fitted, _GROSS)
         widened = []
         for s in sensors:
-            late = -loss / self._omega if s.quantity == "force" else 0.0
+            late = -lag / self._omega if s.quantity == compared else 0.0
             widened.append(replace(s, delay_uncertainty=late, out_of_step=sound and s.quantity == "acceleration"))
         return tuple(widened)
 
@@ -173,6 +196,35 @@ def _compliance(value: FloatArray) -> ComplexArray:
     """Of the cells, (2, 2) [m/N]."""
     xx, yy, xy, loss = (float(v) for v in value)
     return np.asarray(_NANOMETRE * np.array([[xx, xy], [xy, yy]]) * (1 - 1j * loss), complex)
+
+
+def _kappa(value: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Kappa (2, 2) of a floating stator, and the compliance of its shaft (2, 2) [m/N]."""
+    kappa = np.eye(2) * (1 - 1j * value[6]) + value[:4].reshape(2, 2)
+    return kappa, np.asarray(_NANOMETRE * np.diag(value[4:6]), complex)
+
+
+def _shaft_compliance(rig: Rig, blocks: Blocks) -> float:
+    """What lets the shaft of a floating stator move by its usual share, by the film's force per motion [nm/N]."""
+    motion = np.linalg.norm(vector(rig, blocks, "displacement"), axis=1)
+    force = np.linalg.norm(film_force(rig, blocks), axis=1)
+    usable = (motion > 0) & (force > 0)
+    return _SHAFT * float(np.median(motion[usable] / force[usable])) / _NANOMETRE if usable.any() else 1.0
+
+
+def _otherwise(fitted: Fitted, least: float) -> str:
+    """How accelerometers of a floating stator differ from its probes, if by more than `least` and chance."""
+    kappa, error = fitted.value[:4].reshape(2, 2), float(fitted.deviation[:4].max())
+    limit = least + 3 * error
+    turn = (kappa[1, 0] - kappa[0, 1]) / 2
+    if abs(turn) > limit:
+        return f"they are turned by {np.degrees(np.arctan2(turn, 1 + np.trace(kappa) / 2)):.0f} deg against the probes"
+    stretch, axes = np.linalg.eigh((kappa + kappa.T) / 2)
+    k = int(np.abs(stretch).argmax())
+    if abs(stretch[k]) <= limit:
+        return ""
+    along = np.degrees(np.arctan2(axes[1, k], axes[0, k])) % 180
+    return f"they show {1 + stretch[k]:.2f} times the motion along {along:.0f} deg that the probes show"
 
 
 def _out_of_step(phase: float, error: float, sensors: str, omega: float) -> tuple[Condition, ...]:
