@@ -57,7 +57,7 @@ def _curves(value: Any, name: str) -> Any:
 
 
 def _comparison(value: Any, name: str) -> Any:
-    if not hasattr(value, "variants"):
+    if not hasattr(value, "predictions"):
         raise ArgumentError(f"{name}: must be what compare_campaign gives, got {type(value).__name__}.")
     return value
 

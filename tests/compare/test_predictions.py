@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from model.bearing_file import load_bearing
@@ -106,20 +107,21 @@ def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
     assert off.clearance == pytest.approx([80e-6, 83e-6, 80e-6, 80e-6, 80e-6])
 
 
+@pytest.mark.parametrize(("loads", "beyond"), [((4e3, 4e3), False), ((4e3, 12e3), True)])
+def test_a_prediction_says_where_a_pivot_is_pressed_harder_than_in_its_dry_test(loads, beyond):
+    laws = (SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0))
+    prediction = SimpleNamespace(setup=SimpleNamespace(pivots=laws), pad_load=np.array(loads))
+    assert PointPrediction(None, prediction, 0).extrapolated == beyond
+
+
 def test_the_summary_says_where_pivots_are_pressed_harder_than_in_their_dry_tests():
     curves = [SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0)]
-    laws = (SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0))
-
-    def pressed(*loads):
-        setup = SimpleNamespace(pivots=laws)
-        return PointPrediction(None, SimpleNamespace(setup=setup, pad_load=np.array(loads)), 0)
-
-    variants = [
-        SimpleNamespace(name="rigid", points=(pressed(9e3, 9e3),)),
-        SimpleNamespace(name="measured", points=(pressed(4e3, 4e3), pressed(4e3, 12e3))),
-    ]
-    (sentence,) = _extrapolation_sentence(SimpleNamespace(variants=variants, curves=curves))
+    measured = pd.DataFrame(
+        {"pad1_load_N": [4e3, 4e3], "pad2_load_N": [4e3, 12e3], "pivot_extrapolated": [False, True]}
+    )
+    predictions = {"rigid": measured.assign(pad1_load_N=9e3), "measured": measured}
+    (sentence,) = _extrapolation_sentence(SimpleNamespace(predictions=predictions, curves=curves))
     assert sentence.startswith("At 1 of 2 points the measured pivots are extrapolated")
     assert "12 kN, the dry tests went to 4.8 kN" in sentence
-    inside = SimpleNamespace(variants=[SimpleNamespace(name="measured", points=variants[1].points[:1])], curves=curves)
+    inside = SimpleNamespace(predictions={"measured": measured.iloc[:1]}, curves=curves)
     assert _extrapolation_sentence(inside) == []

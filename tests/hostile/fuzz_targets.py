@@ -268,7 +268,7 @@ def _coefficient_tables() -> tuple[bytes, ...]:
 
 def table_target(folder: Path) -> Target:
     """A table of coefficients that comes back: what is taken is finite, possible and within its intervals."""
-    from tpjb_ident.compare.coefficient_table import read_coefficients
+    from tpjb_ident.compare.coefficient_table import ERRORS, VALUES, read_coefficients
     from tpjb_ident.errors import BadInputError
     from tpjb_ident.exports.formats import COLUMNS, ExportError, chosen_rows
     from tpjb_ident.runtime.table_reader import read_table
@@ -279,10 +279,12 @@ def table_target(folder: Path) -> Target:
         path.write_bytes(data)
         frame = read_table(path)
         with contextlib.suppress(BadInputError):
-            for row in read_coefficients(path, 0.05):
-                assert 0 < row.point.static_load < math.inf
-                assert 0 < row.point.shaft_speed < math.inf
-                assert all(math.isfinite(v) and 0 <= e < math.inf for v, e in row.coefficients.values())
+            rows = read_coefficients(path, 0.05)
+            assert rows[["static_load_N", "shaft_speed_Hz"]].gt(0.0).all(axis=None)
+            values, errors = rows[VALUES].to_numpy(), rows[ERRORS].to_numpy()
+            present = ~np.isnan(values)
+            assert np.isfinite(rows[["static_load_N", "shaft_speed_Hz"]]).all(axis=None)
+            assert (np.isfinite(values) & np.isfinite(errors) & (errors >= 0.0))[present].all()
         points = chosen_rows(frame).table
         assert (points["excitation_Hz"] >= 0).all()
         for name in COLUMNS.values():

@@ -28,6 +28,7 @@ from tests.good_campaigns import BEARINGS, directions
 from tpjb_ident.compare.predictions import ModelSettings
 from tpjb_ident.compare.rig_from_model import rig_truth
 from tpjb_ident.diagnosis.comparison.settings import DiagnoseSettings
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 pytestmark = pytest.mark.slow
 MIRROR = np.diag([-1.0, 1.0])
@@ -178,12 +179,17 @@ def rewritten(campaign, target, attribute, change):
     return target
 
 
+def rigid(comparison):
+    """K and C with rigid pivots at every point."""
+    return comparison.predictions["rigid"][list(COEFFICIENT_COLUMNS)].to_numpy().reshape(-1, 2, 2, 2)
+
+
 def test_each_sense_of_one_campaign_has_its_own_leading_edge(both, compared):
     truth = rig_truth(parse_bearing(STATED, "b.toml"), ModelSettings("rigid", "isothermal"))
-    for measured, predicted in zip(compared.identification.points, compared.variant("rigid").points, strict=True):
+    for measured, (k, c) in zip(compared.identification.points, rigid(compared), strict=True):
         h = truth.stiffness(measured.point)
         size = np.abs(h).max()
-        np.testing.assert_allclose(predicted.k + 1j * measured.point.excitation * predicted.c, h, atol=1e-9 * size)
+        np.testing.assert_allclose(k + 1j * measured.point.excitation * c, h, atol=1e-9 * size)
         np.testing.assert_allclose(measured.stiffness.h, h, atol=0.01 * size)
     kxx = {p.point.key: p.stiffness.h[0, 0].real for p in compared.identification.points}
     assert len(kxx) == 4
@@ -191,8 +197,8 @@ def test_each_sense_of_one_campaign_has_its_own_leading_edge(both, compared):
         assert rotation == "clockwise" or k > 5.0 * kxx[(*point, "clockwise")]
     places = {rotation: compared.locus.to_frame().query("rotation == @rotation") for rotation in ROTATIONS}
     assert [len(frame) for frame in places.values()] == [4, 4]
-    measured, predicted = compared.locus.to_frame(), [p.prediction.position for p in compared.variant("rigid").locus]
-    np.testing.assert_allclose(predicted, measured[["x_m", "y_m"]], atol=5e-7)
+    predicted, measured = (compared.loci[[f"x_m{end}", f"y_m{end}"]].to_numpy() for end in ("_predicted", ""))
+    np.testing.assert_allclose(predicted, measured, atol=5e-7)
 
 
 def test_identify_marks_the_points_that_turn_clockwise(both, tmp_path):
@@ -207,14 +213,14 @@ def test_the_mirror_image_of_both_senses(both, compared, tmp_path):
     image = rewritten(both, tmp_path / "copy.h5", "manifest", str)
     mirrored = comparison_of(mirror_campaign(image, tmp_path / "mirrored.h5"))
     image_of = {p.point.key: (p, q) for p, q in zip(
-        mirrored.identification.points, mirrored.variant("rigid").points, strict=True)}  # fmt: skip
-    for p, q in zip(compared.identification.points, compared.variant("rigid").points, strict=True):
+        mirrored.identification.points, rigid(mirrored), strict=True)}  # fmt: skip
+    for p, (k, c) in zip(compared.identification.points, rigid(compared), strict=True):
         *point, rotation = p.point.key
         measured, predicted = image_of[(*point, ROTATIONS[rotation == ROTATIONS[0]])]
         size = np.abs(p.stiffness.h).max()
         np.testing.assert_allclose(MIRROR @ measured.stiffness.h @ MIRROR, p.stiffness.h, atol=1e-9 * size)
-        np.testing.assert_allclose(MIRROR @ predicted.k @ MIRROR, q.k, atol=1e-9 * size)
-        np.testing.assert_allclose(MIRROR @ predicted.c @ MIRROR, q.c, atol=1e-9 * size / p.point.excitation)
+        np.testing.assert_allclose(MIRROR @ predicted[0] @ MIRROR, k, atol=1e-9 * size)
+        np.testing.assert_allclose(MIRROR @ predicted[1] @ MIRROR, c, atol=1e-9 * size / p.point.excitation)
 
 
 def test_runs_that_all_state_the_sense_are_the_shaft_that_states_it(campaign_of, tmp_path):

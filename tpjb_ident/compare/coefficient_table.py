@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigdata.arrays import FloatArray, IntArray
+from rigdata.arrays import IntArray
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.runtime.table_reader import read_table
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
 
 HZ = 2.0 * math.pi
+VALUES = list(COEFFICIENT_COLUMNS)
+ERRORS = [f"{name}_se" for name in VALUES]
 _NEEDED = ("static_load_N", "shaft_speed_Hz")
 #: A column that looks like a coefficient: misspelt, it would be silently left out.
 _COEFFICIENT = re.compile(r"[A-Za-z]{1,5}_[A-Za-z_]*per_(?:m|in)(_se|_lo|_hi|)")
+#: Cells of columns that are not there.
+_DEFAULTS = {"rotation": ROTATIONS[0], "converged": True, "quality": "", "status": ""}
+#: Half of a 95 % interval in standard errors.
+_HALF = 1.96
 
 
 @dataclass(frozen=True)
@@ -38,83 +43,61 @@ class TableSource:
         return {}
 
 
-@dataclass(frozen=True)
-class TableRow:
-    """Coefficients of one operating point, each with its standard error; NaN where nothing states it."""
-
-    line: int
-    point: OperatingPoint
-    values: FloatArray = field(repr=False)  #: (8,) kxx .. kyy [N/m], cxx .. cyy [N s/m]
-    errors: FloatArray = field(repr=False)  #: (8,)
-    position: tuple[float, float] = (math.nan, math.nan)  #: [m]
-    converged: bool = True
-    status: tuple[str, ...] = ()
-    extrapolated: bool = False
-
-    @property
-    def coefficients(self) -> dict[str, tuple[float, float]]:
-        """Value and standard error of what the row holds, ``"kxx"`` .. ``"cyy"``."""
-        pairs = zip(COEFFICIENT_COLUMNS, self.values, self.errors, strict=True)
-        return {column[:3]: (float(value), float(error)) for column, value, error in pairs if not math.isnan(value)}
+def read_coefficients(path: Path, reading_error: float | None = None) -> pd.DataFrame:
+    """Rows of a table of coefficients that says how far each holds; see `read_rows`."""
+    rows = read_rows(path)
+    values, errors = rows[VALUES].to_numpy(), rows[ERRORS].to_numpy()
+    if reading_error is not None:
+        errors = np.where(np.isfinite(errors), errors, reading_error * np.abs(values))
+    for row, column in np.argwhere(~np.isnan(values) & ~np.isfinite(errors)):
+        name = VALUES[column]
+        raise BadInputError(
+            f"{path.name}, line {rows['line'][row]}, {name}: nothing says how far it holds. "
+            f"Add {name}_se, _lo and _hi, or --reading-error."
+        )
+    rows[ERRORS] = errors
+    return rows
 
 
-def read_coefficients(path: Path, reading_error: float | None = None) -> tuple[TableRow, ...]:
-    """Read a table of coefficients that says how far each holds."""
-    rows = []
-    for row in read_rows(path):
-        errors = row.errors
-        if reading_error is not None:
-            errors = np.where(np.isfinite(errors), errors, reading_error * np.abs(row.values))
-        for column in np.array(COEFFICIENT_COLUMNS)[~np.isnan(row.values) & ~np.isfinite(errors)]:
-            raise BadInputError(
-                f"{path.name}, line {row.line}, {column}: nothing says how far it holds. "
-                f"Add {column}_se, _lo and _hi, or --reading-error."
-            )
-        rows.append(replace(row, errors=errors))
-    return tuple(rows)
+def read_rows(path: Path) -> pd.DataFrame:
+    """Read a table of coefficients, measured or predicted; rows that hold none are left out.
 
-
-def read_rows(path: Path) -> tuple[TableRow, ...]:
-    """Read a table of coefficients, measured or predicted; rows that hold none are left out."""
-    rows: list[TableRow] = []
-    places: set[OperatingPoint] = set()
-    frame = read_table(path, _NEEDED, _COEFFICIENT)
-    for line, cells in zip(frame.attrs["lines"], frame.to_dict("records"), strict=True):
-        row = _row(cells, line, f"{path.name}, line {line}")
-        if np.isnan(row.values).all():
-            continue
-        if row.point in places:
-            raise BadInputError(f"{path.name}, line {line}: a second row for the same point. Keep one of them.")
-        places.add(row.point)
-        rows.append(row)
-    if not rows:
+    Columns as in ``prediction.csv``, beside them ``line`` and the standard errors; NaN where nothing states a number.
+    """
+    table = read_table(path, _NEEDED, _COEFFICIENT)
+    ends = [name + end for name in VALUES for end in ("_lo", "_hi")]
+    absent: dict[str, Any] = {name: value for name, value in _DEFAULTS.items() if name not in table}
+    columns = [*POINT_KEY, *VALUES, *ERRORS, *ends, "x_m", "y_m", "converged", "quality", "status"]
+    rows = table.assign(**absent).reindex(columns=columns).assign(line=table.attrs["lines"])
+    for line in rows["line"][~(rows[list(_NEEDED)] > 0.0).all(axis=1)]:
+        raise BadInputError(f"{path.name}, line {line}: static_load_N and shaft_speed_Hz must be positive numbers.")
+    assumed = rows["excitation_Hz"].isna().map({True: "excitation-not-stated", False: ""})
+    rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
+    rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
+    low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
+    stated = (high - low) / (2 * _HALF)  # our own tables have both: the interval holds calibration too
+    rows[ERRORS] = np.where(np.isnan(stated), rows[ERRORS], stated)
+    flags = rows["quality"].where(rows["quality"] != "", rows["status"]) + "; " + assumed
+    rows["status"] = flags.map(_flags)
+    rows["converged"] = rows["converged"].ne(False)
+    rows = rows.drop(columns=ends).dropna(subset=VALUES, how="all").reset_index(drop=True)
+    for line in rows["line"][rows.duplicated(list(POINT_KEY))]:
+        raise BadInputError(f"{path.name}, line {line}: a second row for the same point. Keep one of them.")
+    if rows.empty:
         raise BadInputError(f"{path.name}: holds no coefficient. Name columns as in coefficients.csv: kxx_N_per_m, ...")
-    return tuple(rows)
+    return rows
 
 
-def _row(cells: Mapping[Any, Any], line: int, place: str) -> TableRow:
-    load, speed = cells["static_load_N"], HZ * cells["shaft_speed_Hz"]
-    if not (load > 0.0 and speed > 0.0):
-        raise BadInputError(f"{place}: static_load_N and shaft_speed_Hz must be positive numbers.")
-    direction, excitation = cells.get("static_load_direction_deg", math.nan), cells.get("excitation_Hz", math.nan)
-    point = OperatingPoint(
-        load,
-        math.radians(-90.0 if math.isnan(direction) else direction),
-        speed,
-        speed if math.isnan(excitation) else HZ * excitation,
-        cells.get("rotation", ROTATIONS[0]),
-    )
-    values, errors, low, high = (
-        np.array([cells.get(column + end, math.nan) for column in COEFFICIENT_COLUMNS])
-        for end in ("", "_se", "_lo", "_hi")
-    )
-    stated = (high - low) / (2 * 1.96)  # our own tables have both: the interval holds calibration too
-    errors = np.where(np.isnan(stated), errors, stated)
-    text = cells.get("quality") or cells.get("status") or ""
-    status = tuple(name for name in str(text).split("; ") if name not in ("", "ok", "nan"))
-    status += ("excitation-not-stated",) if math.isnan(excitation) else ()
-    position = (cells.get("x_m", math.nan), cells.get("y_m", math.nan))
-    return TableRow(line, point, values, errors, position, cells.get("converged") is not False, status)
+def _flags(text: str) -> str:
+    return "; ".join(name for name in text.split("; ") if name not in ("", "ok", "nan"))
+
+
+def points_of(rows: pd.DataFrame) -> list[OperatingPoint]:
+    """Operating points of the rows of a table."""
+    points = []
+    for load, direction, speed, excitation, rotation in rows[list(POINT_KEY)].itertuples(index=False, name=None):
+        points.append(OperatingPoint(load, math.radians(direction), HZ * speed, HZ * excitation, rotation))
+    return points
 
 
 def partners(rows: pd.DataFrame, others: pd.DataFrame, within: tuple[float, float, float]) -> IntArray:

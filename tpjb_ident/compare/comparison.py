@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import functools
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ from model.effects import Effect
 from rigdata.arrays import FloatArray
 from rigdata.campaign import Campaign
 from rigdata.operating_point import OperatingPoint
-from tpjb_ident.compare.coefficient_table import TableRow, TableSource
+from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     PointPrediction,
@@ -23,14 +22,13 @@ from tpjb_ident.compare.predictions import (
     beside_measured,
     counted_twice,
     measured_laws,
-    point_columns,
     predict_points,
+    prediction_frame,
 )
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
-from tpjb_ident.results.identification import Identification, coefficient_columns
-from tpjb_ident.results.point_result import PointResult
-from tpjb_ident.schema import COEFFICIENT_COLUMNS
+from tpjb_ident.results.identification import Identification
+from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,6 +40,8 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
+#: Of every pivot model, by operating point.
+Predictions = dict[str, dict[OperatingPoint, PointPrediction]]
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
 _DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
@@ -94,15 +94,6 @@ class CompareSettings:
         return beside_measured(self.effects) if counts_twice else self.effects
 
 
-@dataclass(frozen=True)
-class Variant:
-    """Predictions with one pivot model, or another program's, under the name of its table."""
-
-    name: str
-    points: tuple[PointPrediction | TableRow, ...] = field(repr=False)
-    locus: tuple[PointPrediction, ...] = field(repr=False, default=())
-
-
 @dataclass(frozen=True, repr=False)
 class Comparison(Presented):
     """Everything measured and predicted for one campaign.
@@ -119,7 +110,10 @@ class Comparison(Presented):
         Empty without dry tests.
     clearance : ClearancePolygon or None
     locus : Locus or None
-    variants : tuple of Variant
+    predictions : mapping of str to DataFrame
+        By pivot model or other program: a row as in ``prediction.csv`` for every measured point.
+    loci : DataFrame or None
+        ``locus_comparison.csv``: shaft centres, measured and predicted with every pivot model.
     remarks : tuple of str
         What the campaign lacks, and what was left out for it.
 
@@ -137,7 +131,8 @@ class Comparison(Presented):
     curves: tuple[PivotCurve, ...]
     clearance: ClearancePolygon | None
     locus: Locus | None
-    variants: tuple[Variant, ...]
+    predictions: Mapping[str, pd.DataFrame] = field(repr=False)
+    loci: pd.DataFrame | None = field(repr=False)
     remarks: tuple[str, ...] = ()
 
     @property
@@ -145,26 +140,10 @@ class Comparison(Presented):
         """Whether the measured side was identified from records."""
         return not isinstance(self.campaign, TableSource)
 
-    def variant(self, name: str) -> Variant:
-        """The predictions with one pivot model.
-
-        Parameters
-        ----------
-        name : str
-            Of the pivot model.
-        """
-        return next(v for v in self.variants if v.name == name)
-
     @functools.cached_property
     def table(self) -> pd.DataFrame:
         """``comparison.csv``."""
-        import pandas as pd
-
-        rows = []
-        for variant in self.variants:
-            pairs = zip(self.identification.points, variant.points, strict=True)
-            rows += [_row(variant, measured, predicted) for measured, predicted in pairs]
-        return pd.DataFrame(rows)
+        return joined(self.identification.to_frame(), self.predictions)
 
     def to_dataframe(self) -> pd.DataFrame:
         """``comparison.csv``."""
@@ -189,8 +168,27 @@ class Comparison(Presented):
         return plots.coefficient(self, **{"name": "kxx", **options})
 
     def __str__(self) -> str:
-        names = ", ".join(v.name for v in self.variants)
+        names = ", ".join(self.predictions)
         return f"Comparison of {self.campaign.id}: {len(self.identification.points)} points with {names} pivots"
+
+
+def joined(measured: pd.DataFrame, predictions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Rows of ``comparison.csv``: every prediction beside what was measured, both with a row for every point."""
+    import pandas as pd
+
+    sizes = [len(frame) for frame in predictions.values()]
+    predicted = pd.concat(list(predictions.values()), ignore_index=True)
+    measured = pd.concat([measured] * len(sizes), ignore_index=True)
+    columns: dict[str, Any] = {"pivots": np.repeat(list(predictions), sizes)}
+    columns |= {name: measured[name] for name in (*POINT_KEY, "static_load_measured_N")}
+    for name in COEFFICIENT_COLUMNS:
+        value, low, high = (measured[name + end] for end in ("", "_lo", "_hi"))
+        columns |= {name: value, f"{name}_lo": low, f"{name}_hi": high, f"{name}_predicted": predicted[name]}
+        columns[f"{name}_difference"] = predicted[name] - value
+        columns[f"{name}_ratio"] = (predicted[name] / value).where(low * high > 0)
+    columns |= {f"{name}_predicted": predicted[name] for name in ("x_m", "y_m")}
+    columns |= {name: predicted[name] for name in ("converged", "pivot_extrapolated")}
+    return pd.DataFrame({**columns, "quality": measured["quality"], "status": predicted["status"]})
 
 
 def compare_campaign(
@@ -198,7 +196,7 @@ def compare_campaign(
     bearing: Bearing,
     settings: CompareSettings | None = None,
     progress: Progress | None = None,
-    model: Callable[[], ModelSide | None] | None = None,
+    model: Callable[[], tuple[StaticTests, Predictions] | None] | None = None,
 ) -> Comparison:
     """Identify a campaign, measure its pivots, locus and clearance, and predict the same with every pivot model.
 
@@ -222,7 +220,7 @@ def compare_campaign(
     Examples
     --------
     >>> comparison = ti.compare_campaign(demo, rocker, ti.CompareSettings(variants=("rigid",), thermal="isothermal"))
-    >>> len(comparison.identification.points), [variant.name for variant in comparison.variants]
+    >>> len(comparison.identification.points), list(comparison.predictions)
     (7, ['rigid'])
     """
     from tpjb_ident.identification.identify import identify
@@ -230,86 +228,84 @@ def compare_campaign(
 
     settings = settings or CompareSettings()
     _check(campaign, settings)
-    report = progress or (lambda text, done, total: None)
+    report = progress or _silent
     least = min(pad.assembled_clearance for pad in bearing.pads)
     chosen = settings.identify or IdentifySettings()
     chosen = replace(chosen, clearance=chosen.clearance or least)
     identification = identify(campaign, chosen, _labelled(report, "identifying"))
-    points = tuple(p.point for p in identification.points)
+    points = [p.point for p in identification.points]
     report("waiting for the model", 0, 1)
-    side = None if model is None else model()
-    if side is None or not all(set(points) <= predicted.keys() for predicted in side.predicted.values()):
-        side = model_side(campaign, bearing, settings, points, report)
-    return _joined(campaign, bearing, settings, identification, side)
-
-
-@dataclass(frozen=True)
-class ModelSide:
-    """Static tests, and predictions with every pivot model: what of a comparison needs no identification."""
-
-    static: StaticTests
-    remarks: tuple[str, ...]
-    predicted: dict[str, dict[OperatingPoint, PointPrediction]]
+    ahead = None if model is None else model()
+    if ahead is None or not all(predicted.keys() >= set(points) for predicted in ahead[1].values()):
+        ahead = model_side(campaign, bearing, settings, points, report)
+    static, predictions = ahead
+    frames = {name: predicted_frame(predicted[p] for p in points) for name, predicted in predictions.items()}
+    return Comparison(
+        campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, frames,
+        _loci(static, predictions), _remarks(settings, static, bearing),
+    )  # fmt: skip
 
 
 def model_side(
     campaign: Campaign,
     bearing: Bearing,
     settings: CompareSettings,
-    points: tuple[OperatingPoint, ...] | None = None,
+    points: Sequence[OperatingPoint] | None = None,
     progress: Progress | None = None,
-) -> ModelSide:
-    """Measure the static tests and predict points (default: all that the manifest names) and locus."""
+) -> tuple[StaticTests, Predictions]:
+    """What of a comparison needs no identification: static tests, and predictions of points and of their locus.
+
+    Points are by default all that the manifest names.
+    """
     from tpjb_ident.compare.static_tests import measure_static
 
-    report = progress or (lambda text, done, total: None)
-    points = tuple(sorted({run.point for run in campaign.of_kind("dynamic")})) if points is None else points
+    report = progress or _silent
+    points = sorted({run.point for run in campaign.of_kind("dynamic")}) if points is None else points
     report("fitting pivot curves, clearance and locus", 0, 1)
     static = measure_static(campaign, bearing, "measured" in settings.variants)
-    names, remarks = possible_variants(settings.variants, static.curves, bearing)
-    stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
-    wanted = tuple(dict.fromkeys(points + stations))
-    predicted = {}
+    names, _ = possible_variants(settings.variants, static.curves, bearing)
+    wanted = list(dict.fromkeys([*points, *_stations(static)]))
+    predictions = {}
     for name in names:
         pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
         model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
-        predictions = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
-        predicted[name] = {p.point: p for p in predictions}
-    return ModelSide(static, tuple(remarks), predicted)
+        predicted = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
+        predictions[name] = {p.point: p for p in predicted}
+    return static, predictions
+
+
+def predicted_frame(predictions: Iterable[PointPrediction]) -> pd.DataFrame:
+    """Rows of ``prediction.csv`` with whether a pivot was pressed harder than in its dry test."""
+    listed = list(predictions)
+    return prediction_frame(listed).assign(pivot_extrapolated=[p.extrapolated for p in listed])
+
+
+def _stations(static: StaticTests) -> list[OperatingPoint]:
+    return [] if static.locus is None else [p.point for p in static.locus.points]
 
 
 def possible_variants(
     variants: tuple[str, ...], curves: tuple[PivotCurve, ...], bearing: Bearing
 ) -> tuple[list[str], list[str]]:
     """Pivot models that a campaign and a bearing allow, and remarks about the others."""
-    names, remarks = list(variants), []
+    refused = {}
     missing = sorted(set(range(1, len(bearing.pads) + 1)) - {c.pad for c in curves})
-    if "measured" in names and missing:
-        names.remove("measured")
+    if missing:
         pads = ", ".join(f"#{n}" for n in missing)
-        remarks.append(f"Measured pivots are left out: no dry test of pad {pads}.")
+        refused["measured"] = f"Measured pivots are left out: no dry test of pad {pads}."
     if bearing.pivot.kind == "rigid":
-        printed = [name for name in names if name.startswith("kirk")]
-        names = [name for name in names if name not in printed]
-        if printed:
-            remarks.append("The bearing file says rigid pivots: there is no printed formula to compare.")
-    return names or ["rigid"], remarks
+        formula = "The bearing file says rigid pivots: there is no printed formula to compare."
+        refused |= {"kirk": formula, "kirk-secant": formula}
+    names = [name for name in variants if name not in refused]
+    return names or ["rigid"], list(dict.fromkeys(refused[name] for name in variants if name in refused))
 
 
-def _joined(
-    campaign: Campaign, bearing: Bearing, settings: CompareSettings, identification: Identification, side: ModelSide
-) -> Comparison:
-    """Set what was identified beside the model's side."""
-    static = side.static
-    points = tuple(p.point for p in identification.points)
-    stations = () if static.locus is None else tuple(p.point for p in static.locus.points)
-    variants = tuple(
-        Variant(name, tuple(predicted[p] for p in points), tuple(predicted[p] for p in stations))
-        for name, predicted in side.predicted.items()
-    )
-    remarks = [*side.remarks, *(condition.sentence() for condition in static.left_out)]
+def _remarks(settings: CompareSettings, static: StaticTests, bearing: Bearing) -> tuple[str, ...]:
+    """What the campaign lacks, and what was left out for it."""
+    names, remarks = possible_variants(settings.variants, static.curves, bearing)
+    remarks += [condition.sentence() for condition in static.left_out]
     twice = counted_twice(settings.effects)
-    if "measured" in side.predicted and twice and not settings.from_measured:
+    if "measured" in names and twice and not settings.from_measured:
         remarks.append(
             f"Measured pivots are predicted without {' and '.join(twice)}: their dry tests hold that already, and it "
             "would count twice."
@@ -318,10 +314,7 @@ def _joined(
         remarks.append("No clearance run: positions cannot be given from the bearing centre.")
     if static.locus is None:
         remarks.append("No locus runs: the shaft centre locus is not compared.")
-    return Comparison(
-        campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, variants,
-        tuple(remarks),
-    )  # fmt: skip
+    return tuple(remarks)
 
 
 def _check(campaign: Campaign, settings: CompareSettings) -> None:
@@ -332,76 +325,48 @@ def _check(campaign: Campaign, settings: CompareSettings) -> None:
         raise ComparisonError(f"campaign {campaign.id} has no dynamic runs; there is nothing to compare")
 
 
+def _silent(text: str, done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
 def _labelled(progress: Progress, label: str) -> Progress:
     return lambda text, done, total: progress(f"{label}, {text}", done, total)
 
 
-def measured_locus(comparison: Comparison) -> FloatArray:
-    """Measured positions (n, 2) [m], from the bearing centre if the campaign has a clearance run."""
-    if comparison.locus is None:
-        return np.zeros((0, 2))
-    return np.array([p.position for p in comparison.locus.points]).reshape(-1, 2)
-
-
-def predicted_locus(comparison: Comparison, variant: Variant) -> FloatArray:
-    """Predicted positions (n, 2) [m] in the order and about the origin of the measured ones.
+def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
+    """Measured and predicted position per load direction and pivot model; None without locus runs.
 
     Without a clearance run the probes' zero stands anywhere: then the prediction is shifted by the mean difference,
-    and only the shape of the two can be compared. NaN for a table of another program: it has no locus.
+    and only the shape of the two can be compared.
     """
-    if not variant.locus:
-        return np.full_like(measured_locus(comparison), np.nan)
-    places = np.array([p.prediction.position for p in variant.locus]).reshape(-1, 2)
-    if comparison.clearance is None and len(places):
-        places = places + np.nanmean(measured_locus(comparison) - places, axis=0)
-    return places
-
-
-def locus_distance(comparison: Comparison, variant: Variant) -> float:
-    """Root mean square distance between the two loci [m]; NaN without locus runs."""
-    off = predicted_locus(comparison, variant) - measured_locus(comparison)
-    distance = np.hypot(off[:, 0], off[:, 1])
-    distance = distance[np.isfinite(distance)]
-    return float(np.sqrt(np.mean(distance**2))) if len(distance) else math.nan
-
-
-def locus_frame(comparison: Comparison) -> pd.DataFrame:
-    """Build locus_comparison.csv: measured and predicted position per load direction and pivot model."""
     import pandas as pd
 
-    if comparison.locus is None:
-        return pd.DataFrame(columns=["pivots", "static_load_direction_deg", "x_m", "y_m"])
+    if static.locus is None:
+        return None
     frames = []
-    for variant in comparison.variants:
-        if not variant.locus:
-            continue
-        frame = comparison.locus.to_frame()
-        places = predicted_locus(comparison, variant)
-        frame.insert(0, "pivots", variant.name)
-        frame["x_m_predicted"], frame["y_m_predicted"] = places[:, 0], places[:, 1]
-        frames.append(frame)
+    for name, predicted in predictions.items():
+        frame = static.locus.to_frame()
+        places = np.array([predicted[point].prediction.position for point in _stations(static)])
+        if static.clearance is None:
+            places += (frame[["x_m", "y_m"]] - places).mean().to_numpy()
+        frame.insert(0, "pivots", name)
+        frames.append(frame.assign(x_m_predicted=places[:, 0], y_m_predicted=places[:, 1]))
     return pd.concat(frames, ignore_index=True)
 
 
-DIRECT = tuple(name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy"))
+def predicted_loci(loci: pd.DataFrame | None) -> dict[str, FloatArray]:
+    """Predicted positions (n, 2) [m] by pivot model."""
+    if loci is None:
+        return {}
+    models = loci.groupby("pivots", sort=False)[["x_m_predicted", "y_m_predicted"]]
+    return {str(name): rows.to_numpy() for name, rows in models}
 
 
-def _row(variant: Variant, measured: PointResult, predicted: PointPrediction | TableRow) -> dict[str, Any]:
-    row: dict[str, Any] = {"pivots": variant.name, **point_columns(measured.point)}
-    row["static_load_measured_N"] = measured.static_load_measured
-    values = coefficient_columns(measured.stiffness)
-    for name, model in zip(COEFFICIENT_COLUMNS, predicted.values, strict=True):
-        low, high = values[f"{name}_lo"], values[f"{name}_hi"]
-        row[name], row[f"{name}_lo"], row[f"{name}_hi"] = values[name], low, high
-        row[f"{name}_predicted"] = model
-        row[f"{name}_difference"] = model - values[name]
-        row[f"{name}_ratio"] = model / values[name] if low * high > 0 else np.nan
-    row.update(
-        x_m_predicted=predicted.position[0],
-        y_m_predicted=predicted.position[1],
-        converged=predicted.converged,
-        pivot_extrapolated=predicted.extrapolated,
-        quality="; ".join(str(c) for c in measured.quality) or "ok",
-        status="; ".join(predicted.status),
-    )
-    return row
+def locus_distances(loci: pd.DataFrame | None) -> dict[str, float]:
+    """Root mean square distance between measured and predicted locus by pivot model [m]; empty without locus runs."""
+    distances = {}
+    for name, places in predicted_loci(loci).items():
+        assert loci is not None
+        off = places - loci.loc[loci["pivots"] == name, ["x_m", "y_m"]].to_numpy()
+        distances[name] = float(np.sqrt(np.nanmean((off**2).sum(axis=1))))
+    return distances

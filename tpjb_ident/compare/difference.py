@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -38,7 +38,10 @@ _NO_CHANGE = 0.03
 _PIVOT_LOADS = 5
 #: Errors of instruments, which outlast an overhaul; what scatters with the runs or the films does not.
 _OF_INSTRUMENTS = ("calibration", "axis", "delay", "mass", "temperature")
+_CLEARANCE = "clearance_m"
 _LEVEL = 0.95
+#: Half of a 95 % interval in standard errors.
+_HALF = 1.96
 #: Columns of a value and its interval.
 _ENDS = ("", "_lo", "_hi")
 #: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
@@ -62,13 +65,9 @@ def measured_side(campaign: Campaign, identification: Identification, static: St
     """A side from records."""
     from tpjb_ident.pivot.tables import pivot_table
 
-    names, changes = identification.calibration_names, identification.calibration_changes
-    size = np.sqrt(max(len(changes), 1))
-    sensors = {
-        name: (row / size).reshape(-1, 8)
-        for name, row in zip(names, changes, strict=False)
-        if name.partition(":")[0] in _OF_INSTRUMENTS
-    }
+    changes = identification.calibration_changes / np.sqrt(max(len(identification.calibration_changes), 1))
+    named = dict(zip(identification.calibration_names, changes.reshape(len(changes), -1, 8), strict=False))
+    sensors = {name: moved for name, moved in named.items() if name.partition(":")[0] in _OF_INSTRUMENTS}
     pivots = clearance = None
     if static is not None and static.curves:
         pivots = pivot_table(static.curves)
@@ -81,12 +80,10 @@ def measured_side(campaign: Campaign, identification: Identification, static: St
 
 def recorded_side(folder: Path) -> Side:
     """A side from a folder of results, in which nothing says how single sensors move the points."""
-    tables = {name: folder / f"{name}.csv" for name in ("coefficients", "pivot_curves", "clearance")}
-    frames = {
-        name: read_table(path, ("pad",)) for name, path in tables.items() if name != "coefficients" and path.exists()
-    }
-    coefficients = read_table(tables["coefficients"], (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
-    return Side(folder.name, coefficients, frames.get("pivot_curves"), frames.get("clearance"))
+    coefficients = read_table(folder / "coefficients.csv", (*POINT_COLUMNS, *COEFFICIENT_COLUMNS))
+    paths = [folder / f"{name}.csv" for name in ("pivot_curves", "clearance")]
+    pivots, clearance = (read_table(path, ("pad",)) if path.exists() else None for path in paths)
+    return Side(folder.name, coefficients, pivots, clearance)
 
 
 @dataclass(frozen=True)
@@ -119,31 +116,13 @@ class Difference:
         return untrusted
 
 
-class _Values(NamedTuple):
-    """A quantity of one side at several places (n,): value and interval, and what makes it uncertain."""
-
-    value: FloatArray
-    low: FloatArray
-    high: FloatArray
-    random: FloatArray  #: variance
-    systematic: FloatArray | float = 0.0  #: variance from calibration
-    freedom: FloatArray | float = np.inf  #: degrees of freedom of the random part
-
-
 def difference_of(a: Side, b: Side) -> Difference:
     """Hold two sides against each other, B less A."""
     partner = partners(a.coefficients, b.coefficients, _SAME_POINT)
     pairs = np.column_stack([np.flatnonzero(partner >= 0), partner[partner >= 0]])
     shared = tuple(name for name in a.sensors if name in b.sensors and _same_instrument(name, a, b))
-    return Difference(
-        a,
-        b,
-        _points(a, b, pairs, shared),
-        _pivots(a, b),
-        _clearance(a, b),
-        shared,
-        (*_alone(a, pairs[:, 0]), *_alone(b, pairs[:, 1])),
-    )
+    unmatched = (*_alone(a, pairs[:, 0]), *_alone(b, pairs[:, 1]))
+    return Difference(a, b, _points(a, b, pairs, shared), _pivots(a, b), _clearance(a, b), shared, unmatched)
 
 
 def _same_instrument(name: str, a: Side, b: Side) -> bool:
@@ -157,13 +136,13 @@ def _same_instrument(name: str, a: Side, b: Side) -> bool:
     return before == after and a.campaign.housing_mass == b.campaign.housing_mass
 
 
-def _alone(side: Side, used: IntArray) -> tuple[str, ...]:
+def _alone(side: Side, used: IntArray) -> list[str]:
     rest = side.coefficients.drop(index=side.coefficients.index[used])
-    return tuple(
+    return [
         f"{side.name}: {amount(row['static_load_N'], 'load')} at {row['static_load_direction_deg']:g}°, "
         f"shaft at {spinning(row['shaft_speed_Hz'])}, {row['excitation_Hz']:g} Hz"
         for row in rest.to_dict("records")
-    )
+    ]
 
 
 def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.DataFrame:
@@ -173,40 +152,37 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
     for name in ("static_load_measured_N", "quality"):
         if name in left and name in right:
             columns |= {f"{name}_a": left[name], f"{name}_b": right[name]}
-    flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (left, right)]
-    usable = [not errors_in(f"{a}; {b}") for a, b in zip(*flags, strict=True)]
-    per_omega = [1 / (2 * np.pi * frame["excitation_Hz"].to_numpy(float)) for frame in (left, right)]
+    common = np.zeros((len(pairs), 8))
+    for parameter in shared:
+        common += a.sensors[parameter][pairs[:, 0]] * b.sensors[parameter][pairs[:, 1]]
+    omega_squared = (2 * np.pi) ** 2 * (left["excitation_Hz"] * right["excitation_Hz"]).to_numpy(float)
+    common[:, 4:] /= omega_squared[:, None]
     for j, name in enumerate(COEFFICIENT_COLUMNS):
-        scale = 1.0 if j < 4 else per_omega[0] * per_omega[1]
-        common = np.zeros(len(pairs))
-        for parameter in shared:
-            common += a.sensors[parameter][pairs[:, 0], j] * b.sensors[parameter][pairs[:, 1], j] * scale
-        direct = left[[KINDS[name[0]].column(entry) for entry in ("xx", "yy")]].abs().mean(axis=1).to_numpy()
-        sides = [_coefficient(frame, name) for frame in (left, right)]
-        judged = _judged(name, sides, common, _NO_CHANGE * direct, 8 * len(pairs))
-        judged[f"{name[:3]}_changed"] = np.where(usable, judged[f"{name[:3]}_changed"], "cannot tell")
-        columns |= judged
+        none = _NO_CHANGE * _mean_direct(left, name).to_numpy()
+        columns |= _judged(name, (left, right), common[:, j], none, 8 * len(pairs))
+    flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (left, right)]
+    usable = [not errors_in(f"{before}; {after}") for before, after in zip(*flags, strict=True)]
+    for name in columns:
+        if name.endswith("_changed"):
+            columns[name] = np.where(usable, columns[name], "cannot tell")
     return pd.DataFrame(columns)
 
 
-def _coefficient(frame: pd.DataFrame, name: str) -> _Values:
-    value, low, high = (frame[name + end].to_numpy(float) for end in _ENDS)
-    if f"{name}_se_systematic" not in frame:  # of another program: its interval is all that is known
-        return _Values(value, low, high, _variance(low, high))
+def _variances(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray | float, FloatArray | float]:
+    """Random and systematic variance of a quantity, and degrees of freedom of the random one."""
+    if f"{name}_se_systematic" not in frame:  # its interval is all that is known
+        return ((frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float) / (2 * _HALF)) ** 2, 0.0, np.inf
     error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
-    with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
-        quantile = frame[f"{name}_random95"].to_numpy(float) / error
-    table = stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL)
-    freedom = np.interp(-np.nan_to_num(quantile, nan=1.96), -table, _FREEDOM)
-    return _Values(value, low, high, error**2, systematic**2, freedom)
-
-
-def _variance(low: FloatArray, high: FloatArray) -> FloatArray:
-    return ((high - low) / (2 * 1.96)) ** 2
+    freedom: FloatArray | float = np.inf
+    if f"{name}_random95" in frame:
+        with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
+            quantile = np.nan_to_num(frame[f"{name}_random95"].to_numpy(float) / error, nan=_HALF)
+        freedom = np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
+    return error**2, systematic**2, freedom
 
 
 def _judged(
-    name: str, sides: Sequence[_Values], common: FloatArray | float, none: FloatArray, number: int
+    name: str, frames: Sequence[pd.DataFrame], common: FloatArray | float, none: FloatArray, number: int
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
@@ -214,22 +190,25 @@ def _judged(
     `number` differences that are looked at together one in twenty is beyond its own interval by chance; "yes" holds for
     all of them at once (Bonferroni).
     """
-    systematic = sum(side.systematic for side in sides) - 2 * common
-    variance = np.asarray(sum(side.random for side in sides) + np.maximum(systematic, 0.0))
+    (random_a, systematic_a, freedom_a), (random_b, systematic_b, freedom_b) = (_variances(f, name) for f in frames)
+    variance = random_a + random_b + np.maximum(systematic_a + systematic_b - 2 * common, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
-        freedom = variance**2 / sum(side.random**2 / side.freedom for side in sides)
+        freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
     freedom = np.clip(np.nan_to_num(freedom, nan=_FREEDOM[-1]), 1.0, _FREEDOM[-1])
-    difference = sides[1].value - sides[0].value
-    deviation = np.sqrt(variance)
-    half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * deviation
-    sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * deviation
-    verdict = np.where(np.abs(difference) + half <= none, "no", "cannot tell")
-    verdict = np.where(np.abs(difference) > sure, "yes", verdict)
+    half = stdtrit(freedom, 0.5 + 0.5 * _LEVEL) * np.sqrt(variance)
+    sure = stdtrit(freedom, 1 - 0.5 * (1 - _LEVEL) / max(number, 1)) * np.sqrt(variance)
     columns: dict[str, Any] = {}
-    shown = (sides[0][:3], sides[1][:3], (difference, difference - half, difference + half))
-    for side, ends in zip(("a", "b", "difference"), shown, strict=True):
-        columns |= zip((f"{name}_{side}{end}" for end in _ENDS), ends, strict=True)
-    return columns | {f"{name.partition('_')[0]}_changed": verdict}
+    for side, frame in zip("ab", frames, strict=True):
+        columns |= {f"{name}_{side}{end}": frame[name + end] for end in _ENDS}
+    off = columns[f"{name}_b"] - columns[f"{name}_a"]
+    columns |= {f"{name}_difference": off, f"{name}_difference_lo": off - half, f"{name}_difference_hi": off + half}
+    verdict = np.where(np.abs(off) + half <= none, "no", "cannot tell")
+    return columns | {changed_column(name): np.where(np.abs(off) > sure, "yes", verdict)}
+
+
+def changed_column(name: str) -> str:
+    """Column that says whether a quantity changed: yes, no or cannot tell."""
+    return f"{name.partition('_')[0]}_changed"
 
 
 def _pivots(a: Side, b: Side) -> pd.DataFrame:
@@ -237,42 +216,48 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
     if a.pivots is None or b.pivots is None:
         return pd.DataFrame()
     same = a.campaign is not None and b.campaign is not None and a.campaign.channels == b.campaign.channels
-    pads = [pad for pad in a.pivots["pad"].unique() if (b.pivots["pad"] == pad).any()]
-    frames = [_pivot(pad, [_measured(s.pivots, pad) for s in (a, b)], same, len(pads) * _PIVOT_LOADS) for pad in pads]
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+    curves = []
+    for table in (a.pivots, b.pivots):
+        sound = ~table["extrapolated"].astype(bool) & table["contact_complete"].astype(bool)
+        curves.append(dict(iter(table[sound].groupby("pad"))))
+    pairs = [_at_common_loads(curves[0][pad], curves[1][pad]) for pad in curves[0] if pad in curves[1]]
+    if not pairs:
+        return pd.DataFrame()
+    left, right = (pd.concat(frames, ignore_index=True) for frames in zip(*pairs, strict=True))
+    systematic = f"{TANGENT}_se_systematic"
+    common = left[systematic] * right[systematic] if same else 0.0
+    judged = _judged(TANGENT, (left, right), common, _NO_CHANGE * left[TANGENT].to_numpy(), len(left))
+    return pd.DataFrame({"pad": left["pad"], "force_N": left["force_N"], **judged})
 
 
-def _measured(table: pd.DataFrame | None, pad: float) -> pd.DataFrame:
-    assert table is not None
-    return table[(table["pad"] == pad) & ~table["extrapolated"].astype(bool) & table["contact_complete"].astype(bool)]
-
-
-def _pivot(pad: float, curves: Sequence[pd.DataFrame], same: bool, number: int) -> pd.DataFrame:
+def _at_common_loads(*curves: pd.DataFrame) -> list[pd.DataFrame]:
+    """Curves of one pad at loads at which both were measured."""
     low = max(curve["force_N"].min() for curve in curves)
     high = min(curve["force_N"].max() for curve in curves)
     force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
-    sides = []
+    frames = []
     for curve in curves:
         value, low_end, high_end = (np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS)
-        scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve and len(curve) else 0.0
-        sides.append(_Values(value, low_end, high_end, _variance(low_end, high_end), (scale * value) ** 2))
-    common = np.sqrt(sides[0].systematic * sides[1].systematic) if same else 0.0
-    judged = _judged(TANGENT, sides, common, _NO_CHANGE * sides[0].value, number)
-    return pd.DataFrame({"pad": pad, "force_N": force, **judged})
+        scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
+        columns = {"pad": curve["pad"].iloc[0], "force_N": force, TANGENT: value}
+        columns |= {f"{TANGENT}_lo": low_end, f"{TANGENT}_hi": high_end, f"{TANGENT}_se_systematic": scale * value}
+        frames.append(pd.DataFrame({**columns, f"{TANGENT}_se": (high_end - low_end) / (2 * _HALF)}))
+    return frames
 
 
 def _clearance(a: Side, b: Side) -> pd.DataFrame:
     """Assembled clearance at zero push load of the pads that both have."""
     if a.clearance is None or b.clearance is None:
         return pd.DataFrame()
-    name = "clearance_m"
-    joined = a.clearance.merge(b.clearance, on="pad", suffixes=("_a", "_b"))
-    sides = []
-    for side in "ab":
-        value, error = (joined[f"{name}{ending}_{side}"].to_numpy(float) for ending in ("", "_se"))
-        sides.append(_Values(value, value - 1.96 * error, value + 1.96 * error, error**2))
-    judged = _judged(name, sides, 0.0, _NO_CHANGE * sides[0].value, len(joined))
-    return pd.DataFrame({"pad": joined["pad"], **judged})
+    pads = a.clearance[["pad"]].merge(b.clearance[["pad"]])
+    frames = []
+    for table in (a.clearance, b.clearance):
+        frame = pads.merge(table)
+        half = _HALF * frame[f"{_CLEARANCE}_se"]
+        ends = {f"{_CLEARANCE}_lo": frame[_CLEARANCE] - half, f"{_CLEARANCE}_hi": frame[_CLEARANCE] + half}
+        frames.append(frame.assign(**ends, **{f"{_CLEARANCE}_se_systematic": 0.0}))
+    judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE].to_numpy(), len(pads))
+    return pd.DataFrame({"pad": pads["pad"], **judged})
 
 
 def shown(row: Mapping[Any, Any], name: str, scale: float, side: str = "difference") -> str:
@@ -281,25 +266,18 @@ def shown(row: Mapping[Any, Any], name: str, scale: float, side: str = "differen
     return with_interval(value, low, high, scale)
 
 
-def verdicts(frame: pd.DataFrame) -> list[str]:
-    """All cells that say whether something changed: yes, no or cannot tell."""
-    columns = [name for name in frame.columns if str(name).endswith("_changed")]
-    return [str(cell) for cell in frame[columns].to_numpy().ravel()]
-
-
 def difference_sentences(difference: Difference) -> tuple[str, ...]:
     """Say what changed from A to B, the answer first."""
     a, b, points = difference.a.name, difference.b.name, difference.points
-    judged = verdicts(points)
-    number, yes, no = len(judged), judged.count("yes"), judged.count("no")
+    judged = points.filter(like="_changed").to_numpy()
+    number, yes, no = judged.size, (judged == "yes").sum(), (judged == "no").sum()
     if not number:
         return (f"{a} and {b} have no operating point in common.", *_sentences_beside(difference))
     head = f"From {a} to {b} {yes} of {number} coefficients changed beyond what both intervals allow"
-    largest = _largest_change(points)
     rest = f"{no} are the same within {100 * _NO_CHANGE:g} %"
     rest += f", of {number - yes - no} the records cannot tell." if number > yes + no else "."
     return (
-        f"{head}, most of all {largest}." if yes else f"{head}.",
+        f"{head}, most of all {_largest_change(points)}." if yes else f"{head}.",
         f"At {counted(len(points), 'common operating point')}: {rest}",
         *_sentences_beside(difference),
     )
@@ -307,19 +285,23 @@ def difference_sentences(difference: Difference) -> tuple[str, ...]:
 
 def _largest_change(points: pd.DataFrame) -> str:
     """The coefficient that changed by the largest share of its point's mean direct one, in words."""
-    best, words = 0.0, ""
-    for row in points.to_dict("records"):
-        for name in COEFFICIENT_COLUMNS:
-            kind = KINDS[name[0]]
-            direct = 0.5 * sum(abs(row[f"{kind.column(entry)}_a"]) for entry in ("xx", "yy"))
-            share = row[f"{name}_difference"] / direct
-            if row[f"{name[:3]}_changed"] != "yes" or abs(share) <= best:
-                continue
-            best = abs(share)
-            size = f"{shown(row, name, kind.display_scale)} {kind.display_unit}"
-            place = place_of(row["static_load_N"], row["excitation_Hz"])
-            words = f"{name[:3]} at {place}: {percent(share)} of the mean direct coefficient ({size})"
-    return words
+    shares = {}
+    for name in COEFFICIENT_COLUMNS:
+        share = points[f"{name}_difference"] / _mean_direct(points, name, "_a")
+        shares[name] = share.where(points[changed_column(name)] == "yes")
+    sizes = pd.DataFrame(shares).abs().to_numpy()
+    number, index = np.unravel_index(np.nanargmax(sizes), sizes.shape)
+    name, row = COEFFICIENT_COLUMNS[index], points.iloc[number].to_dict()
+    kind = KINDS[name[0]]
+    size = f"{shown(row, name, kind.display_scale)} {kind.display_unit}"
+    place = place_of(row["static_load_N"], row["excitation_Hz"])
+    return f"{name[:3]} at {place}: {percent(shares[name][number])} of the mean direct coefficient ({size})"
+
+
+def _mean_direct(frame: pd.DataFrame, name: str, side: str = "") -> pd.Series:
+    """Mean size of the direct coefficients of a coefficient's kind at every point."""
+    kind = KINDS[name[0]]
+    return frame[[kind.column(entry) + side for entry in ("xx", "yy")]].abs().mean(axis=1)
 
 
 def _sentences_beside(difference: Difference) -> tuple[str, ...]:
@@ -327,12 +309,12 @@ def _sentences_beside(difference: Difference) -> tuple[str, ...]:
     sentences = []
     for words, frame, name, quantity in (
         ("Pivot stiffness", difference.pivots, TANGENT, "stiffness"),
-        ("Clearance", difference.clearance, "clearance_m", "length"),
+        ("Clearance", difference.clearance, _CLEARANCE, "length"),
     ):
         if frame.empty:
             sentences.append(f"{words} is not compared: one of the two has no such tests.")
             continue
-        changed = frame[frame[f"{name.partition('_')[0]}_changed"] == "yes"]
+        changed = frame[frame[changed_column(name)] == "yes"]
         parts = []
         for pad, rows in changed.groupby("pad"):
             row = rows.iloc[-1].to_dict()

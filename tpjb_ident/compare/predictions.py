@@ -110,21 +110,6 @@ class PointPrediction:
         return np.concatenate([self.k.ravel(), self.c.ravel()])
 
     @property
-    def position(self) -> tuple[float, float]:
-        """Of the shaft centre [m]."""
-        return float(self.prediction.position[0]), float(self.prediction.position[1])
-
-    @property
-    def converged(self) -> bool:
-        """Whether the model's solution did."""
-        return self.prediction.converged
-
-    @property
-    def status(self) -> tuple[str, ...]:
-        """Named conditions of the solution."""
-        return self.prediction.status
-
-    @property
     def extrapolated(self) -> bool:
         """Whether a pad that carries presses its pivot harder than the dry test did."""
         loads = zip(self.prediction.setup.pivots, self.prediction.pad_load, strict=True)

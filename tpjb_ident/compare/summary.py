@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from statistics import fmean
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from model.effects import kind_of
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.comparison import DIRECT, locus_distance
+from tpjb_ident.compare.comparison import locus_distances
 from tpjb_ident.compare.effect_words import Estimate, finding
-from tpjb_ident.compare.predictions import PointPrediction, printed_formula
+from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.rounding import percent, signed
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.compare.comparison import Comparison
 
-#: Clearances no farther from the drawing are as drawn [m].
-_AS_DRAWN = 0.3e-6
+#: Direct coefficients, and their columns.
+DIRECT = {name[:3]: name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy")}
 _PIVOTS_IN_WORDS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots (printed formula, tangent)",
@@ -32,91 +29,76 @@ _PIVOTS_IN_WORDS = {
 }
 
 
-def _in_words(variant: str) -> str:
+def _in_words(variant: Any) -> str:
     return _PIVOTS_IN_WORDS.get(variant, f"the table {variant}")
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """How one pivot model does on one direct coefficient: predicted / measured - 1."""
-
-    coefficient: str
-    median: float
-    worst: float
-    n: int
-    inside: int
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """How one pivot model does on the direct coefficients."""
-
-    pivots: str
-    deviations: tuple[Deviation, ...]
-
-    @property
-    def compared(self) -> list[Deviation]:
-        """Coefficients that could be compared at all."""
-        return [d for d in self.deviations if math.isfinite(d.median)]
-
-    @property
-    def medians(self) -> str:
-        """Median deviation of every coefficient, in words."""
-        return ", ".join(f"{d.coefficient} {percent(d.median)}" for d in self.deviations)
-
-    @property
-    def inside(self) -> str:
-        """How many predictions are within the measured intervals."""
-        return f"{sum(d.inside for d in self.deviations)} of {sum(d.n for d in self.deviations)}"
-
-    @property
-    def is_off(self) -> bool:
-        """Whether a direct coefficient is off by its tolerance, half of its points or more."""
-        return any(abs(d.median) > _OFF and d.inside <= 0.5 * d.n for d in self.compared)
 
 
 #: Median deviation of a direct coefficient from which a model is said to be off.
 _OFF = 0.05
 
 
-def agreements(table: pd.DataFrame) -> list[Agreement]:
-    """How every pivot model of a table of comparison.csv does."""
-    found = []
-    for pivots, rows in table.groupby("pivots", sort=False):
-        deviations = []
-        for name in DIRECT:
-            off = (rows[f"{name}_predicted"] / rows[name] - 1.0)[rows[f"{name}_lo"] * rows[f"{name}_hi"] > 0].to_numpy()
-            off = off[np.isfinite(off)]
-            inside = rows[f"{name}_predicted"].between(rows[f"{name}_lo"], rows[f"{name}_hi"])
-            worst = float(off[np.argmax(np.abs(off))]) if len(off) else math.nan
-            median = float(np.median(off)) if len(off) else math.nan
-            deviations.append(Deviation(name[:3], median, worst, len(off), int(inside.sum())))
-        found.append(Agreement(str(pivots), tuple(deviations)))
-    return found
+def agreements(table: pd.DataFrame) -> pd.DataFrame:
+    """How every pivot model of a table of comparison.csv does: a row each.
+
+    For every direct coefficient columns ``median`` and ``worst`` of predicted / measured - 1, the number of points
+    ``n`` and of those ``inside`` the measured interval.
+    """
+    off = table[[f"{column}_ratio" for column in DIRECT.values()]].set_axis(list(DIRECT), axis=1) - 1.0
+    inside = {
+        name: table[f"{column}_predicted"].between(table[f"{column}_lo"], table[f"{column}_hi"])
+        for name, column in DIRECT.items()
+    }
+    models = off.groupby(table["pivots"], sort=False)
+    columns = {
+        "median": models.median(),
+        "worst": models.agg(_largest),
+        "n": models.count(),
+        "inside": pd.DataFrame(inside).groupby(table["pivots"], sort=False).sum(),
+    }
+    return pd.concat(columns, axis=1)
 
 
-def closest(found: Sequence[Agreement]) -> Agreement | None:
+def _largest(off: pd.Series) -> float:
+    """What is farthest from zero."""
+    return max(off.dropna(), key=abs, default=math.nan)
+
+
+def number_inside(agreement: pd.Series) -> str:
+    """How many predictions of one model are within the measured intervals."""
+    return f"{agreement['inside'].sum():.0f} of {agreement['n'].sum():.0f}"
+
+
+def closest(found: pd.DataFrame) -> pd.Series | None:
     """The pivot model with the smallest mean size of its medians; None if nothing could be compared."""
-    compared = [agreement for agreement in found if agreement.compared]
-    return min(compared, key=lambda a: fmean(abs(d.median) for d in a.compared), default=None)
+    sizes = found[["median"]].abs().mean(axis=1)
+    return found.T[sizes.idxmin()] if sizes.notna().any() else None
 
 
-def _verdict_sentence(comparison: Comparison, best: Agreement | None) -> str:
+def is_off(agreement: pd.Series) -> bool:
+    """Whether a direct coefficient is off by its tolerance, half of its points or more."""
+    far, missed = agreement["median"].abs() > _OFF, agreement["inside"] <= 0.5 * agreement["n"]
+    return bool((far & missed).any())
+
+
+def _medians(agreement: pd.Series) -> str:
+    return ", ".join(f"{name} {percent(value)}" for name, value in agreement["median"].items())
+
+
+def _verdict_sentence(comparison: Comparison, best: pd.Series | None) -> str:
     """Say in one sentence what to conclude."""
-    name = comparison.campaign.id
+    campaign = comparison.campaign.id
     if best is None:
-        return f"{name}: no coefficient could be compared; see the quality flags."
-    worst = max(best.compared, key=lambda d: abs(d.median))
-    if best.is_off:
-        who = "No prediction agrees: the closest" if len(comparison.variants) > 1 else "The prediction"
-        off = f"is off by {percent(worst.median)} in {worst.coefficient} (median)"
-        return f"{name}: {who}, with {_in_words(best.pivots)}, {off}."
-    largest = max(best.compared, key=lambda d: abs(d.worst))
+        return f"{campaign}: no coefficient could be compared; see the quality flags."
+    name, pivots = best["median"].abs().idxmax(), _in_words(best.name)
+    median = best["median", name]
+    if is_off(best):
+        who = "No prediction agrees: the closest" if len(comparison.predictions) > 1 else "The prediction"
+        return f"{campaign}: {who}, with {pivots}, is off by {percent(median)} in {name} (median)."
+    largest = best["worst"].abs().idxmax()
     return (
-        f"{name}: prediction and measurement agree within {100 * abs(worst.median):.1f} % (median) with "
-        f"{_in_words(best.pivots)}; the largest single deviation is {percent(largest.worst)} in {largest.coefficient}, "
-        f"and {sum(d.inside for d in best.compared)} of {sum(d.n for d in best.compared)} direct coefficients are "
-        "inside their interval."
+        f"{campaign}: prediction and measurement agree within {100 * abs(median):.1f} % (median) with {pivots}; the "
+        f"largest single deviation is {percent(best['worst', largest])} in {largest}, and {number_inside(best)} direct "
+        "coefficients are inside their interval."
     )
 
 
@@ -125,11 +107,13 @@ def _effects_sentences(comparison: Comparison) -> tuple[str, ...]:
     effects = comparison.settings.effects
     if not effects or comparison.bearing is None:
         return ()
-    pads = len(comparison.bearing.pads)
     listed = []
-    for e in effects:
-        sizes = {p.name: (float(e.parameters[p.name]), p.unit) for p in kind_of(e.name).parameters_of(pads)}
-        listed.append(finding(e.name, {name: Estimate(v, v, v, unit) for name, (v, unit) in sizes.items()}))
+    for effect in effects:
+        sizes = {}
+        for parameter in kind_of(effect.name).parameters_of(len(comparison.bearing.pads)):
+            value = float(effect.parameters[parameter.name])
+            sizes[parameter.name] = Estimate(value, value, value, parameter.unit)
+        listed.append(finding(effect.name, sizes))
     return (
         f"The model holds effects: {'; '.join(listed)}. Where `tpjb diagnose` found them in this campaign they were "
         "fitted to these data, and agreement with them is no independent proof.",
@@ -142,10 +126,10 @@ def summary_sentences(comparison: Comparison) -> tuple[str, ...]:
     best = closest(found)
     sentences = [_verdict_sentence(comparison, best), *_effects_sentences(comparison)]
     if best is not None:
-        points = max(d.n for d in best.deviations)
-        with_best = f"The prediction comes closest with {_in_words(best.pivots)}: {best.medians}"
-        sentences.append(f"{with_best} (median over {points} points).")
-    sentences += [f"With {_in_words(other.pivots)}: {other.medians}." for other in found if other is not best]
+        closest_words = f"The prediction comes closest with {_in_words(best.name)}: {_medians(best)}"
+        sentences.append(f"{closest_words} (median over {best['n'].max():.0f} points).")
+        found = found.drop(index=best.name)
+    sentences += [f"With {_in_words(name)}: {_medians(row)}." for name, row in found.iterrows()]
     sentences += _pivot_sentence(comparison) + _extrapolation_sentence(comparison)
     sentences += _clearance_sentence(comparison) + _locus_sentence(comparison)
     return (*sentences, *comparison.remarks)
@@ -155,26 +139,25 @@ def _pivot_sentence(comparison: Comparison) -> list[str]:
     formula = printed_formula(comparison.bearing)
     if not comparison.curves or formula is None:
         return []
-    ratios = {}
+    ratios = []
     for curve in comparison.curves:
         load = 0.8 * curve.valid_to
-        ratios[curve.pad] = float(curve.stiffness(load)) / formula(curve.pad, load)[1]
-    low, high = min(ratios, key=lambda k: ratios[k]), max(ratios, key=lambda k: ratios[k])
+        ratios.append((float(curve.stiffness(load)) / formula(curve.pad, load)[1], curve.pad))
+    (low, soft), (high, stiff) = min(ratios), max(ratios)
     load = 0.8 * comparison.curves[0].valid_to
     return [
-        f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * ratios[low]:.0f} % (pad #{low}) to "
-        f"{100 * ratios[high]:.0f} % (pad #{high}) of the stiffness that the printed formula gives."
+        f"At {amount(load, 'load', '.3g')} the measured pivots have {100 * low:.0f} % (pad #{soft}) to "
+        f"{100 * high:.0f} % (pad #{stiff}) of the stiffness that the printed formula gives."
     ]
 
 
 def _extrapolation_sentence(comparison: Comparison) -> list[str]:
     """Say where the model asks more of a measured pivot than the dry tests told."""
-    measured = [point for v in comparison.variants if v.name == "measured" for point in v.points]
-    points = [point for point in measured if isinstance(point, PointPrediction)]
-    beyond = [point for point in points if point.extrapolated]
-    if not beyond or not comparison.curves:
+    points = comparison.predictions.get("measured")
+    if points is None or not points["pivot_extrapolated"].any():
         return []
-    largest = max(float(np.max(point.prediction.pad_load)) for point in beyond)
+    beyond = points[points["pivot_extrapolated"]]
+    largest = float(beyond.filter(regex=r"pad\d+_load_N").to_numpy().max())
     tested = min(curve.valid_to for curve in comparison.curves)
     return [
         f"At {len(beyond)} of {len(points)} points the measured pivots are extrapolated: pads press them with up to "
@@ -190,9 +173,6 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
-    if abs(off[pad]) < _AS_DRAWN:
-        within = amount(abs(off[pad]), "length", ".1g")
-        return [f"The measured clearance is that of the drawing, within {within} at every pad."]
     digits, unit = (1, symbol("length")) if size("length") < 1e-5 else (3, symbol("length"))
     median, worst = (signed(per("length") * float(v), digits) for v in (np.nanmedian(off), off[pad]))
     return [
@@ -202,12 +182,8 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
 
 
 def _locus_sentence(comparison: Comparison) -> list[str]:
-    distances = {v.name: locus_distance(comparison, v) for v in comparison.variants}
-    finite = {name: d for name, d in distances.items() if math.isfinite(d)}
-    if not finite:
-        return []
-    parts = ", ".join(
-        f"{amount(d, 'length', '.2g')} with {name.capitalize() if name.startswith('kirk') else name} pivots"
-        for name, d in finite.items()
-    )
-    return [f"The predicted shaft centre locus is off the measured one by (root mean square) {parts}."]
+    parts = []
+    for name, distance in locus_distances(comparison.loci).items():
+        parts.append(f"{amount(distance, 'length', '.2g')} with {name.replace('kirk', 'Kirk')} pivots")
+    head = "The predicted shaft centre locus is off the measured one by (root mean square)"
+    return [f"{head} {', '.join(parts)}."] if parts else []

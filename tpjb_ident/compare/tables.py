@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from model.bearing import Bearing
+from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import (
-    TableRow,
+    ERRORS,
+    VALUES,
     TableSource,
     partners,
+    points_of,
     read_coefficients,
     read_rows,
 )
-from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, Comparison, Variant, possible_variants
-from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
+from tpjb_ident.compare.comparison import (
+    VARIANTS,
+    CompareSettings,
+    Comparison,
+    possible_variants,
+    predicted_frame,
+)
+from tpjb_ident.compare.predictions import ModelSettings, predict_points
 from tpjb_ident.condition_kinds import KINDS
 from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError
@@ -42,32 +51,32 @@ def compare_table(
     Without a bearing nothing is predicted here: tables of other programs are put beside it.
     """
     settings = settings or CompareSettings()
-    points = tuple(_point(row) for row in read_coefficients(path, reading_error))
-    variants: list[Variant] = []
+    rows = read_coefficients(path, reading_error)
+    points = points_of(rows)
+    frames: dict[str, pd.DataFrame] = {}
     remarks: list[str] = []
     if bearing is not None:
-        names, remarks = possible_variants(tuple(v for v in settings.variants if v != "measured"), (), bearing)
-        if "measured" in settings.variants:
-            remarks.append("Measured pivots are left out: a table holds no dry tests.")
+        names, remarks = possible_variants(settings.variants, (), bearing)
         for name in names:
             model = ModelSettings(name, settings.thermal, settings.effects)
-            predictions = predict_points(bearing, [p.point for p in points], model, progress)
-            variants.append(Variant(name, predictions))
-    identification = Identification(path.stem, _METHOD, points, np.zeros((1, 8 * len(points))))
+            frames[name] = predicted_frame(predict_points(bearing, points, model, progress))
+    cells = zip(points, rows[VALUES].to_numpy(), rows[ERRORS].to_numpy(), rows["status"], strict=True)
+    results = tuple(_point(*row) for row in cells)
+    identification = Identification(path.stem, _METHOD, results, np.zeros((1, 8 * len(points))))
     source = TableSource(path.stem)
-    return Comparison(source, bearing, settings, identification, (), None, None, tuple(variants), tuple(remarks))
+    return Comparison(source, bearing, settings, identification, (), None, None, frames, None, tuple(remarks))
 
 
-def _point(row: TableRow) -> PointResult:
+def _point(point: OperatingPoint, values: FloatArray, errors: FloatArray, status: str) -> PointResult:
     """A row as if it had been identified; what it does not hold is NaN."""
-    omega = row.point.excitation
-    h, errors = row.values[:4].astype(complex).reshape(2, 2), row.errors * np.repeat([1.0, omega], 4)
-    h.imag = omega * row.values[4:].reshape(2, 2)  # a sum would lose a stiffness that stands without its damping
+    omega = point.excitation
+    h, errors = values[:4].astype(complex).reshape(2, 2), errors * np.repeat([1.0, omega], 4)
+    h.imag = omega * values[4:].reshape(2, 2)  # a sum would lose a stiffness that stands without its damping
     stiffness = DynamicStiffness(h, omega, np.diag(errors**2), np.full(8, np.inf), _METHOD, np.zeros((0, 2)))
     nowhere = np.full(2, np.nan)
-    quality = tuple(Condition(name) for name in row.status if name in KINDS)
+    quality = tuple(Condition(name) for name in status.split("; ") if name in KINDS)
     return PointResult(
-        row.point, stiffness, {_METHOD: stiffness}, row.point.static_load, nowhere, nowhere, {}, n_records=0,
+        point, stiffness, {_METHOD: stiffness}, point.static_load, nowhere, nowhere, {}, n_records=0,
         n_windows=0, outlier_fraction=0.0, coherence=np.nan, amplitude=np.nan, quality=quality, rejected=(), runs=(),
     )  # fmt: skip
 
@@ -79,60 +88,48 @@ _TOLERANCES = "its load within 1 %, direction within 1 deg, speed and excitation
 _MOST = 6
 
 
-@dataclass(frozen=True)
-class PredictionTable:
-    """Another program's prediction, under the name of its file."""
-
-    name: str
-    file: str
-    rows: tuple[TableRow, ...] = field(repr=False)
-
-
-def read_predictions(paths: Sequence[Path]) -> tuple[PredictionTable, ...]:
-    """Read tables of predictions; each is called by its file's name."""
-    tables: list[PredictionTable] = []
+def read_predictions(paths: Sequence[Path]) -> dict[str, pd.DataFrame]:
+    """Read tables of predictions; each is called by its file's name, which its frame's attributes hold."""
+    tables: dict[str, pd.DataFrame] = {}
     for path in paths:
         name = path.stem if path.stem not in VARIANTS else path.name
-        if any(table.name == name for table in tables):
+        if name in tables:
             raise BadInputError(f"--prediction {path}: another table is called {name!r} too. Rename one of the files.")
-        tables.append(PredictionTable(name, path.name, read_rows(path)))
-    return tuple(tables)
+        tables[name] = read_rows(path)
+        tables[name].attrs["file"] = path.name
+    return tables
 
 
-def with_predictions(comparison: Comparison, tables: Sequence[PredictionTable]) -> Comparison:
+def with_predictions(comparison: Comparison, tables: Mapping[str, pd.DataFrame]) -> Comparison:
     """Put tables beside the predictions of a comparison, and say which points and rows have no partner."""
-    points = [measured.point for measured in comparison.identification.points]
-    variants, remarks = list(comparison.variants), list(comparison.remarks)
-    for table in tables:
-        theirs = pd.DataFrame([point_columns(row.point) for row in table.rows])
-        nearest = partners(pd.DataFrame(map(point_columns, points)), theirs, _ROUNDED)
-        met = [None if index < 0 else table.rows[index] for index in nearest]
-        unmet = [row for row in table.rows if not any(row is other for other in met)]
-        if len(unmet) == len(table.rows):
+    measured = comparison.identification.to_frame()
+    points = [p.point for p in comparison.identification.points]
+    predictions, remarks = dict(comparison.predictions), list(comparison.remarks)
+    for name, rows in tables.items():
+        nearest = partners(measured, rows, _ROUNDED)
+        unmet = rows[~rows.index.isin(nearest)]
+        if len(unmet) == len(rows):
             raise BadInputError(
-                f"--prediction {table.file}: no row meets an operating point ({_TOLERANCES}). Its first row is "
-                f"{table.rows[0].point}; the first measured point is {points[0]}. Check units and signs of its columns."
+                f"--prediction {rows.attrs['file']}: no row meets an operating point ({_TOLERANCES}). Its first row is "
+                f"{points_of(rows)[0]}; the first measured point is {points[0]}. Check units and signs of its columns."
             )
-        variants.append(Variant(table.name, tuple(map(_at, points, met))))
-        alone = [str(point) for point, row in zip(points, met, strict=True) if row is None]
-        remarks.append(_remark(table, len(points), alone, unmet))
+        met = rows.reindex(nearest).reset_index(drop=True)  # no row has the number -1
+        predictions[name] = met.assign(
+            converged=met["converged"].ne(False),
+            pivot_extrapolated=False,
+            status=met["status"].fillna("no row of the table"),
+        )
+        alone = [str(point) for point, index in zip(points, nearest, strict=True) if index < 0]
+        lines = [f"line {line} ({point})" for line, point in zip(unmet["line"], points_of(unmet), strict=True)]
+        head = f"{rows.attrs['file']} predicts {len(points) - len(alone)} of {len(points)} points"
+        parts = [head, *_listed("without a row", alone), *_listed("rows that meet no point", lines)]
+        remarks.append("; ".join(parts) + ".")
     if tables:
         remarks.append(f"A row of a table meets a point where it has {_TOLERANCES}; nothing is interpolated.")
-    return replace(comparison, variants=tuple(variants), remarks=tuple(remarks))
+    return replace(comparison, predictions=predictions, remarks=tuple(remarks))
 
 
-def _at(point: OperatingPoint, row: TableRow | None) -> TableRow:
-    """A row at the point that it meets; without one, a row of nothing."""
-    nothing = np.full(8, np.nan)
-    return replace(row, point=point) if row else TableRow(0, point, nothing, nothing, status=("no row of the table",))
-
-
-def _remark(table: PredictionTable, total: int, alone: Sequence[str], unmet: Sequence[TableRow]) -> str:
-    """Say how many points a table meets, and what has no partner."""
-    sentences = [f"{table.file} predicts {total - len(alone)} of {total} points"]
-    lines = [f"line {row.line} ({row.point})" for row in unmet]
-    for words, texts in (("without a row", alone), ("rows that meet no point", lines)):
-        if texts:
-            more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
-            sentences.append(f"{words}: {'; '.join(texts[:_MOST])}{more}")
-    return "; ".join(sentences) + "."
+def _listed(words: str, texts: Sequence[str]) -> list[str]:
+    """The first of the texts, and how many more there are; nothing without any."""
+    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    return [f"{words}: {'; '.join(texts[:_MOST])}{more}"] if texts else []

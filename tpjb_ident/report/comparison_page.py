@@ -11,9 +11,9 @@ import pandas as pd
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import amount, size, symbol
-from tpjb_ident.compare.comparison import predicted_locus
+from tpjb_ident.compare.comparison import predicted_loci
 from tpjb_ident.compare.predictions import printed_formula
-from tpjb_ident.compare.summary import agreements, summary_sentences
+from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.figure import Panel
@@ -105,9 +105,9 @@ def write_report(
 def deviations_table(table: pd.DataFrame) -> Table:
     """How far predictions of a table of comparison.csv are off, by pivot model."""
     rows = []
-    for found in agreements(table):
-        cells = [f"{percent(d.median)} ({percent(d.worst)})" for d in found.deviations]
-        rows.append([VARIANT_LABEL.get(found.pivots, found.pivots), *cells, found.inside])
+    for name, found in agreements(table).iterrows():
+        cells = [f"{percent(median)} ({percent(found['worst', k])})" for k, median in found["median"].items()]
+        rows.append([VARIANT_LABEL.get(str(name), str(name)), *cells, number_inside(found)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],
@@ -161,8 +161,7 @@ def _pivot_sections(comparison: Comparison) -> list[Section]:
 def _position_sections(comparison: Comparison) -> list[Section]:
     pads = () if comparison.bearing is None else comparison.bearing.pads
     drawn = (np.array([pad.pivot_angle for pad in pads]), np.array([pad.assembled_clearance for pad in pads]))
-    predicted = {v.name: predicted_locus(comparison, v) for v in comparison.variants if len(v.locus)}
-    panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted)
+    panels = position_panels(comparison.clearance, drawn, comparison.locus, predicted_loci(comparison.loci))
     if not panels:
         return []
     tables = [] if comparison.clearance is None else [clearance_table(comparison.clearance, drawn[1])]

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, per, size, symbol
+from tpjb_ident.compare.comparison import joined, predicted_frame
 from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import deviations_table, measured_table
@@ -22,7 +23,7 @@ from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficient
 from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
 from tpjb_ident.rounding import counted
-from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_COLUMNS, POINT_KEY
+from tpjb_ident.schema import POINT_COLUMNS, POINT_KEY
 from tpjb_ident.view.records_tab import follow
 
 if TYPE_CHECKING:
@@ -142,12 +143,9 @@ def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.D
     """Predictions with every pivot model, and what was measured at the same points; columns as in comparison.csv."""
     import pandas as pd
 
-    keys, predicted_columns = list(POINT_KEY), [f"{name}_predicted" for name in COEFFICIENT_COLUMNS]
-    rows = []
+    digits = dict.fromkeys(POINT_COLUMNS, 6)
+    places = pd.DataFrame([point_columns(point) for point in points]).round(digits)
+    predictions = {}
     for name, pivots in session.pivots.items():
-        for prediction in predict_points(session.bearing, points, ModelSettings(pivots)):
-            values = dict(zip(predicted_columns, prediction.values, strict=True))
-            rows.append({"pivots": name, **point_columns(prediction.point), **values})
-    columns = [f"{name}{end}" for name in COEFFICIENT_COLUMNS for end in ("", "_lo", "_hi")]
-    predicted, measured = (table.round(dict.fromkeys(POINT_COLUMNS, 6)) for table in (pd.DataFrame(rows), measured))
-    return predicted.merge(measured[[*keys, *columns]], how="left", on=keys)
+        predictions[name] = predicted_frame(predict_points(session.bearing, points, ModelSettings(pivots)))
+    return joined(places.merge(measured.round(digits), how="left", on=list(POINT_KEY)), predictions)

@@ -137,7 +137,6 @@ def _variants(text: str) -> tuple[str, ...]:
 
 def write_comparison(c: Command, result: Comparison, show: Progress, following: str, note: str = "") -> None:
     """Write every table, pivots.toml and the report."""
-    from tpjb_ident.compare.comparison import locus_frame
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.pivot import pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import write_report
@@ -151,18 +150,20 @@ def write_comparison(c: Command, result: Comparison, show: Progress, following: 
         write_pivots(c.folder / "pivots.toml", result.curves, result.campaign.id)
     if result.clearance is not None:
         c.table("clearance", result.clearance.to_frame())
-    if result.locus is not None:
+    if result.locus is not None and result.loci is not None:
         c.table("locus", result.locus.to_frame())
-        c.table("locus_comparison", locus_frame(result))
+        c.table("locus_comparison", result.loci)
     show("drawing figures", 1, 2)
     write_report(c.folder, result, named(c.options), c.inputs, following, note)
 
 
 def show_comparison(c: Command, result: Comparison, following: str = "") -> None:
     """Print what to conclude, the command that comes next, and how far each pivot model is off."""
-    from tpjb_ident.compare.summary import agreements, summary_sentences
+    from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 
-    rows = [[a.pivots, *(percent(d.median) for d in a.deviations), a.inside] for a in agreements(result.table)]
+    rows = []
+    for name, agreement in agreements(result.table).iterrows():
+        rows.append([str(name), *map(percent, agreement["median"]), number_inside(agreement)])
     columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy", "inside"]
     with c.conclusion(summary_sentences(result), following):
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
@@ -170,10 +171,10 @@ def show_comparison(c: Command, result: Comparison, following: str = "") -> None
 
 def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
     """Command that comes next: a diagnosis where the model is off, an export where it is not."""
-    from tpjb_ident.compare.summary import agreements, closest
+    from tpjb_ident.compare.summary import agreements, closest, is_off
 
     best = closest(agreements(result.table))
-    if best is not None and best.is_off:
+    if best is not None and is_off(best):
         if result.bearing is None:
             return ""
         return f"tpjb diagnose {source}" + (f" --bearing {bearing}" if bearing else "")
@@ -184,9 +185,7 @@ def refuse_comparison(result: Comparison) -> None:
     """End with exit code 3 if a point is not to be trusted, on either side."""
     if result.has_records:
         refuse_untrusted(result.identification)
-    bad = []
-    for variant in result.variants:
-        points = [p for p in variant.points if not p.converged]
-        bad += [f"{variant.name}, {amount(p.point.static_load, 'load')}" for p in points]
+    failed = result.table[~result.table["converged"]]
+    bad = [f"{row['pivots']}, {amount(row['static_load_N'], 'load')}" for row in failed.to_dict("records")]
     if bad:
         raise NotTrustedError(f"the model did not converge at {len(bad)} points ({listed(bad, between='; ')}).")

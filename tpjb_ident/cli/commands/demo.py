@@ -28,7 +28,6 @@ def demo(c: Command) -> None:
     printed formula, recorded with noise and glitches.
     """
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
-    from tpjb_ident.compare.predictions import PointPrediction, prediction_frame
     from tpjb_ident.runtime.executors import background_job
 
     path = _sample("demo.h5")
@@ -43,8 +42,7 @@ def demo(c: Command) -> None:
             summary = check_summary(c, campaign.id, check_campaign(path), campaign)
             c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
-            measured = result.variant("measured").points
-            c.table("prediction", prediction_frame([p for p in measured if isinstance(p, PointPrediction)]))
+            c.table("prediction", result.predictions["measured"].drop(columns="pivot_extrapolated"))
             truth = json.loads(_sample("demo.truth.json").read_text(encoding="utf-8"))
             error = 100 * _largest_error(result, truth)
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."

@@ -19,7 +19,7 @@ from rigdata.arrays import FloatArray
 from rigdata.vector import directions
 from tpjb_ident.clearance.locus import Locus, LocusPoint
 from tpjb_ident.clearance.measure import ClearancePolygon
-from tpjb_ident.compare.coefficient_table import read_coefficients
+from tpjb_ident.compare.coefficient_table import ERRORS, VALUES, points_of, read_coefficients
 from tpjb_ident.diagnosis.observations.constants import Deciding, Tolerance
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.results.identification import Identification
@@ -361,17 +361,16 @@ def observe_table(path: Path, reading_error: float | None = None, tolerance: Tol
     """Read a table of coefficients."""
     builder = _Builder()
     tests: dict[tuple[float, float, float], list[float]] = {}
-    for entry in read_coefficients(path, reading_error):
-        point = entry.point
+    rows = read_coefficients(path, reading_error)
+    for point, values, errors in zip(points_of(rows), rows[VALUES].to_numpy(), rows[ERRORS].to_numpy()):
         static = (point.static_load, point.static_load_direction, point.spin)
         tests.setdefault(static, []).append(point.excitation)
-        where = _at_point(*static, point.excitation)
-        for part in "kc":
-            factor = point.excitation if part == "c" else 1.0
-            part_coefficients = {n: v for n, v in entry.coefficients.items() if n[0] == part}
-            elements = [Element("h", name, where) for name in part_coefficients]
-            value, error = factor * np.array(list(part_coefficients.values())).reshape(-1, 2).T
-            least = Deciding.axis * (reading_error or 0.0) * direct_scale(elements, value)
-            builder.add(elements, value, np.diag(np.maximum(error, least) ** 2))
+        present = np.flatnonzero(np.isfinite(values))
+        named = _stiffness_elements(_at_point(*static, point.excitation))
+        elements = [named[i] for i in present]
+        factor = np.where(present < 4, 1.0, point.excitation)
+        value, error = factor * values[present], factor * errors[present]
+        least = Deciding.axis * (reading_error or 0.0) * direct_scale(elements, value)
+        builder.add(elements, value, np.diag(np.maximum(error, least) ** 2))
     layout = Layout(tuple(DynamicTest(*key, tuple(lines)) for key, lines in tests.items()))
     return builder.observed(layout, tolerance or Tolerance())
