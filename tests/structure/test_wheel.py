@@ -75,6 +75,7 @@ def test_the_wheel_holds_three_packages_and_their_data(wheel):
         "rigdata/py.typed", "model/py.typed", "tpjb_ident/py.typed", "rigdata/samples/demo.h5",
         "rigdata/samples/demo.truth.json", "model/bearings/rocker.toml", "model/bearings/spherical.toml",
         "tpjb_ident/report/templates/report.html", "tpjb_ident/report/templates/style.css",
+        "tpjb_ident/exports/templates/ross.jinja",
     } <= names  # fmt: skip
     assert "tpjb = tpjb_ident.cli:main" in points
     assert any(name.endswith("licenses/LICENSE") for name in names)

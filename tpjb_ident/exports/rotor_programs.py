@@ -9,17 +9,17 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+import jinja2
 import numpy as np
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
-from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.columns import amount, in_us_units
 from tpjb_ident.exports.formats import COLUMNS, ROSS_VERSIONS, flags
 from tpjb_ident.exports.table import INTERVALS
@@ -30,6 +30,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _HZ = 2.0 * np.pi
+_TEMPLATES = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    undefined=jinja2.StrictUndefined,
+    keep_trailing_newline=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
 #: Excitation frequencies that differ by less than this share are one.
 _SAME = 1e-6
 
@@ -88,11 +95,6 @@ class Grid:
             remarks.append("the rig's shaft turns clockwise: here, and in the intervals, it turns counter-clockwise")
         return remarks
 
-    def speed_rows(self, values: FloatArray, separator: str) -> list[str]:
-        """One line per speed: rpm and (n, 8) coefficients."""
-        table = np.column_stack([60.0 * self.speed, values])
-        return [separator.join([f"{row[0]:.6g}", *(f"{value:.8e}" for value in row[1:])]) for row in table]
-
 
 def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
     """Sort points by load and direction into files over ``"speed"``, ``"excitation"`` or ``"both"``."""
@@ -117,16 +119,16 @@ _SYNCHRONOUS = -1.0
 
 def _alike(by_speed: Sequence[pd.DataFrame]) -> bool:
     """Whether all speeds were run at the same frequencies."""
-    axes = [part["excitation_Hz"].to_numpy() for part in by_speed]
-    return all(len(axis) == len(axes[0]) and np.allclose(axis, axes[0], rtol=_SAME, atol=0.0) for axis in axes)
+    first, *rest = (part["excitation_Hz"].to_numpy() for part in by_speed)
+    return all(len(axis) == len(first) and np.allclose(axis, first, rtol=_SAME, atol=0.0) for axis in rest)
 
 
 def _grid(rows: pd.DataFrame) -> Grid:
     """Grid of rows that have the same frequencies at every speed, or only the running speed."""
     speed = rows["shaft_speed_Hz"].unique()
-    excitation = rows["excitation_Hz"].to_numpy()[: len(rows) // len(speed)]
-    synchronous = len(excitation) == 1 and (rows["line"] == _SYNCHRONOUS).all()
-    return Grid(rows, speed, np.full(1, np.nan) if synchronous else excitation)
+    if len(rows) == len(speed) and (rows["line"] == _SYNCHRONOUS).all():
+        return Grid(rows, speed, np.full(1, np.nan))
+    return Grid(rows, speed, rows["excitation_Hz"].to_numpy()[: len(rows) // len(speed)])
 
 
 def ross_version(chosen: int | None = None) -> tuple[int, str]:
@@ -140,19 +142,6 @@ def ross_version(chosen: int | None = None) -> tuple[int, str]:
     return min(max(installed, ROSS_VERSIONS[0]), ROSS_VERSIONS[-1]), "the one that is installed"
 
 
-_ROSS_HEADS = {
-    2: (
-        '"frequency" is the excitation [rad/s] at constant shaft speed, outside it ROSS extrapolates.',
-        "Its spline smooths by some 1 N/m and 1 N s/m. Do not migrate this file to ROSS 3: ross_2to3 would",
-        'rename the excitation to "speed". tpjb export --to ross --ross 3 writes the file for ROSS 3.',
-    ),
-    3: (
-        '"speed" is the shaft\'s, "frequency" the excitation, both [rad/s]; with both, arrays are (speed, frequency).',
-        "Outside an axis ROSS extrapolates. This form follows ROSS's description; it was not run with ROSS 3.",
-    ),
-}
-
-
 def write_ross(folder: Path, points: pd.DataFrame, source: str, version: int | None = None) -> None:
     """Write one TOML file per element, which ``ross.BearingElement.load`` reads: Re h stands as K, there is no mass."""
     number, reason = ross_version(version)
@@ -162,120 +151,54 @@ def write_ross(folder: Path, points: pd.DataFrame, source: str, version: int | N
         remarks = grid.remarks(source)
         for hz in grid.speed:
             remarks += [f"{60 * hz:g} rpm, {flag}" for flag in flags(grid.rows[grid.rows["shaft_speed_Hz"] == hz])]
-        head = [*remarks, f"For ROSS {number}, {reason}.", *_ROSS_HEADS[number]]
-        lines = [*(f"# {printable(line)}" for line in head), f'["BearingElement_{tag}"]', "n = 0", f'tag = "{tag}"']
         axes = {"speed": _HZ * grid.speed, "frequency": _HZ * grid.excitation}
-        lines += [f"{axis} = {values.tolist()}" for axis, values in axes.items() if len(values) > 1]
-        values = grid.values
-        flat = values if min(values.shape[:2]) > 1 else values.reshape(-1, len(COLUMNS))
-        lines += [f"{name} = {flat[..., i].tolist()}" for i, name in enumerate(COLUMNS)]
-        write_text(folder / f"ross_{tag}.toml", "\n".join(lines) + "\n")
+        arrays = {axis: values.tolist() for axis, values in axes.items() if len(values) > 1}
+        values = grid.values if len(arrays) == 2 else grid.values.reshape(-1, len(COLUMNS))
+        arrays |= {name: values[..., i].tolist() for i, name in enumerate(COLUMNS)}
+        remarks = [printable(remark) for remark in remarks]
+        fields = {"remarks": remarks, "number": number, "reason": reason, "tag": tag, "arrays": arrays}
+        _write(folder / f"ross_{tag}.toml", "ross", fields)
 
 
-def _xltrc(grid: Grid, values: FloatArray, remarks: list[str]) -> list[str]:
-    """Tab-separated table in the order of XLTRC's user-defined bearing sheet: paste it below the sheet's head."""
-    units = {"k": "lbf/in", "c": "lbf-s/in"} if in_us_units() else {"k": "N/m", "c": "N-s/m"}
-    head = ["Speed (rpm)", *(f"{name.capitalize()} ({units[name[0]]})" for name in COLUMNS)]
-    return [*(f"* {remark}" for remark in remarks), "\t".join(head), *grid.speed_rows(values, "\t")]
-
-
-def _dyrobes(grid: Grid, values: FloatArray, remarks: list[str]) -> list[str]:
-    """External bearing file of Dyrobes: points, unit system, 8 coefficients, then one line per speed.
-
-    Its systems are 1 and 2 with in and lbf, 3 with m and N, 4 with mm and N.
-    """
-    head = f"{len(grid.speed)}, {2 if in_us_units() else 3}, 8, 0, 0, 0, 0   {'; '.join(remarks)}"
-    return [head, *grid.speed_rows(values, ", ")]
-
-
-def _ansys(grid: Grid, values: FloatArray, remarks: list[str]) -> list[str]:
-    """File that ANSYS reads for COMBI214: titles, count, keys (1: lbf and in; 1: rpm to rad/s), K and C by speed."""
-    lines = [*(remark[:80] for remark in remarks[:3]), f"{len(grid.speed):10d}{in_us_units():10d}{1:10d}"]
-    for i, (speed, row) in enumerate(zip(grid.speed, values, strict=True), start=1):
-        lines.append(f"{i:10d}{60.0 * speed:10.2f}")
-        lines += ["".join(f"{value:15.7E}" for value in part) for part in (row[:4], row[4:])]
-    return lines
-
-
-def _write_by_speed(
-    program: str,
-    text: Callable[[Grid, FloatArray, list[str]], list[str]],
-    folder: Path,
-    points: pd.DataFrame,
-    source: str,
-) -> None:
+def _write_by_speed(program: str, folder: Path, points: pd.DataFrame, source: str) -> None:
     """One file per load and excitation frequency."""
     per_metre = UNITS["N_per_m"][1] if in_us_units() else 1.0
     for grid in grids(points, "speed"):
-        lines = text(grid, grid.values[:, 0] / per_metre, grid.remarks(source))
-        write_text(folder / f"{program}_{grid.name(grid.line)}.txt", "\n".join(lines) + "\n")
+        rows = np.column_stack([60.0 * grid.speed, grid.values[:, 0] / per_metre]).tolist()
+        fields = {"rows": rows, "remarks": grid.remarks(source), "names": list(COLUMNS), "us": in_us_units()}
+        _write(folder / f"{program}_{grid.name(grid.line)}.txt", program, fields)
 
 
-write_xltrc = functools.partial(_write_by_speed, "xltrc", _xltrc)
-write_dyrobes = functools.partial(_write_by_speed, "dyrobes", _dyrobes)
-write_ansys = functools.partial(_write_by_speed, "ansys", _ansys)
+write_xltrc = functools.partial(_write_by_speed, "xltrc")
+write_dyrobes = functools.partial(_write_by_speed, "dyrobes")
+write_ansys = functools.partial(_write_by_speed, "ansys")
 
 
-_CLOCKWISE = ROTATIONS[1]
-#: What the versions call the same thing.
-_NAMES = {
-    2: {"speed": "frequency", "preload": "pre_load", "match": "determine_eccentricity", "load": "load=[fx, fy]"},
-    3: {"speed": "speed", "preload": "preload", "match": "match_load", "load": "fxs_load=fx, fys_load=fy"},
-}
+def _write(path: Path, form: str, fields: Mapping[str, Any]) -> None:
+    write_text(path, _TEMPLATES.get_template(f"{form}.jinja").render(fields))
 
 
 def write_ross_bearing(folder: Path, bearing: Any, version: int | None = None) -> None:
     """Write ross_bearing.py: a function of node, speed and load that gives a ``ross.TiltingPad``."""
-    if bearing.rotation == _CLOCKWISE:  # oil goes round the ring in the order of the pads
+    clockwise = bearing.rotation == ROTATIONS[1]
+    if clockwise:  # oil goes round the ring in the order of the pads
         bearing = bearing.with_pads(bearing.pads[::-1])
     number, reason = ross_version(version)
-    names = _NAMES[number]
-    head = [
-        f"# {printable(bearing.name)}, written by tpjb-ident for ROSS {number}, {reason}.",
-        "# The shaft turns counter-clockwise; angles from +x. What this call cannot hold:",
-        *(f"# - {printable(remark)}" for remark in _not_held(bearing, number)),
-        "import ross as rs", "", "",
-        "def bearing(n, speed, fx, fy, **options):",
-        '    """At node n: speed [rad/s], an array; fx, fy: static load on the shaft [N]; any option of TiltingPad."""',
-        "    arguments = dict(",
-    ]  # fmt: skip
+    angles = [pad.pivot_angle for pad in bearing.pads]
     assembled = fmean(pad.assembled_clearance for pad in bearing.pads)  # that ROSS takes: preloads give each its own
-    preloads = [1.0 - assembled / pad.pad_clearance for pad in bearing.pads]
-    arguments = {names["preload"]: preloads, **_arguments(bearing)}
-    lines = [f"        {name}={value!r}," for name, value in arguments.items()]
-    tail = [
-        f"        {names['load']}, {names['speed']}=speed,",
-        f"        equilibrium_type='{names['match']}', thermal_type='adiabatic',",
-        "    )",
-        "    return rs.TiltingPad(n=n, **{**arguments, **options})",
-    ]
-    write_text(folder / "ross_bearing.py", "\n".join([*head, *lines, *tail]) + "\n")
-
-
-def _arguments(bearing: Any) -> dict[str, Any]:
-    """What both versions call the same."""
-    pads, oil, hot = bearing.pads, bearing.oil, 100.0
-    angles = [pad.pivot_angle for pad in pads]
-    lubricant = {
-        "liquid_viscosity1": oil.viscosity_40,
-        "temperature1": 40.0 + ZERO_CELSIUS,
-        "liquid_viscosity2": float(oil.viscosity(hot)),
-        "temperature2": hot + ZERO_CELSIUS,
-        "liquid_density": oil.density_40,
-        "liquid_specific_heat": oil.specific_heat,
-        "liquid_thermal_conductivity": oil.conductivity,
+    fields = {
+        "name": printable(bearing.name),
+        "number": number,
+        "reason": reason,
+        "remarks": [printable(remark) for remark in _not_held(bearing, number)],
+        "bearing": bearing,
+        "clearance": assembled,
+        "preloads": [1.0 - assembled / pad.pad_clearance for pad in bearing.pads],
+        "thickness": fmean(pad.thickness for pad in bearing.pads),
+        "angles": [math.pi - angle for angle in angles] if clockwise else angles,
+        "viscosity_100": float(bearing.oil.viscosity(100.0)),
     }
-    return {
-        "journal_diameter": bearing.journal_diameter,
-        "radial_clearance": fmean(pad.assembled_clearance for pad in pads),
-        "pad_thickness": fmean(pad.thickness for pad in pads),
-        "pivot_angle": [math.pi - a for a in angles] if bearing.rotation == _CLOCKWISE else angles,
-        "pad_arc": [pad.arc for pad in pads],
-        "pad_axial_length": [bearing.length] * len(pads),
-        "offset": [pad.pivot_offset for pad in pads],
-        "lubricant": lubricant,
-        "oil_supply_temperature": oil.supply_temperature + ZERO_CELSIUS,
-    }
+    _write(folder / "ross_bearing.py", "ross_bearing", fields)
 
 
 def _not_held(bearing: Any, version: int) -> list[str]:
@@ -285,7 +208,7 @@ def _not_held(bearing: Any, version: int) -> list[str]:
         f"pivots ({bearing.pivot.kind}): rigid here; no law per pad, and none that was measured",
         "mass of pads, their bending, heat into them, thermal expansion of the oil",
     ]
-    if bearing.rotation == _CLOCKWISE:
+    if bearing.rotation == ROTATIONS[1]:
         remarks.append("the sense of the drawing, clockwise: this is its mirror image, x to -x, last pad first")
     if len({pad.assembled_clearance for pad in pads}) > 1:
         clearances = ", ".join(f"{1e6 * pad.assembled_clearance:.4g}" for pad in pads)
