@@ -146,7 +146,7 @@ def test_the_second_legend_of_a_page_is_cut_off():
         panels.append(panel(name, name, figure, ""))
         texts[name] = svg_text(figure, name)
     html = render_page(
-        report_page.Page("t", "", "", picture=panels[0], sections=[Section("s", panels=panels[1:])]), texts
+        report_page.Page("t", "", "", lead=panels[0].name, sections=[Section("s", panels=panels)]), texts
     )
     assert html.count('<g visibility="hidden" id="two-legend_1"') == 1
     assert 'visibility="hidden" id="one' not in html

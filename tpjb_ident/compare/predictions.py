@@ -95,19 +95,9 @@ class PointPrediction:
     index: int
 
     @property
-    def k(self) -> np.ndarray:
-        """(2, 2) stiffness [N/m]."""
-        return np.asarray(self.prediction.k[self.index])
-
-    @property
-    def c(self) -> np.ndarray:
-        """(2, 2) damping [N s/m]."""
-        return np.asarray(self.prediction.c[self.index])
-
-    @property
     def values(self) -> np.ndarray:
         """(8,) kxx .. kyy [N/m], cxx .. cyy [N s/m]."""
-        return np.concatenate([self.k.ravel(), self.c.ravel()])
+        return np.stack([self.prediction.k[self.index], self.prediction.c[self.index]]).ravel()
 
     @property
     def extrapolated(self) -> bool:

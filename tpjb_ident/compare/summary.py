@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Direct coefficients, and their columns.
 DIRECT = {name[:3]: name for name in COEFFICIENT_COLUMNS if name[1:3] in ("xx", "yy")}
+#: Clearances no farther from the drawing are as drawn [m].
+_AS_DRAWN = 0.3e-6
 _PIVOTS_IN_WORDS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots (printed formula, tangent)",
@@ -173,6 +175,9 @@ def _clearance_sentence(comparison: Comparison) -> list[str]:
     if not np.isfinite(off).any():
         return []
     pad = int(np.nanargmax(np.abs(off)))
+    if abs(off[pad]) < _AS_DRAWN:
+        within = amount(abs(off[pad]), "length", ".1g")
+        return [f"The measured clearance is that of the drawing, within {within} at every pad."]
     digits, unit = (1, symbol("length")) if size("length") < 1e-5 else (3, symbol("length"))
     median, worst = (signed(per("length") * float(v), digits) for v in (np.nanmedian(off), off[pad]))
     return [

@@ -16,7 +16,6 @@ from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
 from tpjb_ident.report.drawing.picture import VARIANT_LABEL
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
-from tpjb_ident.report.figure import Panel
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
     clearance_cells,
@@ -80,9 +79,7 @@ def write_report(
     """
     frame = comparison.table
     answer, *more = summary_sentences(comparison)
-    points = comparison.identification.points
-    coefficients = coefficient_panels(frame)
-    lead = next((p for p in coefficients if p.name.startswith(_LEAD)), next(iter(coefficients), None))
+    points, flagged = comparison.identification.points, _flagged(comparison)
     campaign, bearing = comparison.campaign, comparison.bearing
     page = Page(
         title=f"{campaign.id}: predicted and measured dynamic coefficients",
@@ -92,10 +89,10 @@ def write_report(
         facts=tested_facts(campaign, bearing, points) | ({"Note": note} if note else {}),
         key_table=deviations_table(frame),
         values=values_table(points),
-        flags=flags_line([conditions for _, conditions in _flagged(comparison)], len(points)),
-        picture=lead,
+        flags=flags_line([[flag for _, flag in flagged]], len(points)),
+        lead="kyy-over-",
         then=then,
-        sections=_sections(comparison, frame, [p for p in coefficients if p is not lead]),
+        sections=_sections(comparison, frame, flagged),
         settings=settings or {"campaign": campaign.id, **vars(comparison.settings)},
         inputs=campaign.fingerprint() if inputs is None else inputs,
     )
@@ -115,8 +112,8 @@ def deviations_table(table: pd.DataFrame) -> Table:
     )
 
 
-def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequence[Panel]) -> list[Section]:
-    sections = [*grouped(coefficients), *_pivot_sections(comparison), *_position_sections(comparison)]
+def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tuple[str, Condition]]) -> list[Section]:
+    sections = [*grouped(coefficient_panels(frame)), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign: Any = comparison.campaign
     tables = [measured_table(comparison.identification)]
     if comparison.has_records:
@@ -132,9 +129,8 @@ def _sections(comparison: Comparison, frame: pd.DataFrame, coefficients: Sequenc
             tables=[*tables, _predicted_table(frame)],
         )
     )
-    flags = _flag_table(comparison)
-    if flags.rows:
-        sections.append(Section("Quality flags", tables=[flags]))
+    if flagged:
+        sections.append(Section("Quality flags", tables=[_flag_table(flagged)]))
     set_up = set_up_section(comparison)
     return [*sections, set_up] if set_up.tables else sections
 
@@ -168,8 +164,6 @@ def _position_sections(comparison: Comparison) -> list[Section]:
     return [Section("Clearance and shaft centre locus", panels=panels, tables=tables)]
 
 
-#: The picture of the first screen: the coefficient of the loaded direction.
-_LEAD = "kyy-over-"
 #: Loads at which pivot stiffness is tabled [N].
 _PIVOT_LOADS = (2000.0, 4000.0)
 
@@ -205,29 +199,28 @@ def _predicted_table(frame: pd.DataFrame) -> Table:
     return Table("Predicted", columns, rows)
 
 
-def _flag_table(comparison: Comparison) -> Table:
-    """Every flag of points, pivot curves, polygon and locus, in plain words; what says the same stands in one row."""
-    found: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
-    for place, conditions in _flagged(comparison):
-        for condition in conditions:
-            places, details = found.setdefault((str(condition), condition.meaning), ([], []))
-            places.append(place)
-            if condition.detail and condition.detail not in details:
-                details.append(condition.detail)
-    rows = [[*flag, "; ".join(places), "; ".join(details)] for flag, (places, details) in found.items()]
-    return Table("Flags", ["flag", "what it means", "where", "found"], rows)
+def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:
+    """Flags in plain words; what says the same stands in one row."""
+    columns = ["flag", "what it means", "where", "found"]
+    cells = [(str(flag), flag.meaning, place, flag.detail) for place, flag in flagged]
+    rows = []
+    for key, places in pd.DataFrame(cells, columns=columns).groupby(columns[:2], sort=False):
+        details = filter(None, places["found"].unique())
+        rows.append([*map(str, key), "; ".join(places["where"]), "; ".join(details)])
+    return Table("Flags", columns, rows)
 
 
-def _flagged(comparison: Comparison) -> list[tuple[str, Sequence[Condition]]]:
-    """What can have flags, and its flags."""
+def _flagged(comparison: Comparison) -> list[tuple[str, Condition]]:
+    """Every flag of points, pivot curves, polygon and locus, and where it stands."""
     identified = comparison.identification
     labels = point_labels(points_table(identified.points))
     parts: list[tuple[str, Sequence[Condition]]] = []
     parts += [(place, p.quality) for place, p in zip(labels, identified.points, strict=True)]
     parts.append(("campaign", identified.conditions))
     parts += [(f"pivot of pad #{c.pad}", c.status) for c in comparison.curves]
-    tests = (("clearance", comparison.clearance), ("locus", comparison.locus))
-    return parts + [(name, test.status) for name, test in tests if test is not None]
+    tests = {"clearance": comparison.clearance, "locus": comparison.locus}
+    parts += [(name, test.status) for name, test in tests.items() if test is not None]
+    return [(place, condition) for place, conditions in parts for condition in conditions]
 
 
 def pivot_stiffness_table(curves: Sequence[PivotCurve], formula: Formula | None, loads: Sequence[float]) -> Table:

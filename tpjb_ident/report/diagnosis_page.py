@@ -225,9 +225,7 @@ def write_diagnosis_report(
     table = before_and_after(result.diagnosis, result.identification)
     answer, *more = verdict_sentences(campaign.id, verdict, median_deviations(table))
     points = () if result.identification is None else result.identification.points
-    coefficients = coefficient_panels(table) if len(table) else []
     worst = next((d.observable for d in verdict.disagreement if d.observable[0] in "kc"), "kyy")
-    lead = next((p for p in coefficients if p.name.startswith(worst)), None)
     page = Page(
         title=f"{campaign.id}: what the model lacks",
         subtitle=campaign.description,
@@ -236,12 +234,12 @@ def write_diagnosis_report(
         facts=tested_facts(campaign, result.setup.bearing, points),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)),
-        picture=lead,
+        lead=worst,
         then=then,
         key_table=Table(_EFFECTS, ["effect", "parameter", "value"], parameter_rows(verdict))
         if verdict.effects
         else _gap_table(verdict),
-        sections=_sections(result, [p for p in coefficients if p is not lead]),
+        sections=_sections(result, coefficient_panels(table) if len(table) else []),
         settings=settings,
         inputs=inputs,
     )

@@ -45,7 +45,7 @@ def write_difference_report(
         facts=_facts(difference) | set_points(list(points[list(POINT_KEY)].itertuples(index=False, name=None))),
         values=_values_table(difference) if len(points) else None,
         flags=flags_line([_flags(points)], len(points)),
-        picture=panel("difference", _TITLE, _drawn, "", points) if len(points) else None,
+        lead="difference",
         answer=answer,
         more=more,
         then=then,
@@ -94,7 +94,8 @@ def _sections(difference: Difference) -> list[Section]:
     points = difference.points
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
-        sections.append(Section("Coefficients", tables=tables))
+        panels = [panel("difference", _TITLE, _drawn, "", points)]
+        sections.append(Section("Coefficients", panels=panels, tables=tables))
     if not difference.pivots.empty:
         rows = [
             _row(row, TANGENT, "stiffness", significant(row["force_N"] * per("load"), ".3g"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import datetime
+import functools
 import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -68,13 +69,19 @@ class Page:
     key_table: Table | None = None
     values: Table | None = None  #: K and C at one point
     flags: str = ""
-    picture: Panel | None = None
+    lead: str = ""  #: what the name of the panel on the first screen begins with
     then: str = ""
     sections: Sequence[Section] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     refresh: int = 0
     beside: str = "Figures are beside this file as SVG and PNG, tables as CSV and Parquet."
+
+    @functools.cached_property
+    def picture(self) -> Panel | None:
+        """The panel of the first screen; its section does without it."""
+        panels = [panel for section in self.sections for panel in section.panels]
+        return next((panel for panel in panels if self.lead and panel.name.startswith(self.lead)), None)
 
 
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
@@ -104,8 +111,8 @@ def render_page(page: Page, svg: Mapping[str, str]) -> str:
 
 def panels_of(page: Page) -> list[Panel]:
     """All panels of a page, that of its first screen first."""
-    first = [] if page.picture is None else [page.picture]
-    return [*first, *(panel for section in page.sections for panel in section.panels)]
+    panels = [panel for section in page.sections for panel in section.panels]
+    return sorted(panels, key=lambda panel: panel is not page.picture)
 
 
 def _css_text(text: str) -> markupsafe.Markup:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.report.drawing.picture import BLUE, FONT_SIZE, INK, RULE
+from tpjb_ident.report.drawing.picture import BLUE, INK, label, new_pictures
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
@@ -92,51 +92,37 @@ def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
 
 #: A picture of more channels could not be read.
 _MOST = 24
-_ROW, _WIDTH = 1.15, 9.0
+_ROW, _WIDTH = 1.35, 4.6
 _POINTS = 4000
 
 
 def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    return panel("quick-look", title, _quick_look, "", title, series, looks)
+    return panel("quick-look", title, _quick_look, "", title, list(series)[:_MOST], looks)
 
 
 def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
-    shown = list(series)[:_MOST]
-    height = _ROW * len(shown) + 0.9
-    figure = Figure(figsize=(_WIDTH, height))
-    figure.suptitle(printable(title), fontsize=FONT_SIZE + 1, color=INK, y=1.0 - 0.15 / height)
-    for i, channel in enumerate(shown):
-        bottom = 1.0 - (0.45 + _ROW * (i + 1) - 0.12) / height
-        size = (_ROW - 0.32) / height
-        last = i == len(shown) - 1
-        time_axes = figure.add_axes((0.11, bottom, 0.42, size))
-        spectrum_axes = figure.add_axes((0.62, bottom, 0.36, size))
-        _time(time_axes, channel)
+    figure, grid = new_pictures(len(series), 2, title=printable(title), width=_WIDTH, height=_ROW)
+    for (over_time, spectrum), channel in zip(grid, series, strict=True):
+        label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
+        label(spectrum, "frequency, Hz", "")
+        _draw_time(over_time, channel)
         look = looks[channel.name]
-        if len(look.amplitude) > 4:
-            spectrum_axes.semilogy(
-                look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7
-            )
-        name = ", ".join(filter(None, (channel.name, channel.unit)))
-        time_axes.set_ylabel(printable(name), fontsize=FONT_SIZE - 1, color=INK)
-        for axes, label in ((time_axes, "time, s"), (spectrum_axes, "frequency, Hz")):
-            axes.tick_params(labelsize=FONT_SIZE - 2, colors=INK)
-            axes.grid(True, color=RULE, linewidth=0.5)
+        spectrum.plot(look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
+        spectrum.set_yscale("log")
+        over_time.locator_params(axis="y", nbins=3)
+        spectrum.yaxis.get_major_locator().set_params(numticks=4)
+        for axes in (over_time, spectrum):
             axes.margins(x=0.0)
-            axes.yaxis.get_major_locator().set_params(**({"nbins": 3} if axes is time_axes else {"numticks": 4}))
-            if last:
-                axes.set_xlabel(label, fontsize=FONT_SIZE - 1, color=INK)
     return figure
 
 
-def _time(axes: Axes, series: Series) -> None:
+def _draw_time(axes: Axes, series: Series) -> None:
     time = np.arange(len(series), dtype=float) if series.time is None else series.time
     step = max(1, len(series) // _POINTS)
-    if step == 1:
-        axes.plot(time, series.values, color=INK, linewidth=0.6)
-        return
     count = len(series) // step
     blocks = np.ma.masked_invalid(series.values[: count * step].reshape(count, step))
-    ends = time[: count * step : step]
-    axes.fill_between(ends, blocks.min(axis=1), blocks.max(axis=1), color=INK, linewidth=0.4)
+    if step == 1:
+        axes.plot(time, blocks[:, 0], color=INK, linewidth=0.6)
+    else:
+        axes.fill_between(time[: count * step : step], blocks.min(axis=1), blocks.max(axis=1), color=INK, linewidth=0.4)

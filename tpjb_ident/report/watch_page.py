@@ -42,7 +42,7 @@ def write_watch_page(
     """Write ``watch.html``, whole or not at all, with its figures inside; `then` comes after the last run."""
     answer, *more = [step.text for step in snapshot.steps] or ["Nothing to do: records are being written."]
     landed = snapshot.count("good", "look", "repeat", "replaced")
-    points, panels = [p for p in snapshot.measured.points if not lacking(p)], _panels(snapshot)
+    points = [p for p in snapshot.measured.points if not lacking(p)]
     page = Page(
         title=f"{snapshot.campaign.id}: while it is measured",
         subtitle=f"{landed} of {len(snapshot.states)} runs have landed, {snapshot.count('repeat')} to be repeated, "
@@ -53,9 +53,9 @@ def write_watch_page(
         key_table=coverage_table(snapshot),
         values=values_table(points),
         flags=flags_line([p.quality for p in points], len(points)) if points else "",
-        picture=panels[0] if panels else None,
+        lead="k-over-",
         then="" if snapshot.count("to run", "being written") else then,
-        sections=_sections(snapshot, panels[1:]),
+        sections=_sections(snapshot),
         settings=settings,
         inputs=snapshot.hashes,
         refresh=refresh,
@@ -89,14 +89,14 @@ def _group(status: RunStatus) -> str:
     return f"{set_point}, excited at {p.excitation_hz:g} Hz"
 
 
-def _sections(snapshot: Snapshot, panels: Sequence[Panel]) -> list[Section]:
+def _sections(snapshot: Snapshot) -> list[Section]:
     notes = [*snapshot.lacks, *(str(p) for p in snapshot.problems)]
     sections = [Section("What the plan leaves out, and remarks", notes=notes)] if notes else []
     measured = snapshot.measured
     if measured.points or measured.refusals:
         note = "From the good runs so far. They change while runs come in; tpjb identify has the last word."
         tables = [points_table(measured.points)] if measured.points else []
-        sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], panels, tables))
+        sections.append(Section("Stiffness and damping so far", [note, *measured.refusals], _panels(snapshot), tables))
     if measured.curves:
         rows = [
             [f"#{c.pad}", significant(c.valid_to * per("load"), ".3g"), stiffness_cell(c, c.valid_to)]
