@@ -15,13 +15,13 @@ from model.predict import predict
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.predictions import (
     ModelSettings,
-    PointPrediction,
     predict_points,
-    prediction_frame,
+    pressed_beyond,
     printed_formula,
 )
 from tpjb_ident.compare.rig_from_model import erring_instruments, rig_truth
 from tpjb_ident.compare.summary import _extrapolation_sentence
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 HZ = 2 * math.pi
 DOWN = -math.pi / 2
@@ -36,29 +36,33 @@ def point(load, excitation, direction=DOWN):
     return OperatingPoint(load, direction, 22 * HZ, excitation * HZ)
 
 
+def coefficients(row):
+    """K and C of a row of ``prediction.csv``."""
+    return np.array([row[name] for name in COEFFICIENT_COLUMNS]).reshape(2, 2, 2)
+
+
 def test_order_is_kept_and_each_point_equals_a_prediction_of_its_own(bearing):
     points = [point(5000.0, 25.0), point(2500.0, 25.0), point(5000.0, 10.0)]
     settings = ModelSettings("kirk", "isothermal")
     seen = []
     found = predict_points(bearing, points, settings, lambda text, done, total: seen.append((done, total)))
-    assert [p.point for p in found] == points
+    assert [(row["static_load_N"], row["excitation_Hz"]) for row in found] == [(5e3, 25.0), (2.5e3, 25.0), (5e3, 10.0)]
     assert seen == [(1, 2), (2, 2)]
-    for one in found:
-        alone = predict(bearing, one.point.static_load, DOWN, 22 * HZ, one.point.excitation, thermal="isothermal")
-        for values, matrix in zip(one.values.reshape(2, 2, 2), (alone.k, alone.c), strict=True):
+    for row, p in zip(found, points, strict=True):
+        alone = predict(bearing, p.static_load, DOWN, 22 * HZ, p.excitation, thermal="isothermal")
+        for values, matrix in zip(coefficients(row), (alone.k, alone.c), strict=True):
             assert np.allclose(values, matrix, rtol=1e-4, atol=1e-4 * abs(matrix[1, 1]))
 
 
 def test_no_excitation_means_synchronous(bearing):
     settings = ModelSettings("rigid", "isothermal")
     none, given = predict_points(bearing, [point(3000.0, 0.0), point(3000.0, 22.0)], settings)
-    assert np.array_equal(none.values, given.values)
-    assert prediction_frame([none])["excitation_Hz"].tolist() == [22.0]
+    assert none == given
+    assert none["excitation_Hz"] == 22.0
 
 
 def test_prediction_table_adds_up(bearing):
-    frame = prediction_frame(predict_points(bearing, [point(4000.0, 25.0)], ModelSettings("kirk", "isothermal")))
-    row = frame.iloc[0]
+    (row,) = predict_points(bearing, [point(4000.0, 25.0)], ModelSettings("kirk", "isothermal"))
     pads = [row[f"pad{k}_load_N"] for k in range(1, 6)]
     vertical = -sum(load * math.sin(pad.pivot_angle) for load, pad in zip(pads, bearing.pads, strict=True))
     # film forces carry the load; the rest is what the tilted pads' shear arms leave out
@@ -80,9 +84,10 @@ def test_printed_formula_gives_secant_and_tangent(bearing):
 def test_rig_and_model_agree_on_what_stands_in_series(bearing):
     soft = ModelSettings("kirk", "isothermal", (Effect("housing_flexibility", stiffness=4e8),))
     truth = rig_truth(bearing, soft)
-    (predicted,) = predict_points(bearing, [point(5000.0, 25.0)], soft)
-    assert np.allclose(truth.h(point(5000.0, 25.0)), predicted.prediction.h[0], rtol=1e-6)
-    assert np.allclose(truth.centre(point(5000.0, 0.0)), predicted.prediction.position, rtol=1e-6, atol=1e-12)
+    (row,) = predict_points(bearing, [point(5000.0, 25.0)], soft)
+    k, c = coefficients(row)
+    assert np.allclose(truth.h(point(5000.0, 25.0)), k + 25j * HZ * c, rtol=1e-6)
+    assert np.allclose(truth.centre(point(5000.0, 0.0)), [row["x_m"], row["y_m"]], rtol=1e-6, atol=1e-12)
     plain = rig_truth(bearing, ModelSettings("kirk", "isothermal"))
     load = np.array([1000.0, 4000.0])
     assert np.allclose(truth.deflection(1, load) - plain.deflection(1, load), load / 4e8)
@@ -110,8 +115,7 @@ def test_thermal_growth_is_not_seen_by_the_cold_clearance(bearing):
 @pytest.mark.parametrize(("loads", "beyond"), [((4e3, 4e3), False), ((4e3, 12e3), True)])
 def test_a_prediction_says_where_a_pivot_is_pressed_harder_than_in_its_dry_test(loads, beyond):
     laws = (SimpleNamespace(valid_to=5000.0), SimpleNamespace(valid_to=4800.0))
-    prediction = SimpleNamespace(setup=SimpleNamespace(pivots=laws), pad_load=np.array(loads))
-    assert PointPrediction(None, prediction, 0).extrapolated == beyond
+    assert pressed_beyond(laws, loads) == beyond
 
 
 def test_the_summary_says_where_pivots_are_pressed_harder_than_in_their_dry_tests():

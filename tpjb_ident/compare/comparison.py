@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +17,11 @@ from rigdata.operating_point import OperatingPoint
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.predictions import (
     ModelSettings,
-    PointPrediction,
     Progress,
     beside_measured,
     counted_twice,
     measured_laws,
     predict_points,
-    prediction_frame,
 )
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.presentation import Presented, changed
@@ -40,8 +38,8 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
-#: Of every pivot model, by operating point.
-Predictions = dict[str, dict[OperatingPoint, PointPrediction]]
+#: Rows of `predict_points` of every pivot model, by operating point.
+Predictions = dict[str, dict[OperatingPoint, dict[str, Any]]]
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
 _DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
@@ -223,6 +221,8 @@ def compare_campaign(
     >>> len(comparison.identification.points), list(comparison.predictions)
     (7, ['rigid'])
     """
+    import pandas as pd
+
     from tpjb_ident.identification.identify import identify
     from tpjb_ident.identification.settings import IdentifySettings
 
@@ -239,7 +239,7 @@ def compare_campaign(
     if ahead is None or not all(predicted.keys() >= set(points) for predicted in ahead[1].values()):
         ahead = model_side(campaign, bearing, settings, points, report)
     static, predictions = ahead
-    frames = {name: predicted_frame(predicted[p] for p in points) for name, predicted in predictions.items()}
+    frames = {name: pd.DataFrame([rows[p] for p in points]) for name, rows in predictions.items()}
     return Comparison(
         campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, frames,
         _loci(static, predictions), _remarks(settings, static, bearing),
@@ -269,15 +269,9 @@ def model_side(
     for name in names:
         pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
         model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
-        predicted = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
-        predictions[name] = {p.point: p for p in predicted}
+        rows = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
+        predictions[name] = dict(zip(wanted, rows, strict=True))
     return static, predictions
-
-
-def predicted_frame(predictions: Iterable[PointPrediction]) -> pd.DataFrame:
-    """Rows of ``prediction.csv`` with whether a pivot was pressed harder than in its dry test."""
-    listed = list(predictions)
-    return prediction_frame(listed).assign(pivot_extrapolated=[p.extrapolated for p in listed])
 
 
 def _stations(static: StaticTests) -> list[OperatingPoint]:
@@ -344,9 +338,9 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     if static.locus is None:
         return None
     frames = []
-    for name, predicted in predictions.items():
+    for name, rows in predictions.items():
         frame = static.locus.to_frame()
-        places = np.array([predicted[point].prediction.position for point in _stations(static)])
+        places = np.array([(rows[point]["x_m"], rows[point]["y_m"]) for point in _stations(static)])
         if static.clearance is None:
             places += (frame[["x_m", "y_m"]] - places).mean().to_numpy()
         frame.insert(0, "pivots", name)

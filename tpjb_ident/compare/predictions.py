@@ -23,8 +23,6 @@ from tpjb_ident.errors import BadInputError
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from tpjb_ident.pivot import PivotCurve
 
 
@@ -86,33 +84,13 @@ class ModelSettings:
     options: Options = field(default_factory=Options)
 
 
-@dataclass(frozen=True)
-class PointPrediction:
-    """One operating point, and where in a prediction over several frequencies it stands."""
-
-    point: OperatingPoint
-    prediction: Prediction = field(repr=False)
-    index: int
-
-    @property
-    def values(self) -> np.ndarray:
-        """(8,) kxx .. kyy [N/m], cxx .. cyy [N s/m]."""
-        return np.stack([self.prediction.k[self.index], self.prediction.c[self.index]]).ravel()
-
-    @property
-    def extrapolated(self) -> bool:
-        """Whether a pad that carries presses its pivot harder than the dry test did."""
-        loads = zip(self.prediction.setup.pivots, self.prediction.pad_load, strict=True)
-        return any(load > getattr(law, "valid_to", np.inf) for law, load in loads)
-
-
 def predict_points(
     bearing: Bearing,
     points: Iterable[OperatingPoint],
     settings: ModelSettings | None = None,
     progress: Progress | None = None,
-) -> tuple[PointPrediction, ...]:
-    """Predict every operating point."""
+) -> list[dict[str, Any]]:
+    """Predict every operating point: rows of ``prediction.csv``, and whether a pivot is pressed beyond its dry test."""
     settings = settings or ModelSettings()
     wanted = tuple(points)
     bearing = as_it_turns(bearing, {point.rotation for point in wanted})
@@ -141,7 +119,7 @@ def predict_points(
         found[static] = prediction
         if progress is not None:
             progress(f"{static.static_load / 1e3:g} kN", done + 1, len(groups))
-    return tuple(PointPrediction(p, found[_static(p)], groups[_static(p)].index(_excitation(p))) for p in wanted)
+    return [_row(p, found[_static(p)], groups[_static(p)].index(_excitation(p))) for p in wanted]
 
 
 def _excitation(point: OperatingPoint) -> float:
@@ -158,18 +136,10 @@ def point_columns(point: OperatingPoint) -> dict[str, float | str]:
     return dict(zip(POINT_KEY, excited.key, strict=True))
 
 
-def prediction_frame(predictions: Sequence[PointPrediction]) -> pd.DataFrame:
-    """Build prediction.csv: one row per operating point."""
-    import pandas as pd
-
-    return pd.DataFrame([prediction_row(prediction) for prediction in predictions])
-
-
-def prediction_row(point_prediction: PointPrediction) -> dict[str, Any]:
-    """A row of `prediction_frame`, for a process that loads no pandas."""
-    p = point_prediction.prediction
-    row: dict[str, Any] = dict(point_columns(point_prediction.point))
-    row.update(zip(COEFFICIENT_COLUMNS, point_prediction.values, strict=True))
+def _row(point: OperatingPoint, p: Prediction, index: int) -> dict[str, Any]:
+    """Row of one point, of whose frequencies in a prediction it is the one of this index."""
+    row: dict[str, Any] = dict(point_columns(point))
+    row.update(zip(COEFFICIENT_COLUMNS, np.stack([p.k[index], p.c[index]]).ravel(), strict=True))
     row.update(x_m=p.position[0], y_m=p.position[1])
     for number in range(1, len(p.pad_load) + 1):
         row.update(_pad_columns(p, number))
@@ -186,8 +156,14 @@ def prediction_row(point_prediction: PointPrediction) -> dict[str, Any]:
         idle_pads=" ".join(str(n) for n in p.idle_pads),
         mesh_error=p.mesh_error,
         status="; ".join(p.status),
+        pivot_extrapolated=pressed_beyond(p.setup.pivots, p.pad_load),
     )
     return row
+
+
+def pressed_beyond(pivots: Sequence[PivotLaw], loads: Iterable[float]) -> bool:
+    """Whether a pad presses its pivot harder than the dry test of its law did."""
+    return any(load > getattr(law, "valid_to", math.inf) for law, load in zip(pivots, loads, strict=True))
 
 
 def _pad_columns(p: Prediction, number: int) -> dict[str, float]:

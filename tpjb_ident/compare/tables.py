@@ -26,7 +26,6 @@ from tpjb_ident.compare.comparison import (
     CompareSettings,
     Comparison,
     possible_variants,
-    predicted_frame,
 )
 from tpjb_ident.compare.predictions import ModelSettings, predict_points
 from tpjb_ident.condition_kinds import KINDS
@@ -59,7 +58,7 @@ def compare_table(
         names, remarks = possible_variants(settings.variants, (), bearing)
         for name in names:
             model = ModelSettings(name, settings.thermal, settings.effects)
-            frames[name] = predicted_frame(predict_points(bearing, points, model, progress))
+            frames[name] = pd.DataFrame(predict_points(bearing, points, model, progress))
     cells = zip(points, rows[VALUES].to_numpy(), rows[ERRORS].to_numpy(), rows["status"], strict=True)
     results = tuple(_point(*row) for row in cells)
     identification = Identification(path.stem, _METHOD, results, np.zeros((1, 8 * len(points))))

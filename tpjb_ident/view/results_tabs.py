@@ -11,7 +11,7 @@ import numpy as np
 
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.columns import amount, per, size, symbol
-from tpjb_ident.compare.comparison import joined, predicted_frame
+from tpjb_ident.compare.comparison import joined
 from tpjb_ident.compare.predictions import ModelSettings, point_columns, predict_points
 from tpjb_ident.conditions import untrusted
 from tpjb_ident.report.comparison_page import deviations_table, measured_table
@@ -147,5 +147,5 @@ def _compared(session: Session, points: Sequence[OperatingPoint], measured: pd.D
     places = pd.DataFrame([point_columns(point) for point in points]).round(digits)
     predictions = {}
     for name, pivots in session.pivots.items():
-        predictions[name] = predicted_frame(predict_points(session.bearing, points, ModelSettings(pivots)))
+        predictions[name] = pd.DataFrame(predict_points(session.bearing, points, ModelSettings(pivots)))
     return joined(places.merge(measured.round(digits), how="left", on=list(POINT_KEY)), predictions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from model.bearing import Bearing
     from model.options import Options
     from rigdata.operating_point import OperatingPoint
-    from tpjb_ident.compare.predictions import ModelSettings, Progress
+    from tpjb_ident.compare.predictions import ModelSettings
 
 #: Points that take less time than pandas to load.
 FEW = 20
@@ -99,27 +99,21 @@ def predict(
 
 def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings) -> pd.DataFrame:
     """Table of all points; a few are solved in a copy of this process while pandas loads here: 0.7 of the time."""
+    from tpjb_ident.compare.predictions import predict_points
+
     rows = None
     if len(points) <= FEW and forks():
-        with background_job(_rows, bearing, points, settings) as job, c.progress("predicting"):
+        with background_job(predict_points, bearing, points, settings) as job, c.progress("predicting"):
             import pandas as pd
             import pyarrow.parquet  # noqa: F401  (what the table is written with)
 
             rows = job()
     if rows is None:
         with c.progress("predicting") as show:
-            rows = _rows(bearing, points, settings, show)
+            rows = predict_points(bearing, points, settings, show)
     import pandas as pd
 
-    return pd.DataFrame(rows)
-
-
-def _rows(
-    bearing: Bearing, points: list[OperatingPoint], settings: ModelSettings, show: Progress | None = None
-) -> list[dict[str, Any]]:
-    from tpjb_ident.compare.predictions import predict_points, prediction_row
-
-    return [prediction_row(prediction) for prediction in predict_points(bearing, points, settings, show)]
+    return pd.DataFrame(rows).drop(columns="pivot_extrapolated")
 
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
