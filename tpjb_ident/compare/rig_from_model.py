@@ -51,18 +51,49 @@ def rig_truth(bearing: Bearing, settings: ModelSettings, bearing_text: str = "")
 
 
 def truth_of(setup: Setup, bearing_text: str = "") -> RigTruth:
-    """Give a set-up's physics to the virtual rig."""
-    solved = _SolvedSetup(setup)
+    """Give a set-up's physics to the virtual rig; each static point is solved once."""
+    pads, structure = setup.bearing.pads, setup.structure
+    solve = functools.lru_cache(maxsize=4096)(functools.partial(_solved, setup))
+
+    def at(point: OperatingPoint) -> Prediction:
+        return solve(replace(point, excitation=0.0))
+
+    def stiffness(point: OperatingPoint) -> ComplexArray:
+        seen = seen_by_shaft(setup, point.spin)
+        return bearing_impedance(seen, at(point).equilibrium, np.array([point.excitation]))[0]
+
+    def position(point: OperatingPoint) -> FloatArray:
+        # what stands in series with the bearing gives way under the static load too
+        return at(point).bearing_position + structure @ load_vector(point)
+
+    def temperature(point: OperatingPoint) -> FloatArray:
+        backward = runs_backward(setup.bearing, point.spin)
+        return at(point).pad_temperature(1.0 - _SENSOR_POSITION if backward else _SENSOR_POSITION)
+
+    def deflection(pad: int, load: Any) -> FloatArray:
+        law, towards = setup.pivots[pad - 1], directions(pads[pad - 1].pivot_angle)
+        of_pivot = [law.deflection(float(force)) for force in load]
+        return np.array(of_pivot) + float(towards @ structure @ towards) * np.asarray(load)
+
     return RigTruth(
-        stiffness=solved.stiffness,
-        position=solved.position,
-        temperature=solved.temperature,
-        pivot_deflection=solved.pivot_deflection,
-        pivot_angles=tuple(pad.pivot_angle for pad in setup.bearing.pads),
-        clearance=tuple(pad.assembled_clearance for pad in setup.bearing.pads),
+        stiffness=stiffness,
+        position=position,
+        temperature=temperature,
+        pivot_deflection=deflection,
+        pivot_angles=tuple(pad.pivot_angle for pad in pads),
+        clearance=tuple(pad.assembled_clearance for pad in pads),
         bearing_name="bearing.toml",
         bearing_text=bearing_text,
     )
+
+
+def _solved(setup: Setup, static: OperatingPoint) -> Prediction:
+    point = static.static_load, static.static_load_direction, static.spin, static.shaft_speed
+    prediction = predict_setup(setup, *point)
+    if not prediction.converged:
+        reasons = "; ".join(prediction.status)
+        raise ModelConvergenceError(f"the model finds no equilibrium at {static} ({reasons}). Leave that point out.")
+    return prediction
 
 
 def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> Instruments:
@@ -72,41 +103,3 @@ def erring_instruments(instruments: Instruments, effects: Iterable[Effect]) -> I
             argument, parameter = INSTRUMENT_ERRORS[effect.name]
             instruments = instruments.with_errors(**{argument: effect.parameters[parameter]})
     return instruments
-
-
-class _SolvedSetup:
-    """Answers of one set-up, each static point solved once."""
-
-    def __init__(self, setup: Setup) -> None:
-        self.setup = setup
-        self.solve = functools.lru_cache(maxsize=4096)(self._solve)
-
-    def _solve(self, static: OperatingPoint) -> Prediction:
-        setup, speed = self.setup, static.spin
-        prediction = predict_setup(setup, static.static_load, static.static_load_direction, speed, static.shaft_speed)
-        if not prediction.converged:
-            place = f"{static.static_load:g} N, {static.static_load_direction_deg:g} deg, {static.shaft_speed_hz:g} Hz"
-            why = "; ".join(prediction.status)
-            raise ModelConvergenceError(f"the model finds no equilibrium at {place} ({why}). Leave that point out.")
-        return prediction
-
-    def _at(self, point: OperatingPoint) -> Prediction:
-        return self.solve(replace(point, excitation=0.0))
-
-    def stiffness(self, point: OperatingPoint) -> ComplexArray:
-        setup, equilibrium = seen_by_shaft(self.setup, point.spin), self._at(point).equilibrium
-        return bearing_impedance(setup, equilibrium, np.array([point.excitation]))[0]
-
-    def position(self, point: OperatingPoint) -> FloatArray:
-        # what stands in series with the bearing gives way under the static load too
-        return self._at(point).bearing_position + self.setup.structure @ load_vector(point)
-
-    def temperature(self, point: OperatingPoint) -> FloatArray:
-        backward = runs_backward(self.setup.bearing, point.spin)
-        return self._at(point).pad_temperature(1.0 - _SENSOR_POSITION if backward else _SENSOR_POSITION)
-
-    def pivot_deflection(self, pad: int, load: Any) -> FloatArray:
-        law, angle = self.setup.pivots[pad - 1], self.setup.bearing.pads[pad - 1].pivot_angle
-        towards = directions(angle)
-        structure = float(towards @ self.setup.structure @ towards)
-        return np.array([law.deflection(float(w)) for w in load]) + structure * np.asarray(load)

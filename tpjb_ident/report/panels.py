@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.picture import BLUE, INK, label, new_pictures
@@ -111,7 +112,8 @@ def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look])
         spectrum.plot(look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
         spectrum.set_yscale("log")
         over_time.locator_params(axis="y", nbins=3)
-        spectrum.yaxis.get_major_locator().set_params(numticks=4)
+        spectrum.yaxis.set_major_locator(LogLocator(numticks=4))
+        spectrum.minorticks_off()
         for axes in (over_time, spectrum):
             axes.margins(x=0.0)
     return figure
