@@ -27,9 +27,7 @@ class Difference:
 
     file: str
     state: str  #: same | numbers | differs | not judged | missing | new
-    size: float = (
-        0.0  #: largest difference of two numbers: relative, or of the interval's half width where there is one
-    )
+    size: float = 0.0  #: largest difference of two numbers: relative, or of their interval's half width
     where: str = ""
 
     @property
@@ -45,33 +43,18 @@ def compared(first: Path, second: Path, file: str, tolerance: float) -> Differen
         return Difference(file, "missing" if old.is_file() else "new")
     if old.read_bytes() == new.read_bytes():
         return Difference(file, "same")
-    before, now = _content(old), _content(new)
-    if before is None:
+    before, now = (dict(_values(_content(path))) for path in (old, new))
+    if "" in before:  # no values with places
         return Difference(file, "not judged")
     size, where = 0.0, ""
-    for place, a, b, width in _pairs(before, now):
-        off = _off(a, b, width)
-        if off > size:
+    for place in before | now:
+        a, b = before.get(place), now.get(place)
+        if (off := _off(a, b, _half_width(before, place))) > size:
             size, where = off, f"{place}: {_shown(a)}, now {_shown(b)}"
     return Difference(file, "differs" if size > tolerance else "numbers", size, where)
 
 
-def _shown(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]
-
-
-def _off(a: object, b: object, width: float) -> float:
-    """Difference of two values over their size or, where that is larger, half the width of their interval."""
-    if not (isinstance(a, int | float) and isinstance(b, int | float) and bool not in (type(a), type(b))):
-        return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
-    if a == b or (math.isnan(a) and math.isnan(b)):
-        return 0.0
-    scale = max(abs(a), abs(b), width if math.isfinite(width) else 0.0, _LEAST_SCALE)
-    off = abs(a - b) / scale
-    return off if math.isfinite(off) else math.inf
-
-
-def _content(path: Path) -> Any | None:
+def _content(path: Path) -> Any:
     """A file as plain data; None where only bytes can be compared."""
     if path.suffix == ".csv" and path.stem in TABLES:
         rows = read_table(path).to_dict("records")
@@ -80,20 +63,33 @@ def _content(path: Path) -> Any | None:
     return None if parse is None else parse(path.read_text("utf-8"))
 
 
-def _pairs(old: Any, new: Any, place: str = "", width: float = 0.0) -> Iterator[tuple[str, Any, Any, float]]:
-    """Values of two files that belong together, with their place and half the width of their interval."""
-    if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
-        for key in old:
-            if key not in _ASIDE:
-                yield from _pairs(old[key], new[key], f"{place}.{key}" if place else str(key), _half_width(old, key))
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for index, (a, b) in enumerate(zip(old, new, strict=True)):
-            yield from _pairs(a, b, f"{place}[{index}]")
-    else:
-        yield place, old, new, width
+def _values(content: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value of a document with its place."""
+    if not isinstance(content, dict | list):
+        yield place, content
+        return
+    parts = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in parts:
+        if key not in _ASIDE:
+            yield from _values(value, f"{place}.{key}".lstrip("."))
 
 
-def _half_width(values: dict[str, Any], name: str) -> float:
-    base = name.removesuffix("_lo").removesuffix("_hi")
+def _off(a: object, b: object, width: float) -> float:
+    """Difference of two values over their size or, where that is larger, half the width of their interval."""
+    if not (isinstance(a, int | float) and isinstance(b, int | float) and bool not in (type(a), type(b))):
+        return 0.0 if (a, type(a)) == (b, type(b)) else math.inf
+    if a == b or (math.isnan(a) and math.isnan(b)):
+        return 0.0
+    off = abs(a - b) / max(abs(a), abs(b), width, _LEAST_SCALE)
+    return off if math.isfinite(off) else math.inf
+
+
+def _half_width(values: dict[str, Any], place: str) -> float:
+    base = place.removesuffix("_lo").removesuffix("_hi")
     low, high = values.get(f"{base}_lo"), values.get(f"{base}_hi")
-    return 0.5 * (high - low) if isinstance(low, float) and isinstance(high, float) else 0.0
+    width = high - low if isinstance(low, float) and isinstance(high, float) else 0.0
+    return 0.5 * width if math.isfinite(width) else 0.0
+
+
+def _shown(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)[:60]

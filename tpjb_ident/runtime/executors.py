@@ -23,21 +23,20 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any
 
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.runtime.interrupts import interrupts_held
 from tpjb_ident.runtime.provenance import versions
-from tpjb_ident.runtime.threads import limit_threads, one_thread_each
+from tpjb_ident.runtime.threads import one_thread
 
 Task = Callable[..., Any]
 Job = tuple[Any, ...]
-#: Jobs handed out per worker before the first comes back: enough that nobody waits, few enough to cancel.
+#: Jobs handed out per worker before the first comes back: enough that nobody waits, few enough to be given up.
 _AHEAD = 4
 #: Losses in a row, without any job done between them, after which the workers are given up.
 _MAX_LOSSES = 3
@@ -59,8 +58,8 @@ class Outcome:
 
     def get(self) -> Any:
         """Return the value; warn as the job did and raise what it raised."""
-        for message, category, file, line in self.warned:
-            warnings.warn_explicit(message, category, file, line)
+        for warning in self.warned:
+            warnings.warn_explicit(*warning)
         if self.error is not None:
             raise self.error
         return self.value
@@ -77,13 +76,13 @@ class Workers:
         The task is one of a module, so that other processes find it. What is `shared` is every job's first argument; a
         worker unpacks it once, so a task must not change it.
         """
-        first = () if shared is None else (shared,)
+        call = _with_shared(task, shared)
         for index, job in enumerate(jobs):
-            try:
-                outcome = Outcome(task(*first, *job))
-            except Exception as error:  # whoever asked gets it from the outcome
-                outcome = Outcome(error=error)
-            yield index, outcome
+            yield index, Outcome(call(*job))
+
+
+def _with_shared(task: Task, shared: Any) -> Task:
+    return task if shared is None else functools.partial(task, shared)
 
 
 def map_ordered(workers: Workers, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[Any]:
@@ -102,87 +101,62 @@ class PoolWorkers(Workers):
 
     def __init__(self, opened: Callable[[], Executor], count: int, alive: Callable[[], bool] = lambda: True) -> None:
         self._opened, self.count, self._alive = opened, count, alive
-        self._executor: Executor | None = None
+        self.executor = opened()
 
     def submit(self, *call: Any) -> Future[Any]:
-        """Hand a call to the executor, which is opened for the first one."""
+        """Hand a call to the executor."""
         with interrupts_held():
-            if self._executor is None:
-                self._executor = self._opened()
-            return self._executor.submit(*call)
-
-    def close(self, wait: bool = True, at_once: bool = False) -> None:
-        """End the executor; with it the jobs that have not begun, and `at_once` those that have."""
-        executor, self._executor = self._executor, None
-        if isinstance(executor, ProcessPoolExecutor):
-            for process in list((executor._processes or {}).values()) if at_once else ():
-                process.terminate()
-            executor.shutdown(wait=wait, cancel_futures=True)
-        elif executor is not None and self._alive():  # others need not know that argument
-            executor.shutdown(wait=wait)
+            return self.executor.submit(*call)
 
     def outcomes(self, task: Task, jobs: Sequence[Job], shared: Any = None) -> Iterator[tuple[int, Outcome]]:
         """See `Workers`; raises `LostJobsError`."""
-        packed = None if shared is None else pickle.dumps(shared, protocol=5)
+        packed = pickle.dumps(_with_shared(task, shared), protocol=5)
         waiting = collections.deque(range(len(jobs)))
         flying: dict[Future[Outcome], int] = {}
         losses = 0
-        try:
-            while waiting or flying:
-                try:
-                    while waiting and len(flying) < _AHEAD * self.count:
-                        flying[self.submit(_attempt, task, packed, jobs[waiting[0]])] = waiting[0]
-                        waiting.popleft()
-                    for future in self._ended(flying):
-                        outcome = future.result()
-                        losses = 0
-                        yield flying.pop(future), outcome
-                except LostJobsError:
-                    raise
-                except Exception as error:  # every executor has its own way to say that a worker is gone
-                    losses += 1
-                    self._recover(error, losses, waiting, flying)
-        finally:
-            if flying and self._alive():
-                for future in flying:
-                    future.cancel()
+        while waiting or flying:
+            try:
+                while waiting and len(flying) < _AHEAD * self.count:
+                    future = self.submit(_attempt, packed, jobs[waiting[0]])
+                    flying[future] = waiting.popleft()
+                ended = wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done
+                for future in ended:
+                    outcome = future.result()
+                    losses = 0
+                    yield flying.pop(future), outcome
+            except Exception as error:  # every executor has its own way to say that a worker is gone
+                losses += 1
+                if losses == _MAX_LOSSES:
+                    raise LostJobsError(
+                        f"workers were lost {losses} times in a row, last with {type(error).__name__}: {error}. "
+                        "Is memory short? Use fewer workers, or look at the workers' own messages"
+                    ) from error
+                waiting.extendleft(sorted(self._lost(error, flying), reverse=True))
+                continue
+            if not ended and not self._alive():
+                raise LostJobsError("all workers are gone, and none came back. Start some again")
 
-    def _ended(self, flying: Iterable[Future[Outcome]]) -> set[Future[Outcome]]:
-        """Wait until a job ends."""
-        while not (done := wait(flying, timeout=_STALLED, return_when=FIRST_COMPLETED).done):
-            if not self._alive():
-                raise LostJobsError(f"all workers are gone, and none came back within {_STALLED:g} s. Start some again")
-        return done
-
-    def _recover(
-        self, cause: Exception, losses: int, waiting: collections.deque[int], flying: dict[Future[Outcome], int]
-    ) -> None:
-        """Have lost jobs wait for another attempt: a broken pool takes all its jobs with it."""
-        if losses >= _MAX_LOSSES:
-            raise LostJobsError(
-                f"workers were lost {losses} times in a row, last with {type(cause).__name__}: {cause}. "
-                "Is memory short? Use fewer workers, or look at the workers' own messages"
-            ) from cause
-        broken = isinstance(cause, BrokenExecutor)
-        lost = [future for future in flying if broken or future.cancelled() or (future.done() and future.exception())]
-        waiting.extendleft(sorted((flying.pop(future) for future in lost), reverse=True))
+    def _lost(self, error: Exception, flying: dict[Future[Outcome], int]) -> list[int]:
+        """Jobs that are to be tried again: a broken pool takes all of its jobs with it, and is replaced."""
+        broken = isinstance(error, BrokenExecutor)
         if broken:
-            self.close(wait=False)
+            self.executor = self._opened()
+        gone = [f for f in flying if broken or f.cancelled() or (f.done() and f.exception())]
+        return [flying.pop(future) for future in gone]
 
 
-def _attempt(task: Task, packed: bytes | None, job: Job) -> Outcome:
+def _attempt(packed: bytes, job: Job) -> Outcome:
     """Run a job on a worker; whatever it raises or warns of travels back as a value."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")  # the process that asked decides what a warning means
         try:
-            first = () if packed is None else (_unpacked(packed),)
-            value, error = task(*first, *job), None
-        except Exception as raised:  # as in `InProcessWorkers`
+            value, error = _unpacked(packed)(*job), None
+        except Exception as raised:  # whoever asked gets it from the outcome
             value, error = None, _portable(raised)
     return Outcome(value, error, tuple((str(w.message), w.category, w.filename, w.lineno) for w in caught))
 
 
-#: What all jobs share, unpacked once.
+#: The task and what all jobs share, unpacked once.
 _unpacked = functools.lru_cache(maxsize=1)(pickle.loads)
 
 
@@ -198,17 +172,18 @@ def _portable(error: Exception) -> Exception:
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it; the cores are shared already."""
+    """Leave Ctrl-C to the parent, and end with it; its memory is shared as long as no collector walks through it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy of the parent has its handler
-    limit_threads()
+    gc.freeze()
+    one_thread()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
-    parent.join()
+        parent.join()
     os._exit(1)  # nobody is left to hear of it
 
 
@@ -223,41 +198,28 @@ def cores() -> int:
     return len(affinity(0)) if affinity is not None else (os.cpu_count() or 1)
 
 
-def _start_method() -> str:
-    return "fork" if forks() else "spawn"  # a copy need not import anything again
+def _context(start: str | None = None) -> Any:
+    """What processes begin with: as copies of this one, which need not import anything again, where that can be."""
+    return multiprocessing.get_context(start or ("fork" if forks() else "spawn"))
 
 
 @contextmanager
 def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
-    """Open processes on this machine; one alone is this process itself."""
+    """Open processes on this machine, which end with the block; one alone is this process itself."""
     if count <= 1:
         yield Workers()
         return
-    method = start or _start_method()
-    context: Any = multiprocessing.get_context(method)
+    context = _context(start)
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
-    with one_thread_each(), _shared_memory(method == "fork"):
-        try:
-            if method == "fork":  # copies of a process are best made before it has threads, as a bar's
-                pool.submit(int).result()
-            yield pool
-        except BaseException:  # nobody waits for what its workers are still at
-            pool.close(at_once=True)
-            raise
-        pool.close()
-
-
-@contextmanager
-def _shared_memory(forked: bool) -> Iterator[None]:
-    """Copies of this process share its memory with it as long as nobody's garbage collector walks through all of it."""
-    ours = forked and not gc.get_freeze_count()  # what somebody else froze stays frozen
-    if ours:
-        gc.freeze()
     try:
-        yield
+        if context.get_start_method() == "fork":  # copies are best made before there are threads, as a bar's
+            pool.submit(int).result()
+        yield pool
     finally:
-        if ours:
-            gc.unfreeze()
+        processes: Any = getattr(pool.executor, "_processes", None) or {}
+        for process in list(processes.values()):  # nobody waits for what they are still at
+            process.terminate()
+        pool.executor.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -270,11 +232,11 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
     if cores() < 2:
         yield lambda: None
         return
-    context: Any = multiprocessing.get_context(_start_method())
+    context = _context()
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send_outcome, args=(sender, task, job))
+    process = context.Process(target=_send_outcome, args=(sender, pickle.dumps(task), job))
     try:
-        with one_thread_each(), interrupts_held():
+        with interrupts_held():
             process.start()
         sender.close()
         yield functools.cache(lambda: _received_value(receiver))
@@ -285,13 +247,13 @@ def background_job(task: Task, *job: Any) -> Iterator[Callable[[], Any | None]]:
         receiver.close()
 
 
-def _send_outcome(sender: Connection, task: Task, job: Job) -> None:
+def _send_outcome(sender: Any, packed: bytes, job: Job) -> None:
     _begin_worker()
     with suppress(ConnectionError):  # nobody waits for it any more
-        sender.send(_attempt(task, None, job))
+        sender.send(_attempt(packed, job))
 
 
-def _received_value(receiver: Connection) -> Any | None:
+def _received_value(receiver: Any) -> Any | None:
     try:
         outcome: Outcome = receiver.recv()
     except (EOFError, ConnectionError):
@@ -327,44 +289,34 @@ def dask_workers(address: str, patience: float = _PATIENCE) -> Iterator[Workers]
     try:
         client = Client(**place, timeout=patience, set_as_default=False, name="tpjb-ident")
     except (OSError, ValueError, TimeoutError) as error:
-        why = str(error).partition("\n")[0][:120] or type(error).__name__
         raise ClusterError(
-            f"no Dask scheduler answers at {address} ({why}). "
+            f"no Dask scheduler answers at {address} ({_reason(error)}). "
             "Start one with `dask scheduler` and give the address that it prints"
         ) from error
     with client:
-        count = _checked(client, address, patience)
+        _refuse_other_versions(client, address, patience)
         # pure: a job is known by a hash of all that it is given, which took longer here than the job did there
         opened = functools.partial(client.get_executor, pure=False)
         # without a scheduler nobody knows of workers
-        pool = PoolWorkers(opened, count, lambda: bool(client.scheduler_info().get("workers")))
-        try:
-            yield pool
-        finally:
-            pool.close(wait=False)
+        yield PoolWorkers(opened, sum(client.nthreads().values()), lambda: bool(client.scheduler_info().get("workers")))
 
 
-def _checked(client: Any, address: str, patience: float) -> int:
-    """Threads of all workers, after a look at what they have installed."""
+def _refuse_other_versions(client: Any, address: str, patience: float) -> None:
+    """Look at what the workers have installed."""
     try:
         client.wait_for_workers(1, timeout=patience)
-    except TimeoutError as error:
-        raise ClusterError(
-            f"the scheduler at {address} has no workers. Start some with `dask worker {address} --nthreads 1`"
-        ) from error
-    ours = {name: versions()[name] for name in _SAME}
-    try:
-        theirs = client.run(versions)
+        installed = client.run(versions)
     except Exception as error:  # what a worker without this package raises depends on its versions
         raise ClusterError(
-            f"the workers of {address} cannot run tpjb-ident ({type(error).__name__}: {str(error)[:160]}). "
-            "Install the same tpjb-ident there"
+            f"no worker of {address} can run tpjb-ident ({_reason(error)}). "
+            f"Start some with `dask worker {address} --nthreads 1` where it is installed"
         ) from error
-    for worker, installed in theirs.items():
-        differences = [
-            f"{name} {installed[name]} (here {ours[name]})" for name in _SAME if installed[name] != ours[name]
-        ]
-        if differences:
-            text = ", ".join(differences)
-            raise ClusterError(f"worker {worker} has {text}. Install the same versions on all machines")
-    return max(1, sum(client.nthreads().values()))
+    ours = versions()
+    for worker, theirs in installed.items():
+        others = [f"{name} {theirs[name]} (here {ours[name]})" for name in _SAME if theirs[name] != ours[name]]
+        if others:
+            raise ClusterError(f"worker {worker} has {', '.join(others)}. Install the same versions on all machines")
+
+
+def _reason(error: Exception) -> str:
+    return str(error).partition("\n")[0][:120] or type(error).__name__

@@ -5,41 +5,45 @@ A signal is delivered again until the error that it raises is being handled or t
 
 from __future__ import annotations
 
-import _thread
 import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 #: s between two looks at what became of a signal
 _PAUSE = 0.1
-#: the signal that nobody has heard yet, and the number of the last one that came
-_open: object | None = None
+_KINDS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGALRM,) if hasattr(signal, "SIGALRM") else ()))
+#: the number of the last signal that came
 _signalled = 0
 
 
 def listen() -> None:
     """Let both signals raise KeyboardInterrupt, SIGTERM with its number: what was begun is cleared away in both."""
     sys.unraisablehook = _without_interrupts
-    signal.signal(signal.SIGTERM, _interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's job in the background ignores it
-        signal.signal(signal.SIGINT, _interrupt)
+    for number in _KINDS:
+        # a shell's job in the background ignores Ctrl-C
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _interrupt)
+
+
+def _look_again(pause: float = 0.0) -> None:
+    """Have the system send SIGALRM again and again, where it can: the interrupt may have been dropped."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, pause, pause)
 
 
 def heard() -> None:
     """Note that a command ends, or ended, because of the signal."""
-    global _open
-    _open = None
+    _look_again()
 
 
 def stop_listening() -> None:
     """Leave the process to its end: a signal that comes once all is cleared away would replace its exit code."""
     heard()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _KINDS:
         signal.signal(number, signal.SIG_IGN)
 
 
@@ -62,26 +66,13 @@ def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
 
 
 def _interrupt(number: int, frame: Any) -> None:
-    global _open, _signalled
-    _signalled = number
-    if _open is None:
-        _open = object()
-        _thread.start_new_thread(_deliver_again, (number, _open))  # threading's own locks may be held here
-    raise KeyboardInterrupt(*(() if number == signal.SIGINT else (number,)))
-
-
-def _deliver_again(number: int, signalled: object) -> None:
-    main_thread = threading.main_thread().ident or 0
-    while True:
-        time.sleep(_PAUSE)
-        if _open is not signalled:
-            return
-        handled = sys._current_exceptions().get(main_thread)
-        if interrupt_behind(handled[1] if isinstance(handled, tuple) else handled) is None:
-            if hasattr(signal, "pthread_kill"):  # wakes a thread that waits, which the other one does not
-                signal.pthread_kill(main_thread, number)
-            else:
-                _thread.interrupt_main(signal.Signals(number))
+    global _signalled
+    if number in (signal.SIGINT, signal.SIGTERM):
+        _signalled = number
+        _look_again(_PAUSE)
+    elif interrupt_behind(sys.exc_info()[1]) is not None:  # what is being cleared away is not interrupted again
+        return
+    raise KeyboardInterrupt(*(() if _signalled == signal.SIGINT else (_signalled,)))
 
 
 def _without_interrupts(lost: Any) -> None:
@@ -98,7 +89,7 @@ def interrupts_held() -> Iterator[None]:
     """
     held: list[int] = []
     # other threads are not interrupted
-    kinds = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    kinds = _KINDS if threading.current_thread() is threading.main_thread() else ()
     former = {kind: signal.signal(kind, lambda number, frame: held.append(number)) for kind in kinds}
     try:
         yield

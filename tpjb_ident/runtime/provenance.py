@@ -84,12 +84,10 @@ def read_document(path: Path, kind: str) -> Document:
     remedy = f"Give the folder as tpjb wrote it, or run the command again; {schema(kind)} is read"
     try:
         if path.stat().st_size > _LARGEST:
-            raise BadInputError(f"{path}: is larger than {_LARGEST >> 20} MB. {remedy}.")
+            raise ValueError(f"larger than {_LARGEST >> 20} MB")
         document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be read ({error.strerror}). {remedy}.") from error
-    except (ValueError, RecursionError) as error:
-        raise BadInputError(f"{path}: is no JSON ({type(error).__name__}). {remedy}.") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInputError(f"{path}: cannot be read as JSON ({error}). {remedy}.") from error
     stated = document.get("schema") if isinstance(document, dict) else None
     steps = _STEPS[kind]
     versions = [f"{kind}/{number}" for number in range(1, len(steps) + 2)]

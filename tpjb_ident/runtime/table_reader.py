@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rigdata.near_names import nearest_name
 from rigdata.operating_point import ROTATIONS
@@ -42,8 +42,40 @@ _US |= {"_lbf_s_per_in": _US["_lbfs_per_in"], "_rpm": ("_Hz", 1.0 / 60.0)}
 #: Columns of our exported tables that have another name and unit in results.
 _EXPORTED = {"frequency_rad_per_s": ("excitation_Hz", 0.5 / math.pi)}
 _US_NAME = re.compile(rf"(\w+?)({'|'.join(_US)})(_lo|_hi|_se|)")
-#: Name, column of the schema, ending, and the size of its unit.
-_Header = list[tuple[str, Column | None, str, float]]
+
+
+class _Header(NamedTuple):
+    """Name of a column in results, the size of its unit there, and what it is by the schema."""
+
+    name: str
+    size: float
+    known: Column | None
+    ending: str
+
+    def value(self, cell: str) -> object:
+        """Text, truth value or number of a cell, in SI."""
+        known = self.known
+        if known is None or known.quantity == "text":
+            return cell
+        words = _WORDS.get(known.quantity, {})
+        if words and cell not in words:
+            names = " or ".join(filter(None, words))
+            raise ValueError(f"{cell[:40]!r} is not known. Write {names}, or leave the cell empty.")
+        if words:
+            return words[cell]
+        if cell in _NOTHING:
+            return math.nan
+        if cell in _INFINITE and known.may_be_infinite(self.ending):
+            return _INFINITE[cell]
+        number = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+        if not math.isfinite(number):
+            is_comma = _NUMBER.fullmatch(cell.replace(",", "."))
+            remedy = "Write a decimal point" if is_comma else "Leave the cell empty where nothing is known"
+            raise ValueError(f"{cell[:40]!r} is no number. {remedy}.")
+        least = known.least(self.ending)
+        if number < least:
+            raise ValueError(f"{cell[:40]} is below {least:g}, the least that it can be. Correct the cell.")
+        return self.size * number
 
 
 def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str] | None = None) -> pd.DataFrame:
@@ -53,34 +85,36 @@ def read_table(path: Path, needed: Sequence[str] = (), misspelt: re.Pattern[str]
     """
     import pandas as pd
 
-    rows = _lines(path)
-    number, names = next(rows, (1, []))
+    records = _lines(path)
+    line, names = next(records, (1, []))
     if not names:
         raise BadInputError(f"{path.name}: is empty. Give a table with a line of names.")
-    header = _header(path, number, names, needed, misspelt)
-    cells: list[list[object]] = [[] for _ in names]
-    names = [name for name, *_ in header]
-    lines: list[int] = []
-    for number, row in rows:
-        place = f"{path.name}, line {number}"
-        if len(row) != len(names):
+    header = _header(f"{path.name}, line {line}", path, names)
+    columns: dict[str, list[object]] = {column.name: [] for column in header}
+    _refuse_wrong_names(path, list(columns), needed, misspelt)
+    lines = []
+    for line, cells in records:
+        place = f"{path.name}, line {line}"
+        if len(cells) != len(header):
             remedy = "A delimiter at a line's end counts as one; save the table again"
-            raise BadInputError(f"{place}: has {len(row)} cells, the names are {len(names)}. {remedy}.")
-        values = {}
-        for column, (name, known, ending, size), cell in zip(cells, header, row, strict=True):
-            value = _value(cell.strip(), known, ending, f"{place}, {name}")
-            values[name] = size * value if isinstance(value, float) else value
-            column.append(values[name])
-        _check_intervals(values, place)
-        lines.append(number)
-    frame = pd.DataFrame(dict(zip(names, cells, strict=True)))
+            raise BadInputError(f"{place}: has {len(cells)} cells, the names are {len(header)}. {remedy}.")
+        row: dict[str, object] = {}
+        for column, cell in zip(header, cells, strict=True):
+            try:
+                row[column.name] = column.value(cell.strip())
+            except ValueError as error:
+                raise BadInputError(f"{place}, {column.name}: {error}") from error
+        _refuse_outside_intervals(row, place)
+        for name, value in row.items():
+            columns[name].append(value)
+        lines.append(line)
+    frame = pd.DataFrame(columns)
     frame.attrs["lines"] = lines
     return frame
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of every line that is neither blank nor a remark; the names come first."""
-    remedy = "Save it as CSV with a line of names, in UTF-8"
     try:
         if path.stat().st_size > _LARGEST:
             raise BadInputError(f"{path.name}: is larger than {_LARGEST >> 20} MB. Is it the right file?")
@@ -93,43 +127,38 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
                     yield reader.line_num, row
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
+        remedy = "Save it as CSV with a line of names, in UTF-8"
         raise BadInputError(f"{path.name}: cannot be read as a table ({reason}). {remedy}.") from error
 
 
-def _header(
-    path: Path, line: int, names: list[str], needed: Sequence[str], misspelt: re.Pattern[str] | None
-) -> _Header:
-    """What each column is by the schema, by its name in SI."""
-    place = f"{path.name}, line {line}"
-    sizes: dict[str, float] = {}
-    for number, name in enumerate(names, start=1):
-        name, size = _in_si(name.strip())
+def _header(place: str, path: Path, names: list[str]) -> list[_Header]:
+    """What each column is, by its name in SI; US units are known by their ends."""
+    header: dict[str, _Header] = {}
+    for number, text in enumerate(names, start=1):
+        name, size = _EXPORTED.get(text.strip(), (text.strip(), 1.0))
+        if match := _US_NAME.fullmatch(name):
+            unit, size = _US[match[2]]
+            name = match[1] + unit + match[3]
         if not name:
             raise BadInputError(f"{place}: column {number} has no name. Delete the delimiter, or name the column.")
-        if name in sizes:
+        if name in header:
             raise BadInputError(f"{place}: column {name!r} is there twice. Delete one of them.")
-        sizes[name] = size
+        header[name] = _Header(name, size, *column_of(name, path.stem))
+    return list(header.values())
+
+
+def _refuse_wrong_names(path: Path, names: list[str], needed: Sequence[str], misspelt: re.Pattern[str] | None) -> None:
+    """Name a column that is missing, and one that looks like a coefficient and is none."""
     for name in needed:
-        if name not in sizes:
-            near = nearest_name(name, list(sizes))
+        if name not in names:
+            near = nearest_name(name, names)
             hint = f"; {near!r} is not it" if near else ""
             raise BadInputError(f"{path.name}: column {name} is missing{hint}. Add it.")
-    header = [(name, *column_of(name, path.stem), size) for name, size in sizes.items()]
-    for name, known, _, _ in header:
-        if known is None and misspelt is not None and misspelt.fullmatch(name):
+    for name in names if misspelt is not None else ():
+        if misspelt is not None and misspelt.fullmatch(name) and column_of(name, path.stem)[0] is None:
             coefficients = [name + ending for name in COEFFICIENT_COLUMNS for ending in ("", "_se", "_lo", "_hi")]
             near = nearest_name(name, coefficients)
             raise BadInputError(f"{path.name}: column {name!r} is no coefficient. Did you mean {near}?")
-    return header
-
-
-def _in_si(name: str) -> tuple[str, float]:
-    """Name of a column in results, and the size of its unit there; US units are known by their ends."""
-    match = _US_NAME.fullmatch(name)
-    if match is None:
-        return _EXPORTED.get(name, (name, 1.0))
-    unit, size = _US[match[2]]
-    return match[1] + unit + match[3], size
 
 
 @functools.lru_cache(maxsize=4096)
@@ -142,38 +171,11 @@ def column_of(name: str, table: str = "") -> tuple[Column | None, str]:
     return None, ""
 
 
-def _value(cell: str, column: Column | None, ending: str, place: str) -> object:
-    """Text, truth value or number of a cell."""
-    if column is None or column.quantity == "text":
-        return cell
-    if column.quantity in _WORDS:
-        known = _WORDS[column.quantity]
-        if cell not in known:
-            names = " or ".join(filter(None, known))
-            raise BadInputError(f"{place}: {cell[:40]!r} is not known. Write {names}, or leave the cell empty.")
-        return known[cell]
-    if cell in _NOTHING:
-        return math.nan
-    if cell in _INFINITE and column.may_be_infinite(ending):
-        return _INFINITE[cell]
-    number = float(cell) if _NUMBER.fullmatch(cell) else math.nan
-    if not math.isfinite(number):
-        is_comma = _NUMBER.fullmatch(cell.replace(",", "."))
-        remedy = "Write a decimal point" if is_comma else "Leave the cell empty where nothing is known"
-        raise BadInputError(f"{place}: {cell[:40]!r} is no number. {remedy}.")
-    least = column.least(ending)
-    if number < least:
-        raise BadInputError(f"{place}: {cell[:40]} is below {least:g}, the least that it can be. Correct the cell.")
-    return number
-
-
-def _check_intervals(values: dict[str, object], place: str) -> None:
+def _refuse_outside_intervals(row: dict[str, object], place: str) -> None:
     """Refuse a value outside its own interval, of which one end may be missing."""
-    for end in [name for name in values if name.endswith(("_lo", "_hi"))]:
-        base = end[:-3]
-        low, value, high = (values.get(base + ending, math.nan) for ending in ("_lo", "", "_hi"))
-        if not (isinstance(low, float) and isinstance(value, float) and isinstance(high, float)):
-            continue
-        if low > high or value < low or value > high:
+    for base in {name[:-3] for name in row if name.endswith(("_lo", "_hi"))}:
+        low, value, high = (row.get(base + ending, math.nan) for ending in ("_lo", "", "_hi"))
+        numbers = isinstance(low, float) and isinstance(value, float) and isinstance(high, float)
+        if numbers and (low > high or value < low or value > high):  # type: ignore[operator]
             shown = f"{value:g} is not within {low:g} to {high:g}"
             raise BadInputError(f"{place}, {base}: {shown}, its interval. Correct the cells.")
