@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
-import numpy as np
+import pandas as pd
 import pytest
 
 from tests.command_line import tpjb
@@ -13,6 +13,7 @@ from tpjb_ident.cli import terminal
 from tpjb_ident.cli.identification import cross_coupling_matters, with_half
 from tpjb_ident.cli.terminal import MOST_ROWS, Terminal, cell_len, table_lines, wrapped
 from tpjb_ident.columns import Column, words
+from tpjb_ident.schema import COEFFICIENT_COLUMNS
 
 COLUMNS = ["load kN", "dir. deg", "speed Hz", "exc. Hz", "kxx MN/m", "kyy MN/m", "quality"]
 FLAGS = "large-amplitude; mains-on-excitation-line; methods-disagree"
@@ -66,11 +67,13 @@ def test_a_point_without_an_answer_says_so(value, half, says):
     assert with_half(value, half) == says
 
 
-def test_cross_coupling_is_shown_when_it_is_beyond_doubt():
-    values = np.array([100.0, 20.0, -1.0, 90.0, 500.0, 0.0, 0.0, 500.0])
-    assert cross_coupling_matters(values, np.full(8, 5.0))
-    assert not cross_coupling_matters(values, np.full(8, 15.0))
-    assert not cross_coupling_matters(values * np.nan, np.full(8, 5.0))
+@pytest.mark.parametrize(("half", "matters"), [(5.0, True), (15.0, False), (math.nan, False)])
+def test_cross_coupling_is_shown_when_it_is_beyond_doubt(half, matters):
+    values = dict(zip(COEFFICIENT_COLUMNS, (100.0, 20.0, -1.0, 90.0, 500.0, 0.0, 0.0, 500.0), strict=True))
+    ends = {
+        name + end: value + sign * half for name, value in values.items() for end, sign in (("_lo", -1), ("_hi", 1))
+    }
+    assert cross_coupling_matters(pd.DataFrame([values | ends])).tolist() == [matters]
 
 
 def test_notes_of_one_sort_are_counted():

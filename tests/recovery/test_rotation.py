@@ -206,7 +206,7 @@ def test_identify_marks_the_points_that_turn_clockwise(both, tmp_path):
     rows = [line.split() for line in lines if re.match(r" *[36] +-90 ", line)]
     table = pd.read_csv(tmp_path / "out" / "coefficients.csv")
     assert sorted(table["rotation"]) == sorted(2 * ROTATIONS)
-    assert [row[2:4] == ["22", "cw"] for row in rows] == list(table["rotation"] == "clockwise")
+    assert ["clockwise" in row for row in rows] == list(table["rotation"] == "clockwise")
 
 
 def test_the_mirror_image_of_both_senses(both, compared, tmp_path):

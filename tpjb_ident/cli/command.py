@@ -60,24 +60,18 @@ class Command(Terminal):
 
     folder: Path  #: the temporary one that is filled inside `results`
 
-    def __init__(
-        self,
-        name: str,
-        options: Mapping[str, Any],
-        out: Path | None = None,
-        as_json: bool = False,
-        quiet: bool = False,
-    ) -> None:
-        super().__init__(as_json, quiet)
+    def __init__(self, name: str, options: Mapping[str, Any], out: Path | None = None, silent: bool = False) -> None:
+        super().__init__(silent)
         self.name, self.out = name, out
         self.options = dict(options)  #: as run.json records them
-        self.given = {name: _plain(value) for name, value in options.items()}  #: as they were typed
+        self.given = _plain(self.options)  #: as they were typed
         self.remarks: Sequence[str] = ()  #: flags that run.json repeats
         self.arithmetic: dict[str, None] = {}  #: warnings of single operations, in order
         self.target = out or Path(f"tpjb-{name}-out")
+        self.frames: dict[str, pd.DataFrame] = {}  #: tables that were written, by file name
         self._sources: list[Path] = []
         self._opened: list[Campaign | Path] = []
-        self._outputs: list[str] = []
+        self._outputs: dict[str, None] = {}
 
     def open(self, path: Path) -> Campaign:
         """Open a campaign; a folder with one campaign in it stands for that."""
@@ -149,6 +143,7 @@ class Command(Terminal):
 
     def table(self, name: str, frame: pd.DataFrame) -> None:
         """Write a table of the results as CSV and Parquet."""
+        self.frames[name] = frame
         write_table(self.folder, name, frame)
         if in_us_units():
             from tpjb_ident.presentation import us_table
@@ -167,7 +162,7 @@ class Command(Terminal):
 
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""
-        self._outputs = list(dict.fromkeys([*self._outputs, *names]))
+        self._outputs |= dict.fromkeys(names)
 
     def run(self, function: Callable[..., None], options: Mapping[str, Any]) -> int:
         """Run the command, and print where its results are and, last of all, the command that comes next."""
@@ -188,34 +183,17 @@ class Command(Terminal):
                 warnings.showwarning = self._show_warning  # type: ignore[assignment]
                 use_units(self.options.get("units", "si"))
                 function(self, **options)
-        except NotTrustedError as error:
-            self.error("not to be trusted", str(error))
-            if self._sources:  # the records come first
-                self.next("check", self._sources[-1])
-            return _NOT_TRUSTED
-        except KeyboardInterrupt as error:
-            return self._interrupted(error)
         except BrokenPipeError:  # the reader of our output went away, as `| head` does
             sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open until the process ends)
-        except Exception as error:
-            ended = interrupt_behind(error)
-            if ended is not None:  # it fell into an import, which makes an error of its own of it
-                return self._interrupted(ended)
-            message = _bad_input_message(error)
-            if message is None:
-                self.error("bug", _bug_report(error))
-                return _BUG
-            self.error("error", message)
-            return _BAD_INPUT
+        except (Exception, KeyboardInterrupt) as error:
+            exit_code, kind, message = _end_of(error)
+            self.say(kind, message)
+            if exit_code == _NOT_TRUSTED and self._sources:  # the records come first
+                self.next("check", self._sources[-1])
+            return exit_code
         finally:
             use_units("si")
         return 0
-
-    def _interrupted(self, error: KeyboardInterrupt) -> int:
-        heard()
-        kind, exit_code = ("terminated", _TERMINATED) if error.args else ("interrupted", _INTERRUPTED)
-        self.error(kind, "nothing was written.")
-        return exit_code
 
     def _show_warning(
         self, message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
@@ -230,17 +208,19 @@ class Command(Terminal):
         """Everything printed, as plain data; ``data`` holds the result tables and JSON files themselves."""
         data: dict[str, Any] = {}
         for name in self._outputs:
-            path = self.target / name
-            if path.suffix == ".parquet":
-                data[path.stem] = _rows(path)
-            elif path.suffix == ".json" and name != RECORD:
-                data[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+            stem, ending = os.path.splitext(name)
+            if ending == ".parquet" and stem in self.frames:
+                frame = self.frames[stem]
+                few = len(frame) <= _MOST_ROWS
+                data[stem] = frame.to_dict("records") if few else {"rows": len(frame), "file": name}
+            elif ending == ".json" and name != RECORD:
+                data[stem] = json.loads((self.target / name).read_text(encoding="utf-8"))
         return {
             "schema": "tpjb-command/1",
             "command": self.name,
             "exit_code": exit_code,
             "results": str(self.target) if self._outputs else None,
-            "outputs": self._outputs,
+            "outputs": list(self._outputs),
             "said": self.lines,
             "remarks": self.messages,
             "tables": self.tables,
@@ -263,7 +243,7 @@ def command(*examples: str) -> Callable[[Callable[..., None]], Callable[..., Non
         ) -> None:
             recorded = {p.name: options[p.name] for p in own if p.name not in _UNRECORDED}
             recorded |= {"units": units} if units != "si" else {}
-            c = Command(name, recorded, out, as_json, quiet)
+            c = Command(name, recorded, out, as_json or quiet)
             exit_code = c.run(function, options)
             if as_json:
                 _print_document(c.document(exit_code))
@@ -294,30 +274,28 @@ def _print_document(document: Mapping[str, Any]) -> None:
     typer.echo(json.dumps(json_data(document), indent=1, ensure_ascii=ascii_only, allow_nan=False))
 
 
-def _rows(path: Path) -> Any:
-    import pyarrow.parquet as pq
-
-    with path.open("rb") as stream:
-        table = pq.ParquetFile(stream)
-        count = table.metadata.num_rows
-        return table.read().to_pylist() if count <= _MOST_ROWS else {"rows": count, "file": path.name}
-
-
-def _bad_input_message(error: Exception) -> str | None:
-    """Say what is wrong with the input; None if `error` is no fault of the input."""
+def _end_of(error: BaseException) -> tuple[int, str, str]:
+    """Exit code, kind of message and message of a command that did not end well."""
+    if isinstance(error, NotTrustedError):
+        return _NOT_TRUSTED, "not to be trusted", str(error)
+    interrupt = interrupt_behind(error)  # an import that it fell into makes an error of its own of it
+    if interrupt is not None:
+        heard()
+        ended = (_TERMINATED, "terminated") if interrupt.args else (_INTERRUPTED, "interrupted")
+        return *ended, "nothing was written."
     model = sys.modules.get("model.errors")  # not loaded: then it is none of the model's
     refusals = (TpjbError, RigError, *((model.ModelError,) if model else ()))
     if isinstance(error, refusals) or (isinstance(error, ImportError) and "named 'model'" in str(error)):
-        return str(error)
+        return _BAD_INPUT, "error", str(error)
     if isinstance(error, OSError) and error.strerror:
         place = f"{error.filename}: " if error.filename else ""
-        return f"{place}{error.strerror}. Check the path, its rights and the room on the disk."
+        return _BAD_INPUT, "error", f"{place}{error.strerror}. Check the path, its rights and the room on the disk."
     if isinstance(error, MemoryError):
-        return "not enough memory for this campaign. Close other programs or split the campaign."
-    return None
+        return _BAD_INPUT, "error", "not enough memory for this campaign. Close other programs or split the campaign."
+    return _BUG, "bug", _bug_report(error)
 
 
-def _bug_report(error: Exception) -> str:
+def _bug_report(error: BaseException) -> str:
     """Write the traceback to a temporary file and say where it is."""
     with tempfile.NamedTemporaryFile(
         "w", prefix="tpjb-traceback-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
@@ -361,7 +339,7 @@ def write_record(
     record = {
         "tables": TABLE_SCHEMA,
         "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "settings": {name: _plain(value) for name, value in settings.items()},
+        "settings": _plain(settings),
         "versions": versions(),
         "inputs_sha256": dict(inputs),
         "outputs": outputs,
@@ -378,25 +356,21 @@ def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]
 
     Several of one option are numbered: ``prediction.0``.
     """
-    places = {}
+    values = {}
     for name, value in settings.items():
-        numbered = (
-            {f"{name}.{i}": v for i, v in enumerate(value)} if isinstance(value, (list, tuple)) else {name: value}
-        )
-        for key, item in numbered.items():
-            # a word may name a file in place of a choice, as of --pivots
-            path = Path(item) if isinstance(item, str) and Path(item).name in inputs else item
-            if isinstance(path, Path) and path.exists():
-                with contextlib.suppress(ValueError):  # another drive: there is no relative way
-                    places[key] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
+        several = enumerate(value) if isinstance(value, (list, tuple)) else ()
+        values |= {name: value, **{f"{name}.{number}": item for number, item in several}}
+    places = {}
+    for key, value in values.items():
+        # a word may name a file in place of a choice, as of --pivots
+        is_place = isinstance(value, Path) or (isinstance(value, str) and Path(value).name in inputs)
+        if is_place and (path := Path(value)).exists():
+            with contextlib.suppress(ValueError):  # another drive: there is no relative way
+                places[key] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
     return places
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return value.name  # its place is of no use elsewhere; its SHA-256 says what it was
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
+def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as JSON holds them; of a file its name: its place is of no use elsewhere, its SHA-256 says what it was."""
+    plain: dict[str, Any] = json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))
+    return plain

@@ -14,7 +14,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,19 +43,16 @@ _EXAMPLES = {
 }
 
 
-def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
+def parse_values(text: str, dimension: str, option: str, is_positive: bool = False) -> tuple[float, ...]:
     """Read a list or range of quantities."""
     if re.search(r"\d,\d", text):
         raise BadInputError(
             f"{option}: {text!r} has a comma between digits. Write a decimal point (2.5 kN), or a space after "
             "the comma of a list (2, 5 kN)."
         )
-    items = [item for item in re.split(r"[,;]", text) if item.strip()]
-    if not items:
-        raise BadInputError(f'{option}: is empty. Write, for instance, "{_EXAMPLES[dimension]}".')
     values: list[float] = []
     unit = ""
-    for item in reversed(items):
+    for item in filter(str.strip, reversed(re.split(r"[,;]", text))):
         start, dots, end = item.partition("..")
         where = f"{option}: the range {item.strip()!r}"
         if dots and ":" not in end:
@@ -65,9 +61,13 @@ def parse_values(text: str, dimension: str, option: str) -> tuple[float, ...]:
         for part in reversed([start, *end.split(":", 1)] if dots else [item]):
             quantity, unit = _quantity(part, unit, dimension, option)
             quantities.insert(0, quantity)
-        values[:0] = _range(quantities, where) if dots else quantities
-        if len(values) > MAX_VALUES:
-            raise BadInputError(f"{option}: {text!r} makes more than {MAX_VALUES} values. Take a larger step.")
+        values[:0] = _range(*quantities, where) if dots else quantities
+    if not values:
+        raise BadInputError(f'{option}: is empty. Write, for instance, "{_EXAMPLES[dimension]}".')
+    if len(values) > MAX_VALUES:
+        raise BadInputError(f"{option}: {text[:LONGEST]!r} makes more than {MAX_VALUES} values. Take a larger step.")
+    if is_positive and min(values) <= 0:
+        raise BadInputError(f"{option}: must be positive. Directions have options of their own.")
     return tuple(values)
 
 
@@ -81,13 +81,17 @@ def parse_value(text: str, dimension: str, option: str, least: float = -math.inf
     return values[0]
 
 
-def _range(quantities: Sequence[float], where: str) -> list[float]:
-    start, stop, step = quantities
-    if step == 0 or (stop - start) * step < 0:
+def parse_share(text: str | None, option: str) -> float | None:
+    """Read a share, if one is given."""
+    return None if text is None else parse_value(text, "ratio", option, 0.0)
+
+
+def _range(start: float, stop: float, step: float, where: str) -> list[float]:
+    steps = (stop - start) / step if step else -1.0
+    if steps < 0:
         raise BadInputError(
             f"{where} never reaches its end. Give a step that leads from the first to the second value."
         )
-    steps = (stop - start) / step
     if steps > MAX_VALUES:
         raise BadInputError(f"{where} makes more than {MAX_VALUES} values. Take a larger step.")
     return [start + i * step for i in range(math.floor(steps + 1e-9) + 1)]
@@ -95,13 +99,10 @@ def _range(quantities: Sequence[float], where: str) -> list[float]:
 
 def _quantity(text: str, unit: str, dimension: str, option: str) -> tuple[float, str]:
     match = _PART.fullmatch(text) if len(text) <= LONGEST else None
-    if match is None:
-        raise BadInputError(
-            f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit. "
-            f'Write, for instance, "{_EXAMPLES[dimension]}".'
-        )
-    unit = match[2] or unit
     try:
+        if match is None:
+            raise UnitError(f"{option}: {text.strip()[:LONGEST]!r} is not a number with a unit")
+        unit = match[2] or unit
         return parse_quantity(f"{match[1]} {unit}".strip(), dimension, option), unit
     except UnitError as error:
         raise BadInputError(f'{error}. Write, for instance, "{_EXAMPLES[dimension]}".') from error
@@ -114,14 +115,10 @@ def operating_points(
     load: str, load_direction: str, speed: str, excitation: str | None, rotation: str = ROTATIONS[0]
 ) -> list[OperatingPoint]:
     """Every combination of the first four options, SI."""
-    loads = parse_values(load, "force", "--load")
+    loads = parse_values(load, "force", "--load", is_positive=True)
     directions = parse_values(load_direction, "angle", "--load-direction")
-    speeds = parse_values(speed, "speed", "--speed")
-    frequencies = parse_values(excitation, "speed", "--excitation") if excitation else (0.0,)
-    _refuse_negative(loads, "--load", "Give the direction of the load with --load-direction.")
-    _refuse_negative(speeds, "--speed", "Which way the shaft turns is said by --rotation.")
-    if excitation:
-        _refuse_negative(frequencies, "--excitation", "Leave the option out for synchronous coefficients.")
+    speeds = parse_values(speed, "speed", "--speed", is_positive=True)
+    frequencies = parse_values(excitation, "speed", "--excitation", is_positive=True) if excitation else (0.0,)
     if len(loads) * len(directions) * len(speeds) * len(frequencies) > MAX_VALUES:
         raise BadInputError(f"more than {MAX_VALUES} operating points. Take larger steps.")
     return [OperatingPoint(*point, rotation) for point in itertools.product(loads, directions, speeds, frequencies)]
@@ -133,11 +130,6 @@ def rotation_choice(c: Command, rotation: str | None, bearing: Bearing) -> str:
         refuse_unknown(rotation, ROTATIONS, "--rotation")
     c.options["rotation"] = chosen = rotation or bearing.rotation or ROTATIONS[0]
     return chosen
-
-
-def _refuse_negative(values: Sequence[float], option: str, remedy: str) -> None:
-    if min(values) <= 0:
-        raise BadInputError(f"{option}: must be positive. {remedy}")
 
 
 def pivot_choice(c: Command, text: str) -> str | float | Path:

@@ -61,7 +61,9 @@ _OPTIONS: dict[str, str | ParameterInfo] = {
     "effects": Option(metavar="FILE", help="Effects file: what the baseline model lacks."),
     "physics": Option(metavar="NAMES", help=f'Beyond the paper\'s model: some of "{", ".join(PHYSICS)}".'),
     "housing_temperature": 'With growth: mean temperature of the housing, "48 degC" [default: the oil supply\'s].',
-    "model_tolerance": "What the model is trusted to, share of the direct coefficients [1.5 %].",
+    "model_tolerance": Option(
+        min=1e-4, max=0.5, help="What the model is trusted to, share of the direct coefficients [1.5 %]."
+    ),
     "tolerance": Option(metavar="NAME=VALUE", help="How well something is known: viscosity=4%; repeatable."),
     "rerun tolerance": Option(min=0.0, help="Difference that is rounding: relative, or of half an interval's width."),
     "library": Option(metavar="FILE.py", help="Effects of your own; the file's code is run."),
@@ -141,8 +143,8 @@ def refuse_unknown(value: str, known: Iterable[str], option: str) -> None:
 
 
 def known_names(text: str, known: Iterable[str], option: str) -> tuple[str, ...]:
-    """Names in a list with commas, each once."""
-    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    """Names in a list with commas, each once; at least one."""
+    names = tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip())) or ("",)
     for name in names:
         refuse_unknown(name, known, option)
     return names

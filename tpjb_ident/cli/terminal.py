@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import shlex
 import shutil
 import sys
 import textwrap
 import time
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.columns import Column
 from tpjb_ident.runtime.tables import printable, readable
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tpjb_ident.report.page import Table
 
 #: Seconds between two lines about progress where there is no terminal, and between two states of the one line on it.
@@ -26,8 +29,8 @@ _LOG_WIDTH = 80
 MOST_ROWS = 40
 #: Share of a step from which its speed is known well enough to tell the remaining time.
 _FORETELLS = 0.02
-#: Columns between two columns of a table.
-_SPACE = 2
+#: Between two columns of a table.
+_SPACE = "  "
 #: Called with what is being done, how many are done, of how many.
 Progress = Callable[[str, int, int], None]
 
@@ -35,19 +38,18 @@ Progress = Callable[[str, int, int], None]
 class Terminal:
     """What a command prints, all of it or, with ``--quiet``, warnings and errors alone; collected for ``--json``."""
 
-    def __init__(self, as_json: bool = False, quiet: bool = False) -> None:
-        self.as_json = as_json
-        self._silent = as_json or quiet
+    def __init__(self, silent: bool = False) -> None:
+        self._silent = silent
         self.lines: list[str] = []
         self.following = ""  #: the command that comes next
         self.messages: list[dict[str, str]] = []
         self.tables: list[dict[str, Any]] = []
 
-    def print(self, text: str) -> None:
+    def print(self, text: str, fitted: bool = True) -> None:
         """Print one line; text from outside is shown as it is, less its control characters."""
         self.lines.append(printable(text))
         if not self._silent:
-            print(_fitted(text), flush=True)
+            print(_fitted(text) if fitted else printable(text), flush=True)
 
     def next(self, *words: object) -> None:
         """Note the command that comes next, by its words after `tpjb` or as typed; it is the last line of all."""
@@ -56,59 +58,56 @@ class Terminal:
 
     def close(self) -> None:
         """Print the command that comes next, unbroken, so that it can be copied."""
-        if not self.following:
-            return
-        line = f"Next: {printable(self.following)}"
-        self.lines.append(line)
-        if not self._silent:
-            print(line, flush=True)
+        if self.following:
+            self.print(f"Next: {self.following}", fitted=False)
 
-    def error(self, kind: str, text: str) -> None:
-        """Print a message to stderr, its lines kept."""
-        self._say(kind, "\n".join(printable(line) for line in text.splitlines()), True)
+    def say(self, kind: str, text: str) -> None:
+        """Print a message to stderr, its lines kept; a note not of a quiet command."""
+        text = "\n".join(printable(line) for line in text.splitlines())
+        self.messages.append({"kind": kind, "text": text})
+        if kind != "note" or not self._silent:
+            _print_message(kind, text)
 
     def warn(self, text: str) -> None:
         """Print a warning to stderr."""
-        self._say("warning", printable(text), True)
+        self.say("warning", text)
 
     def note(self, text: str) -> None:
-        """Print a remark to stderr; not of a quiet command."""
-        self._say("note", printable(text), not self._silent)
+        """Print a remark to stderr."""
+        self.say("note", text)
 
     def doing(self, text: str) -> None:
         """Print to stderr what the command is at."""
         if not self._silent:
             _print_message("doing", printable(text))
 
-    def _say(self, kind: str, text: str, aloud: bool) -> None:
-        self.messages.append({"kind": kind, "text": text})
-        if aloud:
-            _print_message(kind, text)
-
-    def show(
-        self,
-        title: str,
-        titles: Sequence[Column | str],
-        rows: Iterable[Sequence[Any]],
-        file: str = "",
-    ) -> None:
+    def show(self, title: str, columns: Iterable[Column | str], rows: Iterable[Sequence[Any]], file: str = "") -> None:
         """Print a table that fits the terminal, its columns of words to the left; of a long one the `file` with all."""
-        columns = [Column(title) if isinstance(title, str) else title for title in titles]
-        headings = [column.heading for column in columns]
+        columns = [Column(column) if isinstance(column, str) else column for column in columns]
+        headings = [readable(column.heading) for column in columns]
         texts = []
         for row in rows:
-            cells = [column.cell(value) for column, value in zip(columns, row, strict=True)]
+            cells = [readable(column.cell(value)) for column, value in zip(columns, row, strict=True)]
             texts.append(cells)
         self.tables.append({"title": title, "columns": headings, "rows": texts})
         if self._silent:
             return
-        head = texts[:MOST_ROWS] if file else texts
-        shown = [[readable(cell) for cell in row] for row in head]
         words = [i for i, column in enumerate(columns) if column.words]
-        shown_headings = [readable(heading) for heading in headings]
-        title, lines = _titled_table(printable(title), shown_headings, shown, words)
-        more = [f"{len(texts) - len(head)} more rows: {file} has all {len(texts)}"] if len(head) < len(texts) else []
-        print("\n".join(["", title, *lines, "", *more]), flush=True)
+        shown = texts[:MOST_ROWS] if file else texts
+        lines = _titled_table(printable(title), headings, shown, words)
+        if len(shown) < len(texts):
+            lines.append(f"{len(texts) - len(shown)} more rows: {file} has all {len(texts)}")
+        print("\n".join(["", *lines]), flush=True)
+
+    def show_frame(self, title: str, frame: pd.DataFrame, columns: Mapping[str, Column | str], file: str = "") -> None:
+        """Print columns of a table on disk; those with a form of several numbers with half of their intervals."""
+        cells: list[Iterable[Any]] = []
+        for name, column in columns.items() if len(frame) else ():
+            has_interval = isinstance(column, Column) and callable(column.form)
+            half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]) if has_interval else None
+            cells.append(frame[name] if half is None else zip(frame[name], half, strict=True))
+        if cells:
+            self.show(title, columns.values(), zip(*cells, strict=True), file)
 
     def show_table(self, table: Table, name: str = "") -> None:
         """Print a table of a page; `name` says what it is of."""
@@ -120,8 +119,7 @@ class Terminal:
         """Print the answer, what the block shows, and all else; the command that comes next is noted."""
         answer, *more = sentences
         self.print(answer)
-        if following:
-            self.next(following)
+        self.following = following or self.following
         yield
         for line in more:
             self.print(line)
@@ -156,16 +154,16 @@ class ProgressLines:
             self._began, self._first = now, done
         self._step = done
         is_counted = 0 < done < total
-        every = LINE_EVERY if self._every is None else self._every
-        if now - self._last < every or not (is_counted or self._every):
+        if now - self._last < (self._every or LINE_EVERY) or not (is_counted or self._every):
             return
         self._last = now
-        remaining = ""
-        counted = done - self._first
-        if counted > 0 and done >= _FORETELLS * total:
-            remaining = f", about {_duration((now - self._began) * (total - done) / counted)} left"
-        count = f"{done} of {total}{remaining} ({text})" if is_counted else text
-        self._report(f"{self._activity}: {count}")
+        if is_counted:
+            remaining = ""
+            if done > self._first and done >= _FORETELLS * total:
+                seconds = (now - self._began) * (total - done) / (done - self._first)
+                remaining = f", about {_duration(seconds)} left"
+            text = f"{done} of {total}{remaining} ({text})"
+        self._report(f"{self._activity}: {text}")
 
 
 def _overwrite(text: str) -> None:
@@ -192,19 +190,6 @@ def _width() -> int:
     return max(40, shutil.get_terminal_size((_LOG_WIDTH, 24)).columns)
 
 
-def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> tuple[str, list[str]]:
-    """Title and lines of a table; of one that is too wide, columns of one and the same number go to the title."""
-    constant: list[int] = []
-    if rows and max(map(cell_len, table_lines(headings, rows, words, sys.maxsize))) > _width():
-        constant = [i for i in range(len(headings)) if i not in words and len({row[i] for row in rows}) == 1]
-    columns = [i for i in range(len(headings)) if i not in constant]
-    title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
-    chosen = [[row[i] for i in columns] for row in rows]
-    texts = [columns.index(i) for i in words]
-    lines = table_lines([headings[i] for i in columns], chosen, texts, _width())
-    return "\n".join(wrapped(title, _width())), lines
-
-
 def _fitted(text: str, wraps: bool = True) -> str:
     """Lines with whole words, as wide as a table; messages in a log stay whole, for who searches them."""
     lines = [readable(line) for line in text.split("\n")]
@@ -223,6 +208,19 @@ def wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False) or [""]
 
 
+def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> list[str]:
+    """Lines of a title and its table; of one that is too wide, columns of one and the same number go to the title."""
+    columns = list(range(len(headings)))
+    if rows and max(map(cell_len, table_lines(headings, rows, words, sys.maxsize))) > _width():
+        columns = [i for i in columns if i in words or len({row[i] for row in rows}) > 1]
+        constant = sorted(set(range(len(headings))) - set(columns))
+        title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
+    varying = [[row[i] for i in columns] for row in rows]
+    texts = [columns.index(i) for i in words]
+    lines = table_lines([headings[i] for i in columns], varying, texts, _width())
+    return [*wrapped(title, _width()), *lines, ""]
+
+
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
     """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers."""
     cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
@@ -233,29 +231,25 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
     beside = list(range(len(columns)))
     while len(beside) > 1 and _total([sizes[i] for i in beside]) > width:
         beside.remove(max([i for i in beside[1:] if i in words] or beside))
-    headings = [textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False) for i in beside]
-    height = max(map(len, headings))
-    layout = [(sizes[i], i in words) for i in beside]
-    head = zip(*([""] * (height - len(heading)) + heading for heading in headings), strict=True)
-    lines = [_row_line(texts, layout) for texts in head]
+
+    def line(texts: Sequence[str]) -> str:
+        padded = []
+        for i, text in zip(beside, texts, strict=True):
+            pad = " " * (sizes[i] - cell_len(text))
+            padded.append(text + pad if i in words else pad + text)
+        return _SPACE.join(padded).rstrip()
+
+    headings = [reversed(textwrap.wrap(columns[i], sizes[i] or 1, break_on_hyphens=False)) for i in beside]
+    lines = [line(texts) for texts in itertools.zip_longest(*headings, fillvalue="")][::-1]
     lines.append("-" * min(width, _total([sizes[i] for i in beside])))
     for row in rows:
-        lines.append(_row_line([row[i] for i in beside], layout))
+        lines.append(line([row[i] for i in beside]))
         below = [i for i in range(len(columns)) if i not in beside and row[i].strip(" -")]
         texts = [f"{columns[i]}: {row[i].strip()}".lstrip(": ") for i in below]
         if texts:
-            lines += [f"    {line}" for line in wrapped("; ".join(texts), width - 4)]
+            lines += [f"    {part}" for part in wrapped("; ".join(texts), width - 4)]
     return lines
 
 
 def _total(sizes: Sequence[int]) -> int:
-    return sum(sizes) + _SPACE * (len(sizes) - 1)
-
-
-def _row_line(texts: Iterable[str], layout: Sequence[tuple[int, bool]]) -> str:
-    """One line of a table, of the size of each column and whether it holds words, which stand left."""
-    cells = []
-    for text, (size, is_text) in zip(texts, layout, strict=True):
-        pad = " " * (size - cell_len(text))
-        cells.append(text + pad if is_text else pad + text)
-    return (" " * _SPACE).join(cells).rstrip()
+    return sum(sizes) + len(_SPACE) * (len(sizes) - 1)

@@ -28,11 +28,8 @@ ALIKE = 4
 
 def span(*values: float) -> str:
     """Range of finite values."""
-    finite = [v for v in values if math.isfinite(v)]
-    if not finite:
-        return "-"
-    low, high = min(finite), max(finite)
-    return f"{low:.4g}" if low == high else f"{low:.4g}..{high:.4g}"
+    finite = sorted({f"{v:.4g}" for v in values if math.isfinite(v)}, key=float) or ["-"]
+    return finite[0] if len(finite) == 1 else f"{finite[0]}..{finite[-1]}"
 
 
 RANGES = ("rate {frequency}", "load {load}", "direction {angle}", "speed {frequency}", "excitation {frequency}")
@@ -58,14 +55,13 @@ def check(c: Command, campaign: Path) -> None:
         except RigDataError:  # what it says is among the problems already
             pass
         else:
-            problems = sorted(
-                [*problems, *_drawing_problems(c, source, problems)], key=lambda p: SEVERITIES.index(p.severity)
-            )
+            problems += _drawing_problems(c, source, problems)
+            problems.sort(key=lambda p: SEVERITIES.index(p.severity))
     summary = check_summary(c, source.id if source else path.name, problems, source)
     with c.results():
         c.json("check.json", summary)
-    counts = summary["counts"]
-    c.print(f"{summary['campaign']}: {', '.join(counted(counts[severity], severity) for severity in SEVERITIES)}")
+    errors = summary["counts"]["error"]
+    c.print(f"{summary['campaign']}: {', '.join(counted(n, severity) for severity, n in summary['counts'].items())}")
     for line in problem_lines(problems):
         c.print(line)
     if source is not None:
@@ -74,26 +70,27 @@ def check(c: Command, campaign: Path) -> None:
         c.next("init", path if path.is_dir() else path.parent, "--update")
     else:
         dynamic = source is not None and source.of_kind("dynamic")
-        c.next("check" if counts["error"] else "identify" if dynamic else "pivot", campaign)
-    if not summary["ok"]:
-        raise BadInputError(
-            f"{path}: {counted(counts['error'], 'error')}, listed above and in {c.target / 'check.json'}: to be mended."
-        )
+        c.next("check" if errors else "identify" if dynamic else "pivot", campaign)
+    if errors:
+        findings = c.target / "check.json"
+        raise BadInputError(f"{path}: {counted(errors, 'error')}, listed above and in {findings}: to be mended.")
 
 
 def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: Campaign | None) -> dict[str, Any]:
     """Gather the content of check.json; without a campaign, where it could not even be opened."""
     counts = {severity: sum(p.severity == severity for p in problems) for severity in SEVERITIES}
-    keys = ("severity", "file", "place", "run", "what", "cure")
     return {
         "schema": "tpjb-check/1",
         "campaign": name,
         "ok": not counts["error"],
         "runs": {kind: len(campaign.of_kind(kind)) for kind in KINDS} if campaign else {},
         "counts": counts,
-        "problems": [{key: getattr(p, key) for key in keys} for p in problems],
+        "problems": [{key: getattr(p, key) for key in _KEYS} for p in problems],
         "files_sha256": c.inputs,
     }
+
+
+_KEYS = ("severity", "file", "place", "run", "what", "cure")
 
 
 def problem_lines(problems: Sequence[Problem]) -> list[str]:
@@ -103,8 +100,7 @@ def problem_lines(problems: Sequence[Problem]) -> list[str]:
         pattern = re.sub(r"[-+]?\d[\d.e+-]*", "#", p.what)
         groups.setdefault((p.severity, pattern, p.place if p.severity == "error" else ""), []).append(p)
     lines = []
-    for group in groups.values():
-        severity = group[0].severity
+    for (severity, *_), group in groups.items():
         if severity == "error" or len(group) < ALIKE:
             lines += [f"{severity}: {p}" for p in group]
             continue
@@ -134,27 +130,20 @@ def _show_coverage(c: Command, campaign: Campaign) -> None:
     rows = []
     for kind in KINDS:
         runs = campaign.of_kind(kind)
-        if not runs:
-            continue
-        points = [run.point for run in runs]
-        places = len({run.pad for run in runs}) if kind == "dry_pivot" else len({p.key for p in points})
-        ranges = [
-            [_rate(run) for run in runs],
-            [p.static_load for p in points],
-            [p.static_load_direction_deg for p in points],
-            [p.shaft_speed_hz for p in points],
-            [p.excitation_hz for p in points if p.excitation],
-        ]
-        rows.append([kind, str(len(runs)), str(places), *ranges])
+        places = {run.pad if kind == "dry_pivot" else run.point.key for run in runs}
+        figures = [_figures(run) for run in runs]
+        rows += [[kind, len(runs), len(places), *zip(*figures, strict=True)]] if runs else []
     columns = [*words("kind"), "runs", "points, pads", *(Column(title, span) for title in RANGES)]
     c.show(f"{campaign.id}: what it covers", columns, rows)
 
 
-def _rate(run: Run) -> float:
-    """Sample rate [Hz]; NaN where the record cannot be read, which is among the problems already."""
+def _figures(run: Run) -> tuple[float, ...]:
+    """Of a run, for `RANGES`; the rate is NaN where the record cannot be read, which is among the problems already."""
     from rigdata import RigDataError
 
+    p = run.point
     try:
-        return run.sample_rate
+        rate = run.sample_rate
     except RigDataError:
-        return math.nan
+        rate = math.nan
+    return rate, p.static_load, p.static_load_direction_deg, p.shaft_speed_hz, p.excitation_hz or math.nan

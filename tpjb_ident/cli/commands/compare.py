@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified, identify_settings, refuse_untrusted, write_identification
-from tpjb_ident.cli.inputs import model_settings, open_source, parse_value
+from tpjb_ident.cli.inputs import model_settings, open_source, parse_share
 from tpjb_ident.cli.options import DEMO, known_names, named
-from tpjb_ident.columns import amount, words
+from tpjb_ident.columns import Column, amount, words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed, percent
 
@@ -53,12 +52,12 @@ def compare(
             raise BadInputError("--prediction: belongs to one campaign. Leave it or the second campaign out.")
         _compare_two(c, (campaign, other), bearing, method, norm)
         return
-    c.options["pivots"] = variants = _variants(pivots)
-    from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
+    from tpjb_ident.compare.comparison import VARIANTS, CompareSettings, compare_campaign, model_side
     from tpjb_ident.compare.predictions import counts_from_measured
     from tpjb_ident.compare.tables import compare_table, read_predictions, with_predictions
     from tpjb_ident.runtime.executors import background_job
 
+    c.options["pivots"] = variants = known_names(pivots, VARIANTS, "--pivots")
     tables = read_predictions([c.file(path) for path in prediction or ()])
     source, drawing = open_source(c, campaign, coefficients, bearing, bool(tables))
     model = model_settings(c, "kirk", thermal, effects, drawing)
@@ -72,10 +71,10 @@ def compare(
                 settings = replace(settings, identify=identify_settings(c, source, method, norm))
                 result = compare_campaign(source, drawing, settings, show, ahead)
             else:
-                share = parse_value(reading_error, "ratio", "--reading-error") if reading_error else None
+                share = parse_share(reading_error, "--reading-error")
                 result = compare_table(coefficients, drawing, settings, share, show)
             result = with_predictions(result, tables)
-            following = next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
+            following = _next_command(result, str(campaign or f"--coefficients {coefficients}"), bearing)
             write_comparison(c, result, show, following)
     show_comparison(c, result, following)
     refuse_comparison(result)
@@ -94,18 +93,18 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
         on_records = difference.b.campaign is not None
         following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
         write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
-    rows = []
-    for row in difference.points.to_dict("records"):
-        judged = {str(name)[:3]: verdict for name, verdict in row.items() if str(name).endswith("_changed")}
-        changed = ", ".join(name for name, verdict in judged.items() if verdict == "yes")
-        counts = Counter(judged.values())
-        row_counts = [str(counts[verdict]) for verdict in ("yes", "no", "cannot tell")]
-        rows.append([row["static_load_N"], row["excitation_Hz"], *row_counts, changed])
-    columns = ["load {load}", "exc. {frequency}", "changed", "same", "cannot tell", *words("which")]
-    title = f"{difference.a.name} and {difference.b.name}"
+    points = difference.points
+    judged = points.filter(like="_changed")
+    shown = points.assign(
+        which=[", ".join(name[:3] for name in row.index[row == "yes"]) for _, row in judged.iterrows()]
+    )
+    columns: dict[str, Column | str] = {"static_load_N": "load {load}", "excitation_Hz": "exc. {frequency}"}
+    for heading, verdict in (("changed", "yes"), ("same", "no"), ("cannot tell", "cannot tell")):
+        shown[heading], columns[heading] = (judged == verdict).sum(axis=1), heading
+    columns["which"] = Column("which", words=True)
     with c.conclusion(difference_sentences(difference), following):
-        c.show(title, columns, rows, file="difference.csv")
-    if difference.points.empty:
+        c.show_frame(f"{difference.a.name} and {difference.b.name}", shown, columns, file="difference.csv")
+    if points.empty:
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
     if bad := difference.untrusted_points():
         raise NotTrustedError(f"{len(bad)} points have a flag that forbids trust: {'; '.join(bad[:5])}.")
@@ -124,15 +123,6 @@ def _side(c: Command, path: Path, bearing: Path | None, method: str, norm: str |
     identification = identified(c, campaign, method, norm)
     drawing = c.bearing_of(campaign, bearing) if bearing is not None or campaign.bearing_text else None
     return measured_side(campaign, identification, None if drawing is None else measure_static(campaign, drawing))
-
-
-def _variants(text: str) -> tuple[str, ...]:
-    from tpjb_ident.compare.comparison import VARIANTS
-
-    names = known_names(text, VARIANTS, "--pivots")
-    if not names:
-        raise BadInputError(f"--pivots: is empty. Use some of {', '.join(VARIANTS)}.")
-    return names
 
 
 def write_comparison(c: Command, result: Comparison, show: Progress, following: str, note: str = "") -> None:
@@ -169,16 +159,15 @@ def show_comparison(c: Command, result: Comparison, following: str = "") -> None
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
 
 
-def next_command(result: Comparison, source: str, bearing: Path | None) -> str:
+def _next_command(result: Comparison, source: str, bearing: Path | None) -> str:
     """Command that comes next: a diagnosis where the model is off, an export where it is not."""
     from tpjb_ident.compare.summary import agreements, closest, is_off
 
     best = closest(agreements(result.table))
-    if best is not None and is_off(best):
-        if result.bearing is None:
-            return ""
-        return f"tpjb diagnose {source}" + (f" --bearing {bearing}" if bearing else "")
-    return f"tpjb export {source} --to ross" if not source.startswith("--") else ""
+    if best is None or not is_off(best):
+        return "" if source.startswith("--") else f"tpjb export {source} --to ross"
+    given = f" --bearing {bearing}" if bearing else ""
+    return "" if result.bearing is None else f"tpjb diagnose {source}{given}"
 
 
 def refuse_comparison(result: Comparison) -> None:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import rigdata
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.check import check_summary
 from tpjb_ident.cli.commands.compare import refuse_comparison, show_comparison, write_comparison
@@ -13,7 +14,6 @@ from tpjb_ident.rounding import counted
 
 if TYPE_CHECKING:
     from tpjb_ident.compare.comparison import Comparison
-
 
 _NEXT = "tpjb init FOLDER-OF-YOUR-RECORDS"
 
@@ -30,7 +30,7 @@ def demo(c: Command) -> None:
     from tpjb_ident.compare.comparison import CompareSettings, compare_campaign, model_side
     from tpjb_ident.runtime.executors import background_job
 
-    path = _sample("demo.h5")
+    path = Path(rigdata.__path__[0]) / "samples" / "demo.h5"
     c.options = {"campaign": path, "thermal": "adiabatic", "pivots": ["rigid", "kirk", "measured"], "method": "mm-eiv"}
     with c.results():
         campaign = c.open(path)
@@ -43,27 +43,17 @@ def demo(c: Command) -> None:
             c.json("check.json", summary)
             result = compare_campaign(campaign, bearing, progress=show, model=model)
             c.table("prediction", result.predictions["measured"].drop(columns="pivot_extrapolated"))
-            truth = json.loads(_sample("demo.truth.json").read_text(encoding="utf-8"))
+            truth = json.loads(path.with_name("demo.truth.json").read_text(encoding="utf-8"))
             error = 100 * _largest_error(result, truth)
             note = f"The records are computed: identified direct coefficients are within {error:.2f} % of the truth."
             write_comparison(c, result, show, _NEXT, note)
-    counts = summary["counts"]
     show_comparison(c, result)
-    c.print(
-        f"Read {len(campaign.runs)} records of {path.name}: {counted(counts['error'], 'error')}, "
-        f"{counted(counts['warning'], 'warning')}."
-    )
+    counts = ", ".join(counted(summary["counts"][severity], severity) for severity in ("error", "warning"))
+    c.print(f"Read {len(campaign.runs)} records of {path.name}: {counts}.")
     c.print(note)
     c.print("On your own campaign: tpjb compare CAMPAIGN   (every command: tpjb --help)")
     c.next("view", c.target)
     refuse_comparison(result)
-
-
-def _sample(name: str) -> Path:
-    """Path of a bundled file."""
-    import rigdata
-
-    return Path(rigdata.__path__[0]) / "samples" / name
 
 
 def _largest_error(result: Comparison, truth: dict[str, Any]) -> float:
@@ -71,10 +61,9 @@ def _largest_error(result: Comparison, truth: dict[str, Any]) -> float:
     import numpy as np
 
     points = {(p["static_load_N"], p["excitation_Hz"]): p for p in truth["points"]}
-    largest = 0.0
+    errors = [0.0]
     for p in result.identification.points:
         true = points[(p.point.static_load, p.point.excitation_hz)]
         for matrix, key in ((p.stiffness.k, "K_apparent"), (p.stiffness.c, "C_apparent")):
-            errors = np.diagonal(matrix) / np.diagonal(np.array(true[key])) - 1.0
-            largest = max(largest, float(np.max(np.abs(errors))))
-    return largest
+            errors += np.abs(np.diagonal(matrix) / np.diagonal(np.array(true[key])) - 1.0).tolist()
+    return max(errors)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import identified
@@ -11,9 +11,6 @@ from tpjb_ident.cli.options import DEMO
 from tpjb_ident.errors import NotTrustedError
 from tpjb_ident.exports.formats import FORMATS, check_format
 from tpjb_ident.rounding import counted, listed
-
-if TYPE_CHECKING:
-    from tpjb_ident.exports.formats import Chosen
 
 
 @command(
@@ -49,16 +46,11 @@ def export(
     c.next("verify", c.target)
     if FORMATS[to]:
         c.note(FORMATS[to])
-    _refuse_doubtful(written.chosen, force)
-
-
-def _refuse_doubtful(chosen: Chosen, forced: bool) -> None:
-    """End with exit code 3 if a point stayed behind, or left because that was forced."""
     parts = []
-    if chosen.left_out:
-        parts.append(f"left out, because their coefficients are not finite: {listed(chosen.left_out, between='; ')}")
-    if doubtful := chosen.doubtful:
-        action = "written because of --force, marked" if forced else "left out (--force writes them, marked)"
+    if left_out := written.chosen.left_out:
+        parts.append(f"left out, because their coefficients are not finite: {listed(left_out, between='; ')}")
+    if doubtful := written.chosen.doubtful:
+        action = "written because of --force, marked" if force else "left out (--force writes them, marked)"
         parts += [f"{counted(len(doubtful), 'point')}, {action}:", listed(doubtful, between="\n")]
     if parts:
         raise NotTrustedError("\n".join(parts))

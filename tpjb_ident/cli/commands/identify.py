@@ -23,7 +23,6 @@ from tpjb_ident.runtime.executors import cores, forks
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
-    from tpjb_ident.identification.plain import PlainSettings
     from tpjb_ident.phasors.run_phasors import PhasorSettings
     from tpjb_ident.runs.run_store import RunStore
 
@@ -57,25 +56,24 @@ def identify(
     frequency, per load), each as .csv and .parquet. Runs excited over a band (multi-sine, noise, sweep, impact) give
     frf, frf_estimators and frf_models. Exit code 3 if a point is not to be trusted.
     """
+    if scheduler is not None and workers is not None:
+        raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
     source = c.open(campaign)
     phasors = _phasor_settings(lines, delay or ())
     settings = replace(identify_settings(c, source, method, norm), phasors=phasors, keep_weights=False)
     from tpjb_ident.identification.identify import identify as run_identification
     from tpjb_ident.runtime.executors import open_workers
 
-    count, start = _worker_count(source, workers, scheduler)
+    team = open_workers(workers, scheduler) if workers or scheduler else open_workers(*_worth_starting(source))
     with c.results():
-        with (
-            open_workers(count, scheduler, start) as team,
-            _finished_runs(c.target) as store,
-            c.progress("identifying") as show,
-        ):
-            result = run_identification(source, settings, show, team, store)
+        with team as opened, _finished_runs(c.target) as store, c.progress("identifying") as show:
+            result = run_identification(source, settings, show, opened, store)
         write_identification(c, result)
         if plain or keep_r:
-            from tpjb_ident.identification.plain import plain_frame, plain_points, write_r_matrices
+            from tpjb_ident.identification.plain import PlainSettings, plain_frame, plain_points, write_r_matrices
 
-            plain_settings = _plain_settings(window, norm)
+            length = parse_value(window, "time", "--window", _SHORTEST)
+            plain_settings = PlainSettings(length, norm or "huber")
             points = plain_points(source, plain_settings)
             c.table("plain", plain_frame(points, plain_settings))
             if keep_r:
@@ -107,17 +105,12 @@ def _finished_runs(target: Path) -> Iterator[RunStore]:
     store.clear()
 
 
-def _worker_count(campaign: Campaign, wanted: int | None, scheduler: str | None) -> tuple[int | None, str | None]:
-    """Processes to use, and how they begin: as wanted, else one per core where the records pay for starting them."""
-    if scheduler is not None and wanted is not None:
-        raise BadInputError("--workers: processes here, and --scheduler: a cluster, exclude each other. Give one.")
-    if scheduler is not None or wanted is not None:
-        return wanted, None
-    size = sum(path.stat().st_size for path in campaign.files.values() if path.is_file())
-    if size > WORTH_PROCESSES:
-        return None, None
-    copies = min(cores(), MOST_COPIES) if forks() and len(campaign.of_kind("dynamic")) > WORTH_COPIES else 1
-    return copies, "fork"
+def _worth_starting(campaign: Campaign) -> tuple[int | None, None, str | None]:
+    """Processes that pay for being started, and how they begin: one per core for long records, else copies of this."""
+    if sum(path.stat().st_size for path in campaign.files.values() if path.is_file()) > WORTH_PROCESSES:
+        return None, None, None
+    many = forks() and len(campaign.of_kind("dynamic")) > WORTH_COPIES
+    return min(cores(), MOST_COPIES) if many else 1, None, "fork"
 
 
 def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings:
@@ -131,10 +124,3 @@ def _phasor_settings(lines: str | None, delays: Sequence[str]) -> PhasorSettings
         refuse_unknown(quantity, QUANTITIES, "--delay")
         times[quantity] = parse_value(time, "time", f"--delay {quantity}")
     return PhasorSettings(excitation_lines=tuple(omega / (2 * math.pi) for omega in excited), delays=times)
-
-
-def _plain_settings(window: str, norm: str | None) -> PlainSettings:
-    """Build `PlainSettings` from ``--window`` and ``--norm``."""
-    from tpjb_ident.identification.plain import PlainSettings
-
-    return PlainSettings(parse_value(window, "time", "--window", _SHORTEST), norm or "huber")

@@ -34,21 +34,22 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
         c.table("pivot_pads", pads_table(curves))
         write_pivots(c.folder / "pivots.toml", curves, source.id)
         c.draw(pivot_panels(curves, formula))
-    tested = {run.pad for run in source.of_kind("dry_pivot")}
+    tested = {run.pad or 0 for run in source.of_kind("dry_pivot")}
     c.print(f"{source.id}: {len(curves)} of {len(tested)} pads with dry tests have a pivot curve.")
     full = min((curve.valid_to for curve in curves), default=0.0)  # that all pads were tested at
     c.show_table(pivot_stiffness_table(curves, formula, (0.5 * full, full)), source.id)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
-    conditions = [(curve.pad, condition) for curve in curves for condition in curve.status]
-    for text in dict.fromkeys(condition.sentence() for _, condition in conditions if condition in ABOUT_ALL):
+    notes, bad = [], []
+    for curve in curves:
+        for condition in curve.status:
+            text = condition.sentence()
+            notes.append(text if condition in ABOUT_ALL else f"pad #{curve.pad}: {text}")
+        bad += [f"pad {curve.pad}: {condition.sentence()}" for condition in untrusted(curve.status)]
+    for text in dict.fromkeys(notes):
         c.note(text)
-    for pad, condition in conditions:
-        if condition not in ABOUT_ALL:
-            c.note(f"pad #{pad}: {condition.sentence()}")
-    bad = [f"pad {curve.pad}: {condition.sentence()}" for curve in curves for condition in untrusted(curve.status)]
-    without = {run.pad or 0 for run in source.of_kind("dry_pivot")} - {curve.pad for curve in curves}
-    bad += [f"pad {pad}: has no curve, its records were refused" for pad in sorted(without)]
+    without = sorted(tested - {curve.pad for curve in curves})
+    bad += [f"pad {pad}: has no curve, its records were refused" for pad in without]
     if bad:
         raise NotTrustedError("; ".join(bad))

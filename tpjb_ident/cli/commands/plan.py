@@ -14,8 +14,6 @@ from tpjb_ident.rounding import counted, signed
 
 if TYPE_CHECKING:
     from model.effects.kind import Parameter
-    from model.setup import Setup
-    from tpjb_ident.diagnosis.observations.observe import Layout
     from tpjb_ident.diagnosis.plan import CampaignPlan
 
 
@@ -48,10 +46,12 @@ def plan(
     and a matrix and a picture of each.
     """
     drawing = c.bearing(bearing)
+    import pandas as pd
+
     from model.pivots import pivot_laws
     from model.setup import Setup
+    from tpjb_ident.diagnosis import plan as planning
     from tpjb_ident.diagnosis.from_python import planned_layout
-    from tpjb_ident.diagnosis.plan import plan as plan_campaign
     from tpjb_ident.report.panels import isolability_panels
 
     points = operating_points(load, load_direction, speed, excitation, rotation_choice(c, rotation, drawing))
@@ -59,11 +59,13 @@ def plan(
     with c.results("planning") as show:
         show("every effect of the library", 0, 1)
         setup = Setup(drawing, pivot_laws(pivot_choice(c, pivots), drawing))
-        result = plan_campaign(setup, tests)
+        result = planning.plan(setup, tests)
         plans = {"isolability": result}
         if data_sets:
             show("parts of the campaign", 1, 2)
-            plans |= _data_sets(c, setup, tests)
+            sets = planning.data_sets(setup, tests)
+            c.table("data_sets", pd.DataFrame([data_set.to_row() for data_set in sets]))
+            plans |= {f"isolability_{data_set.name}": data_set.free for data_set in sets}  # calibration errors free
         c.table("effects", result.to_frame())
         for name, part in plans.items():
             c.table(name, part.matrix())
@@ -71,17 +73,6 @@ def plan(
         c.json("plan.json", result.to_dict())
     _show(c, result)
     c.next("simulate", bearing)
-
-
-def _data_sets(c: Command, setup: Setup, tests: Layout) -> dict[str, CampaignPlan]:
-    """Write the table of data sets; what each could tell with calibration errors free, by file name."""
-    import pandas as pd
-
-    from tpjb_ident.diagnosis.plan import data_sets
-
-    sets = data_sets(setup, tests)
-    c.table("data_sets", pd.DataFrame([data_set.to_row() for data_set in sets]))
-    return {f"isolability_{data_set.name}": data_set.free for data_set in sets}
 
 
 def _detected_from(size: float, parameter: Parameter) -> str:
@@ -104,12 +95,12 @@ def _show(c: Command, result: CampaignPlan) -> None:
         size = _detected_from(float(row["seen_from"]), candidate.parameter)
         like = label_in_words(row["mistaken_for"]) or "-"
         rows.append([label_in_words(row["effect"]), row["typical_size_sigma"], size, like])
-    columns = [*words("effect"), Column("sigma", ".1f"), "seen from", *words("like")]
     seen = len(rows) - len(result.below_floor)
     c.print(
         f"{seen} of {counted(len(rows), 'effect')} would be seen at a typical size; {len(result.confusable)} of "
         f"{result.pairs} pairs could not be told apart."
     )
+    columns = [*words("effect"), Column("sigma", ".1f"), "seen from", *words("like")]
     c.show("What this campaign could tell", columns, rows)
     c.print("sigma: standard deviations that the effect is seen with at a typical size; like: what looks the same.")
     blind = ", ".join(label_in_words(name) for name in result.below_floor)

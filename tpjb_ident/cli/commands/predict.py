@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
-from tpjb_ident.cli.inputs import (
-    model_settings,
-    operating_points,
-    parse_value,
-    pivot_choice,
-    rotation_choice,
-)
+from tpjb_ident.cli.inputs import model_settings, operating_points, parse_value, pivot_choice, rotation_choice
 from tpjb_ident.cli.options import PHYSICS, ROCKER, known_names
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
@@ -31,8 +25,9 @@ if TYPE_CHECKING:
 
 #: Points that take less time than pandas to load.
 FEW = 20
-#: Rows of the printed table, and its columns by those of prediction.csv.
-MOST_ROWS = 20
+#: Share of a direct coefficient from which the mesh is too coarse.
+_COARSE = 0.05
+#: Columns of the printed table, by those of prediction.csv.
 COLUMNS: dict[str, Column | str] = {
     "static_load_N": Column("load {load}", words=True),
     "static_load_direction_deg": "dir {angle}",
@@ -81,19 +76,15 @@ def predict(
     bad = int((~frame["converged"]).sum())
     state = f"{bad} did NOT converge" if bad else "all converged"
     c.print(f"{drawing.name}: {counted(len(frame), 'operating point')}, {state}.")
+    c.next("export", c.target, "--to", "ross")
+    c.show_frame(drawing.name, frame, COLUMNS, "prediction.csv")
     if bad:  # whether the bearing carries the load at all
         c.next("predict", bearing, "--load", load, "--speed", speed, "--pivots", "rigid", "--thermal", "isothermal")
-    else:
-        c.next("export", c.target, "--to", "ross")
-    c.show(drawing.name, list(COLUMNS.values()), frame.head(MOST_ROWS)[list(COLUMNS)].itertuples(index=False))
-    if len(frame) > MOST_ROWS:
-        c.print(f"... and {len(frame) - MOST_ROWS} more rows in prediction.csv")
-    if bad:
         raise NotTrustedError(
             f"{bad} of {len(frame)} points did not converge; their status says why, their values are NaN."
         )
     mesh_error = float(frame["mesh_error"].max())
-    if mesh_error > 0.05:
+    if mesh_error > _COARSE:
         raise NotTrustedError(f"the mesh error reaches {100 * mesh_error:.0f} % of a direct coefficient.")
 
 
@@ -118,7 +109,7 @@ def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], setti
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
     """Read `--physics` and `--housing-temperature`."""
-    chosen = known_names(names or "", PHYSICS, "--physics")
+    chosen = known_names(names, PHYSICS, "--physics") if names else ()
     if housing is not None and "growth" not in chosen:
         raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
     if "jfo" in chosen and "turbulence" in chosen:
@@ -126,15 +117,13 @@ def parse_physics(names: str | None, housing: str | None) -> Options:
     from model.growth import Growth
     from model.options import Options
 
-    growth = None
-    if "growth" in chosen:
-        temperature = None
-        if housing is not None:  # the model counts in degC
-            temperature = round(parse_value(housing, "temperature", "--housing-temperature") - ZERO_CELSIUS, 9)
-        try:
-            growth = Growth(housing=temperature)
-        except ValueError as error:
-            raise BadInputError(f"--housing-temperature: {error}.") from error
+    temperature = None
+    if housing is not None:  # the model counts in degC
+        temperature = round(parse_value(housing, "temperature", "--housing-temperature") - ZERO_CELSIUS, 9)
+    try:
+        growth = Growth(housing=temperature) if "growth" in chosen else None
+    except ValueError as error:
+        raise BadInputError(f"--housing-temperature: {error}.") from error
     return Options(
         conduction="conduction" in chosen,
         isothermal_journal="journal" in chosen,
