@@ -17,7 +17,6 @@ import pytest
 from rigdata.virtual_rig import Fault, write_campaign
 from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig
-from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.watch.landing import NewFiles
 from tpjb_ident.watch.watcher import Watcher
 
@@ -69,7 +68,7 @@ def land(source, live, *runs):
 
 
 def watcher(live, settle: float = 0.0) -> Watcher:
-    return Watcher(live, NewFiles(settle), IdentifySettings())
+    return Watcher(live, NewFiles(settle))
 
 
 def states(snapshot) -> dict[str, str]:

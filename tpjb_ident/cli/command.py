@@ -371,6 +371,6 @@ def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]
 
 
 def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as JSON holds them; of a file its name: its place is of no use elsewhere, its SHA-256 says what it was."""
+    """Options as JSON holds them; of a file its name: its place is of no use elsewhere, its SHA-256 tells which."""
     plain: dict[str, Any] = json.loads(json.dumps(options, default=lambda value: getattr(value, "name", str(value))))
     return plain

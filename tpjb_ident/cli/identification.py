@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: Share of the mean direct coefficient from which a cross-coupled one is shown.
 _CROSS_COUPLED = 0.1
-#: About so many lines of h over a band are shown; all are in the table on disk.
-_MOST_LINES = 20
 
 
 def with_half(value: float, half: float) -> str:
@@ -45,32 +43,19 @@ def coefficients(names: str) -> dict[str, Column | str]:
     return {coefficient_column(name): column for name, column in shown.items()}
 
 
-_LOAD: dict[str, Column | str] = {"static_load_N": "load {load}"}
-_POINT: dict[str, Column | str] = {
-    **_LOAD,
+POINT: dict[str, Column | str] = {
+    "static_load_N": "load {load}",
     "static_load_direction_deg": "dir. {angle}",
     "shaft_speed_Hz": "speed {speed}",
     "excitation_Hz": "exc. {frequency}",
 }
 _DIRECT = coefficients("kxx kyy cxx cyy")
 _MODELS: dict[str, Column | str] = {
-    **_LOAD,
+    "static_load_N": "load {load}",
     "model": Column("model", words=True),
     **_DIRECT,
     **coefficients("mxx myy"),
     "supported": Column("supported", words=True),
-}
-_LINES: dict[str, Column | str] = {
-    **_LOAD,
-    "excitation": Column("excitation", words=True),
-    "excitation_Hz": Column("{frequency}", ".4g"),
-    "hxx_real_N_per_m": Column("Re hxx {stiffness}", with_half),
-    "hyy_real_N_per_m": Column("Re hyy {stiffness}", with_half),
-    "hxx_imag_N_per_m": Column("Im hxx {stiffness}", with_half),
-    "hyy_imag_N_per_m": Column("Im hyy {stiffness}", with_half),
-    "coherence_x": Column("coh. x", ".3f"),
-    "coherence_y": Column("coh. y", ".3f"),
-    "method": Column("method", words=True),
 }
 
 
@@ -156,12 +141,8 @@ def show_identification(c: Command, result: Identification) -> None:
         _show_coefficients(c, f"{result.campaign}: {result.method}, 95 % intervals", c.frames["coefficients"])
     for name, over in (("frequency_fits", "frequency"), ("frf_models", "the band")):
         if name in c.frames:
-            title = f"models over {over}, 95 % intervals; raw H: none, use h or the coefficients at each frequency"
+            title = f"models over {over}, 95 % intervals; raw H: none, use frf.csv or the coefficients"
             c.show_frame(title, c.frames[name], _MODELS, f"{name}.csv")
-    if "frf" in c.frames:
-        lines = c.frames["frf"]
-        every = lines.iloc[:: 1 + len(lines) // _MOST_LINES]
-        c.show_frame("dynamic stiffness over the band, some lines of frf.csv", every, _LINES)
     for remark in result.remarks():
         c.print(f"note: {remark}")
 
@@ -171,7 +152,7 @@ def _show_coefficients(c: Command, title: str, frame: pd.DataFrame) -> None:
     if frame.empty:
         return
     rotation: dict[str, Column | str] = {"rotation": Column("rotation", words=True)}
-    point = _POINT | (rotation if "clockwise" in set(frame["rotation"]) else {})
+    point = POINT | (rotation if "clockwise" in set(frame["rotation"]) else {})
     share, flags = Column("out {share}", ".0f"), Column("flags", words=True)
     c.show_frame(
         title, frame, {**point, **_DIRECT, "outlier_fraction": share, "quality": flags}, file="coefficients.csv"

@@ -1,4 +1,4 @@
-"""Every option and argument that can be typed, by command and name, and their order in the help."""
+"""Every option and argument that can be typed, by command and name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from typer import Argument, Option
-from typer.core import TyperCommand
 from typer.models import ParameterInfo
 
 from rigdata.near_names import hint
@@ -148,40 +147,3 @@ def known_names(text: str, known: Iterable[str], option: str) -> tuple[str, ...]
     for name in names:
         refuse_unknown(name, known, option)
     return names
-
-
-#: Parameters from which on headings help more than they cost.
-_MANY = 11
-#: Headings of the help with the parameters under them, in their order; others stand under "Options".
-_HEADINGS = {
-    "Arguments": "",
-    "Operating points": "load load_direction speed rotation excitation",
-    "Model": "bearing pivots thermal effects physics housing_temperature model_tolerance tolerance library",
-    "A table in place of records": "coefficients reading_error",
-    "Estimation": "method norm lines delay",
-    "Tests": "plan locus dry push temperatures repeats noise fault",
-    "Options": "",
-    "Running": "workers scheduler seed",
-    "Output": "name layout plain keep_r window data_sets out as_json units quiet help",
-}
-
-
-class GroupedHelp(TyperCommand):
-    """A command whose help lists its options under headings, in plain text, where there are many."""
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write arguments, then options by heading; what every command has stands last."""
-        parameters = self.get_params(ctx)
-        groups: dict[str, list[tuple[str, str]]] = {heading: [] for heading in _HEADINGS}
-        for parameter in parameters:
-            heading = next((h for h, names in _HEADINGS.items() if parameter.name in names.split()), "Options")
-            if parameter.param_type_name == "argument":
-                heading = "Arguments"
-            elif len(parameters) < _MANY:
-                heading = "Options"
-            if record := parameter.get_help_record(ctx):
-                groups[heading].append(record)
-        for heading, records in groups.items():
-            if records:
-                with formatter.section(heading):
-                    formatter.write_dl(records)

@@ -211,23 +211,21 @@ def wrapped(text: str, width: int) -> list[str]:
 def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> list[str]:
     """Lines of a title and its table; of one that is too wide, columns of one and the same number go to the title."""
     columns = list(range(len(headings)))
-    if rows and max(map(cell_len, table_lines(headings, rows, words, sys.maxsize))) > _width():
+    if rows and _total(_sizes([headings, *rows])) > _width():
         columns = [i for i in columns if i in words or len({row[i] for row in rows}) > 1]
         constant = sorted(set(range(len(headings))) - set(columns))
         title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
-    varying = [[row[i] for i in columns] for row in rows]
-    texts = [columns.index(i) for i in words]
-    lines = table_lines([headings[i] for i in columns], varying, texts, _width())
+    varying = [[row[i] for i in columns] for row in [headings, *rows]]
+    lines = table_lines(varying[0], varying[1:], [columns.index(i) for i in words], _width())
     return [*wrapped(title, _width()), *lines, ""]
 
 
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int], width: int) -> list[str]:
     """Lay out a table: no cell is broken, what has no room is printed below its row, words before numbers."""
-    cells = [max((cell_len(row[i]) for row in rows), default=0) for i in range(len(columns))]
-    sizes = [max(cell, cell_len(column)) for cell, column in zip(cells, columns, strict=True)]
+    sizes = _sizes([columns, *rows])
     if _total(sizes) > width:  # headings break at spaces first
-        longest = [max(map(cell_len, column.split()), default=0) for column in columns]
-        sizes = [max(pair) for pair in zip(cells, longest, strict=True)]
+        longest = [max(column.split(), key=cell_len, default="") for column in columns]
+        sizes = _sizes([longest, *rows])
     beside = list(range(len(columns)))
     while len(beside) > 1 and _total([sizes[i] for i in beside]) > width:
         beside.remove(max([i for i in beside[1:] if i in words] or beside))
@@ -249,6 +247,11 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], words: Co
         if texts:
             lines += [f"    {part}" for part in wrapped("; ".join(texts), width - 4)]
     return lines
+
+
+def _sizes(rows: Iterable[Sequence[str]]) -> list[int]:
+    """Size of the widest cell of each column."""
+    return [max(map(cell_len, cells)) for cells in zip(*rows, strict=True)]
 
 
 def _total(sizes: Sequence[int]) -> int:

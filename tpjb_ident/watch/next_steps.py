@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -198,81 +199,73 @@ def located(problem: Problem) -> str:
 
 def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     """A fault of one channel in the last records in a row: the next one will have it too."""
-    landed = sorted((s for s in states if s.landed), key=lambda s: s.landed)
-    if not landed:
-        return [], set()
+    landed = sorted((s for s in states if s.landed), key=lambda s: s.landed)[::-1]
     steps, stopped = [], set()
-    for finding in landed[-1].findings:
+    for finding in landed[0].findings if landed else ():
         if not finding.key.startswith(_LOST_SAMPLES) or finding.problem.severity == "note":
             continue
-        row: list[str] = []
-        for status in reversed(landed):
-            if finding.key not in {f.key for f in status.findings}:
-                break
-            row.append(status.run.id)
-        if len(row) >= _IN_A_ROW:
-            stopped.update(row)
-            runs = tuple(reversed(row))
+        with_it = itertools.takewhile(lambda s: finding.key in {f.key for f in s.findings}, landed)  # noqa: B023 (here)
+        runs = tuple(s.run.id for s in with_it)[::-1]
+        if len(runs) >= _IN_A_ROW:
+            stopped.update(runs)
             p = finding.problem
-            text = f"Stop: {located(p)}, in the last {len(row)} records ({listed(runs)}). {p.cure}, then repeat them."
+            text = f"Stop: {located(p)}, in the last {len(runs)} records ({listed(runs)}). {p.cure}, then repeat them."
             steps.append(Step("stop", text, runs))
     return steps, stopped
 
 
 def _repeats(states: Sequence[RunStatus], at: Run | None) -> list[Step]:
-    now: list[Step] = []
-    later: list[Step] = []
+    """Runs to be made again: first what the rig stands at, then what takes another set-up."""
+    steps: list[tuple[bool, Step]] = []
     for status in states:
-        problem = status.first
+        problem, run = status.first, status.run
         if status.state != "repeat" or problem is None:
             continue
-        run, why = status.run, f"{located(problem)}. {problem.cure}."
-        same_set_up = at is None or _set_up(run) == _set_up(at)
-        when = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
-        if run.kind not in _TURNING:
-            when = f"({described(run)})"
-        elif same_set_up:
-            when = "before you change the load"
-        step = Step("repeat", f"Repeat {run.id} {when}: {why}", (run.id,))
-        (now if same_set_up or run.kind not in _TURNING else later).append(step)
-    return now + later
+        is_later = False
+        when = f"({described(run)})"
+        if run.kind in _TURNING:
+            is_later = at is not None and _set_up(run) != _set_up(at)
+            back = f"when you are back at {_load(run.point)}, {run.point.shaft_speed_hz:g} Hz"
+            when = back if is_later else "before you change the load"
+        text = f"Repeat {run.id} {when}: {located(problem)}. {problem.cure}."
+        steps.append((is_later, Step("repeat", text, (run.id,))))
+    return [step for _, step in sorted(steps, key=lambda pair: pair[0])]
 
 
 def _more(states: Sequence[RunStatus], points: Sequence[PointResult], within: float | None) -> list[Step]:
     """Points that are measured as planned and still not as sure as wanted."""
     if within is None:
         return []
+    unfinished = {s.run.point for s in states if s.state in ("to run", "being written", "repeat")}
     steps = []
     for point in points:
-        if any(s.state in ("to run", "being written", "repeat") and s.run.point == point.point for s in states):
-            continue
         widest, name, random_alone = _widest(point)
-        if not widest > within:
+        if point.point in unfinished or not widest > within:
             continue
         place = place_of(point.point.static_load, point.point.excitation_hz)
-        share = f"{name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
+        share = f"{place}: {name} is known to {100 * widest:.1f} %, {100 * within:g} % is wanted"
         random_allowed = within**2 - max(0.0, widest**2 - random_alone**2)
         if random_allowed <= 0.25 * within**2:
-            steps.append(Step("more", f"{place}: {share}; calibration sets that, more records do not help."))
-            continue
-        more = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
-        many = f"about {counted(more, 'more record')} like those there would do"
-        steps.append(Step("more", f"{place}: {share}; {many}.", point.runs))
+            steps.append(Step("more", f"{share}; calibration sets that, more records do not help."))
+        else:
+            more = math.ceil(point.n_records * (random_alone**2 / random_allowed - 1.0))
+            many = f"about {counted(more, 'more record')} like those there would do"
+            steps.append(Step("more", f"{share}; {many}.", point.runs))
     return steps
+
+
+#: Direct coefficients and their places among (kxx, kxy, kyx, kyy, cxx, .. cyy).
+_DIRECT = {"kxx": 0, "kyy": 3, "cxx": 4, "cyy": 7}
 
 
 def _widest(point: PointResult) -> tuple[float, str, float]:
     """Half interval of the direct coefficient known worst, as a share of their mean, and its random part."""
-    est = point.stiffness
-    half = est.half_width()
-    random = est.half_width(systematic=False)
-    shares = []
-    for name, i, pair in (("kxx", 0, (0, 3)), ("kyy", 3, (0, 3)), ("cxx", 4, (4, 7)), ("cyy", 7, (4, 7))):
-        mean = 0.5 * (abs(est.vector[pair[0]]) + abs(est.vector[pair[1]]))
-        share = float(half[i] / mean)
-        if math.isfinite(share):
-            shares.append((share, name, float(random[i] / mean)))
-    return max(shares, default=(math.nan, "", math.nan))
+    est, direct = point.stiffness, list(_DIRECT.values())
+    mean = np.repeat(np.abs(est.vector[direct]).reshape(2, 2).mean(axis=1), 2)
+    shares, random = est.half_width()[direct] / mean, est.half_width(systematic=False)[direct] / mean
+    known = np.where(np.isfinite(shares), shares, -1.0)  # what is not known at all is told elsewhere
+    worst = int(known.argmax())
+    return float(known[worst]), list(_DIRECT)[worst], float(random[worst])
 
 
 def _next(states: Sequence[RunStatus], at: Run | None) -> list[Step]:

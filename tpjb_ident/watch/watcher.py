@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import functools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -88,8 +89,7 @@ class Watcher:
 
     folder: Path
     files: NewFiles
-    settings: IdentifySettings
-    pad_angles: tuple[float, ...] = ()
+    bearing: Any = None
     store: RunStore | None = None
     within: float | None = None
     _campaign: Campaign | None = None
@@ -211,7 +211,7 @@ class Watcher:
             campaign=campaign,
             states=tuple(states),
             steps=tuple(next_steps(states, common, measured.points, self.within)),
-            lacks=tuple(plan_lacks(runs, len(self.pad_angles))),
+            lacks=tuple(plan_lacks(runs, 0 if self.bearing is None else len(self.bearing.pads))),
             measured=measured,
             problems=(*problems, *campaign.notes, *unknown),
             new=tuple(new),
@@ -221,25 +221,27 @@ class Watcher:
 
     def _measured(self, good: Campaign) -> Measured:
         """Results of the runs that count, each made anew where its runs have news."""
+        pads = () if self.bearing is None else self.bearing.pads
+        angles = [pad.pivot_angle for pad in pads]
+        clearance = min((pad.assembled_clearance for pad in pads), default=None)
+        settings = IdentifySettings(clearance=clearance, keep_weights=False)
+        measures: dict[str, tuple[str, Callable[[], Any]]] = {
+            "identification": ("dynamic", lambda: identify(good, settings, store=self.store)),
+            "curves": ("dry_pivot", lambda: fit_pivots(good, angles, PivotSettings(on_refusal="skip"))),
+            "polygon": ("clearance", lambda: measure_clearance(good, angles)),
+        }
         results: dict[str, Any] = {}
-        refusals: list[str] = []
-        for kind, name, measure in (
-            ("dynamic", "identification", lambda: identify(good, self.settings, store=self.store)),
-            ("dry_pivot", "pivots", lambda: fit_pivots(good, self.pad_angles, PivotSettings(on_refusal="skip"))),
-            ("clearance", "clearance", lambda: measure_clearance(good, self.pad_angles)),
-        ):
+        refusals = []
+        for name, (kind, measure) in measures.items():
             runs = good.of_kind(kind)
-            if not runs or not (self.pad_angles or kind == "dynamic"):
-                continue
-            mark = frozenset((run.id, self._records[run.id].mark) for run in runs)
-            former = self._made.get(name, (None, (None, "")))[1][0]
-            result, refusal = self._unless_changed(
-                name, mark, functools.partial(_unless_refused, name, measure, former)
-            )
-            results[kind] = result
-            refusals += [refusal] if refusal else []
-        curves = results.get("dry_pivot") or ()
-        return Measured(results.get("dynamic"), curves, results.get("clearance"), tuple(refusals))
+            if runs and (angles or kind == "dynamic"):
+                mark = frozenset((run.id, self._records[run.id].mark) for run in runs)
+                former = self._made.get(name, (None, (None, "")))[1][0]
+                make = functools.partial(_unless_refused, f"{kind} runs", measure, former)
+                results[name], refusal = self._unless_changed(name, mark, make)
+                refusals += [refusal] if refusal else []
+        results = {name: result for name, result in results.items() if result is not None}
+        return Measured(**results, refusals=tuple(refusals))
 
 
 def _unless_refused(name: str, measure: Callable[[], Any], former: Any) -> tuple[Any, str]:
@@ -253,14 +255,10 @@ def _unless_refused(name: str, measure: Callable[[], Any], former: Any) -> tuple
 def _read(run: Run, path: Path, mark: tuple[Any, ...]) -> _Record:
     """Read a record: what it shows, when it landed, in ISO form of this place, its SHA-256 and its length [s]."""
     changed = datetime.datetime.fromtimestamp(1e-9 * mark[0][1], datetime.UTC)
-    try:
+    digest, seconds = "missing", 0.0
+    with contextlib.suppress(OSError, RigDataError):  # gone or locked again, which its state tells, or damaged
         digest = sha256(path)
-    except OSError:  # gone or locked again: its state tells
-        digest = "missing"
-    try:
         seconds = run.length / run.sample_rate
-    except RigDataError:
-        seconds = 0.0
     return _Record(mark, observe(run), changed.astimezone().isoformat(timespec="milliseconds"), digest, seconds)
 
 
@@ -268,12 +266,11 @@ def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[flo
     """Note records below `_WHOLE` of the median length of their kind, before everything else that follows from it."""
     of_kind: dict[str, list[float]] = {}
     for observation, length in zip(observations, lengths, strict=True):
-        if length > 0:
-            of_kind.setdefault(observation.run.kind, []).append(length)
+        of_kind.setdefault(observation.run.kind, []).append(length or math.nan)
     for observation, length in zip(observations, lengths, strict=True):
-        same_kind = of_kind.get(observation.run.kind, [0.0])
-        usual = median(same_kind)
-        if 0 < length < _WHOLE * usual and len(same_kind) > 2:
+        same_kind = of_kind[observation.run.kind]
+        usual = float(np.nanmedian(same_kind)) if length else 0.0
+        if 0 < length < _WHOLE * usual and np.isfinite(same_kind).sum() > 2:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
             observation.report.say("short record", "error", "record", what, cure)

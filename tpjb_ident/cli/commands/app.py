@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import importlib
+from typing import Annotated, Any
 
 import typer
 
 from tpjb_ident.cli.command import COMMANDS
-from tpjb_ident.cli.commands import (
-    check,
-    compare,
-    demo,
-    diagnose,
-    export,
-    identify,
-    init,
-    locus,
-    pivot,
-    plan,
-    predict,
-    rerun,
-    show,
-    simulate,
-    verify,
-    view,
-    watch,
-)  # fmt: skip
-from tpjb_ident.cli.options import GroupedHelp
 
 #: What is written outside --out.
 _CACHES = (
@@ -61,11 +42,12 @@ def _common(
     pass
 
 
+#: Files of this folder, in the order of the help.
 _IN_ORDER = (
-    init, show, check, identify, pivot, locus, predict, compare, diagnose, plan, simulate, demo, export, view,
-    watch, verify, rerun,
-)  # fmt: skip
-for module in _IN_ORDER:
-    name = module.__name__.rpartition(".")[2]
-    lines = "\n".join(f"  {example}" for example in COMMANDS[name].examples)  # type: ignore[attr-defined]
-    app.command(name, cls=GroupedHelp, epilog=f"\b\nExamples:\n{lines}")(COMMANDS[name])
+    "init show check identify pivot locus predict compare diagnose plan simulate demo export view watch verify rerun"
+)
+for name in _IN_ORDER.split():
+    importlib.import_module(f"tpjb_ident.cli.commands.{name}")
+    function: Any = COMMANDS[name]
+    lines = "\n".join(f"  {example}" for example in function.examples)
+    app.command(name, epilog=f"\b\nExamples:\n{lines}")(function)

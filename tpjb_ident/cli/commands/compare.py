@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.difference import Side
     from tpjb_ident.compare.predictions import Progress
 
+#: Coefficients that are shown.
+DIRECT = ("kxx", "kyy", "cxx", "cyy")
+
 
 @command(
     f"tpjb compare {DEMO}",
@@ -94,16 +97,12 @@ def _compare_two(c: Command, paths: tuple[Path, Path], bearing: Path | None, met
         following = f"tpjb diagnose {paths[1]}" if on_records else f"tpjb view {c.target}"
         write_difference_report(c.folder, difference, named(c.options), c.inputs, following)
     points = difference.points
-    judged = points.filter(like="_changed")
-    shown = points.assign(
-        which=[", ".join(name[:3] for name in row.index[row == "yes"]) for _, row in judged.iterrows()]
-    )
     columns: dict[str, Column | str] = {"static_load_N": "load {load}", "excitation_Hz": "exc. {frequency}"}
-    for heading, verdict in (("changed", "yes"), ("same", "no"), ("cannot tell", "cannot tell")):
-        shown[heading], columns[heading] = (judged == verdict).sum(axis=1), heading
-    columns["which"] = Column("which", words=True)
+    for name in DIRECT:
+        columns[f"{name}_changed"] = Column(name, words=True)
     with c.conclusion(difference_sentences(difference), following):
-        c.show_frame(f"{difference.a.name} and {difference.b.name}", shown, columns, file="difference.csv")
+        title = f"{difference.a.name} and {difference.b.name}: changed?"
+        c.show_frame(title, points, columns, file="difference.csv")
     if points.empty:
         raise NotTrustedError("the two have no operating point in common. Their set points are in the message above.")
     if bad := difference.untrusted_points():
@@ -154,7 +153,7 @@ def show_comparison(c: Command, result: Comparison, following: str = "") -> None
     rows = []
     for name, agreement in agreements(result.table).iterrows():
         rows.append([str(name), *map(percent, agreement["median"]), number_inside(agreement)])
-    columns = [*words("pivots"), "kxx", "kyy", "cxx", "cyy", "inside"]
+    columns = [*words("pivots"), *DIRECT, "inside"]
     with c.conclusion(summary_sentences(result), following):
         c.show(f"{result.campaign.id}: predicted / measured - 1, median", columns, rows)
 

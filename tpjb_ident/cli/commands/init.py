@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 MANIFEST = "campaign.toml"
 #: What a draft of the bearing is called, and its text in the model's package.
 BEARING, DRAFT = "bearing.toml", "bearing_draft.toml"
-#: Records that are listed; the manifest has all of them.
-MOST_RECORDS = 20
 
 
 @command("tpjb init exports", "tpjb init exports --bearing rocker.toml")
@@ -36,85 +34,77 @@ def init(c: Command, folder: Path, bearing: str | None = None, update: bool = Fa
     rig can know ??. Records are only read. A campaign.toml that is there already stays as it is; with --update it is
     carried on: what you typed stays, open places and guesses are made anew, new records become runs.
     """
+    from rigdata.manifest.fields import open_paths, open_summary
+    from rigdata.survey.draft import column_names, updated_manifest
+
     if not folder.is_dir():
         raise BadInputError(f"{folder}: is no folder. Give the folder that holds the records.")
     c.target = c.out or folder
-    bearing = bearing or _bearing_file(folder)
-    text = (_update if update else _draft)(c, folder, bearing)
-    if _open_summary(text):
-        c.next("init", folder, "--update")
-    else:
-        c.next("check", folder)
-
-
-def _draft(c: Command, folder: Path, bearing: str | None) -> str:
-    from rigdata.survey.draft import draft_manifest
-    from rigdata.survey.survey import survey
-
     manifest = c.target / MANIFEST
-    if manifest.exists():
+    if update and not manifest.is_file():
+        raise BadInputError(f"{manifest}: is not there, so there is nothing to carry on. Leave --update out.")
+    if manifest.exists() and not update:
         raise BadInputError(
             f"{manifest}: is there already and stays as it is. Give --update to carry it on, another --out, "
             "or move the file away."
         )
-    exports, problems = _read_exports(c, folder, ())
-    name = re.sub(r"[^\w.+=@-]+", "-", folder.resolve().name) or "campaign"
-    guesses = survey(exports, pivots=_pivot_angles(folder, bearing))
-    text = draft_manifest(guesses, name, bearing or BEARING)
-    c.target.mkdir(parents=True, exist_ok=True)
-    _write(c, MANIFEST, text)
-    c.print(_verdict(manifest, guesses, text))
-    _show_survey(c, guesses, folder.name)
-    for problem in problems:
-        c.warn(f"left out: {problem}")
-    if bearing is None and not (c.target / BEARING).exists():
-        _write(c, BEARING, _bearing_draft(guesses))
-        c.print(f"{c.target / BEARING}: to be filled in from drawing and data sheet; `identify` needs none.")
-    return text
-
-
-def _update(c: Command, folder: Path, bearing: str | None) -> str:
-    from rigdata.survey.draft import column_names, updated_manifest
-
-    manifest = c.target / MANIFEST
-    if not manifest.is_file():
-        raise BadInputError(f"{manifest}: is not there, so there is nothing to carry on. Leave --update out.")
-    before = manifest.read_text("utf-8-sig")
-    exports, problems = _read_exports(c, folder, column_names(before))
-    text, changes = updated_manifest(before, exports, _pivot_angles(folder, bearing))
-    count = "nothing to change"
-    if text.split() != before.split():
-        count = f"{len(changes)} changes, the former one is {manifest.name}.bak"
-        write_text(manifest.with_suffix(".toml.bak"), before)
-        _write(c, MANIFEST, text)
-    c.print(f"{manifest}: {count}; {_open_summary(text) or 'no place is open'}.")
+    before = manifest.read_text("utf-8-sig") if update else ""
+    bearing = bearing or _bearing_file(folder)
+    exports, problems = _read_exports(c, folder, column_names(before) if update else ())
+    angles = _pivot_angles(folder / (bearing or BEARING))
+    if update:
+        text, changes = updated_manifest(before, exports, angles)
+        channels: list[list[str]] = []
+        count = f"{len(changes)} changes, the former one is {MANIFEST}.bak"
+    else:
+        text, count, channels = _draft(c, folder, bearing, exports, angles)
+        changes = []
+    if text.split() == before.split():
+        count = "nothing to change"
+    else:
+        _write(c, MANIFEST, text, before)
+    open_places = open_summary(open_paths(tomllib.loads(text)))
+    c.print(f"{manifest}: {count}; {open_places or 'no place is open'}.")
+    if channels:
+        c.show(f"{folder.name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
     for problem in problems:
         c.warn(f"left out: {problem}")
     for change in changes:
         c.print(change)
-    return text
+    c.next(*(("init", folder, "--update") if open_places else ("check", folder)))
 
 
-def _write(c: Command, name: str, text: str) -> None:
-    write_text(c.target / name, text)
-    c.wrote(name)
+def _draft(
+    c: Command, folder: Path, bearing: str | None, exports: Sequence[Export], angles: list[float]
+) -> tuple[str, str, list[list[str]]]:
+    """Text of a new manifest, what was found, and channel by channel; the bearing's draft is written beside it."""
+    from rigdata.survey.draft import draft_manifest
+    from rigdata.survey.survey import survey
 
-
-def _verdict(manifest: Path, guesses: Survey, text: str) -> str:
-    """What was found, and what is open, in one sentence each."""
+    guesses = survey(exports, pivots=angles)
+    name = re.sub(r"[^\w.+=@-]+", "-", folder.resolve().name) or "campaign"
+    text = draft_manifest(guesses, name, bearing or BEARING)
+    rows = []
+    for channel, guess in guesses.channels.items():
+        axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
+        reason = " ".join([f"({guess.axis.source})" * bool(axis), guess.axis.reason]).strip()
+        rows.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, reason])
+    if bearing is None and not (c.target / BEARING).exists():
+        _write(c, BEARING, _bearing_draft(guesses))
     kinds = Counter(run.kind.value or "unknown" for run in guesses.runs)
     runs = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-    guessed = sum("(guess)" in line for line in text.splitlines()) - 1  # the head explains the mark
-    return (
-        f"{manifest}: {len(guesses.channels)} channels, {len(guesses.runs)} records ({runs}); "
-        f"{_open_summary(text) or 'no place is open'}; {guessed} marked (guess)."
-    )
+    guessed = text.count("(guess)") - 1  # the head explains the mark
+    count = f"{len(rows)} channels, {len(guesses.runs)} records ({runs}), {guessed} entries marked (guess)"
+    return text, count, rows
 
 
-def _open_summary(text: str) -> str:
-    from rigdata.manifest.fields import open_paths, open_summary
-
-    return open_summary(open_paths(tomllib.loads(text)))
+def _write(c: Command, name: str, text: str, before: str = "") -> None:
+    """Write a file of the draft; what it was before is beside it."""
+    c.target.mkdir(parents=True, exist_ok=True)
+    if before:
+        write_text(c.target / f"{name}.bak", before)
+    write_text(c.target / name, text)
+    c.wrote(name)
 
 
 def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[Export], list[str]]:
@@ -129,19 +119,19 @@ def _read_exports(c: Command, folder: Path, names: Sequence[str]) -> tuple[list[
         for export in read_exports(folder, problems, names):
             exports.append(export)
             show(export.name, len(exports), total)
+    texts = [str(problem) for problem in problems]
     if not exports:
-        raise BadInputError("\n".join(str(p) for p in problems[:5]))
-    return exports, [str(p) for p in problems]
+        raise BadInputError("\n".join(texts[:5]))
+    return exports, texts
 
 
-def _pivot_angles(folder: Path, bearing: str | None) -> list[float]:
+def _pivot_angles(bearing: Path) -> list[float]:
     """Angles of the pads [rad] by the bearing file; none where it cannot be read yet."""
     from model.bearing import BearingError
     from model.bearing_file import load_bearing
 
-    path = folder / (bearing or BEARING)
     try:
-        return [pad.pivot_angle for pad in load_bearing(path).pads] if path.is_file() else []
+        return [pad.pivot_angle for pad in load_bearing(bearing).pads] if bearing.is_file() else []
     except BearingError:
         return []
 
@@ -152,7 +142,7 @@ def _bearing_draft(guesses: Survey) -> str:
     dry = [run for run in guesses.runs if run.kind.value == "dry_pivot" and run.pad.value]
     steps = {run.pad.value: run.direction.number for run in dry}
     pads = list(range(1, len(steps) + 1))
-    if len(pads) > 1 and sorted(steps) == pads and all(math.isfinite(angle) for angle in steps.values()):
+    if len(pads) > 1 and sorted(steps) == pads and all(map(math.isfinite, steps.values())):
         angles = ", ".join(f'"{steps[pad]:g} deg"' for pad in pads)
         text = text.replace('["?? deg"]          #', f"[{angles}]\n# (guess) where the dry steps pull;")
     return text
@@ -162,22 +152,3 @@ def _bearing_file(folder: Path) -> str | None:
     """Name of the one bearing file in a folder; None if there is none, or several."""
     files = [p for p in sorted(folder.glob("*.toml")) if "tpjb-bearing/1" in p.read_text("utf-8", "replace")[:4000]]
     return files[0].name if len(files) == 1 else None
-
-
-def _show_survey(c: Command, guesses: Survey, name: str) -> None:
-    """Print what the channels and the files may be, and by what."""
-    channels = []
-    for channel, guess in guesses.channels.items():
-        axis = "" if guess.axis.value is None else f"{guess.axis.number:g}"
-        reason = " ".join([f"({guess.axis.source})" * bool(axis), guess.axis.reason])
-        channels.append([channel, guess.quantity.value or "?", guess.unit or "?", axis, reason.strip()])
-    c.show(f"{name}: channels", words("channel", "quantity", "unit", "axis", "axis by"), channels)
-    runs = []
-    for rate, run in zip(guesses.rates, guesses.runs[:MOST_RECORDS], strict=False):
-        oscillates = run.kind.value in ("dynamic", "locus")
-        lines = ", ".join(f"{line.frequency:.4g}" for line in run.lines[:3] if oscillates) or "-"
-        runs.append([run.file, run.kind.value or "?", rate if rate > 0 else "?", lines, run.kind.reason])
-    columns = [*words("file", "kind"), "rate {frequency}", *words("lines Hz", "kind by")]
-    c.show(f"{name}: records", columns, runs)
-    if len(guesses.runs) > len(runs):
-        c.print(f"... and {len(guesses.runs) - len(runs)} more records")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
+from tpjb_ident.cli.identification import POINT
 from tpjb_ident.cli.inputs import model_settings, operating_points, parse_value, pivot_choice, rotation_choice
 from tpjb_ident.cli.options import PHYSICS, ROCKER, known_names
 from tpjb_ident.columns import Column
@@ -29,10 +30,7 @@ FEW = 20
 _COARSE = 0.05
 #: Columns of the printed table, by those of prediction.csv.
 COLUMNS: dict[str, Column | str] = {
-    "static_load_N": Column("load {load}", words=True),
-    "static_load_direction_deg": "dir {angle}",
-    "shaft_speed_Hz": "speed {speed}",
-    "excitation_Hz": "exc. {frequency}",
+    **POINT,
     "kxx_N_per_m": Column("kxx {stiffness}", ".1f"),
     "kyy_N_per_m": Column("kyy {stiffness}", ".1f"),
     "cxx_Ns_per_m": Column("cxx {damping}", ".1f"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,10 @@ import typer
 
 from tpjb_ident.cli.command import COMMANDS, Command, command
 from tpjb_ident.cli.commands.verify import STATES, files_of, recorded
-from tpjb_ident.columns import Column, words
+from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.rounding import listed
-from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of
+from tpjb_ident.runtime.output_folder import RECORD, contradiction, outputs_of, texts_of
 
 #: Commands whose results hang on their options and inputs alone.
 _REPEATABLE = (
@@ -35,22 +35,20 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
     by number, pictures and pages by their bytes. Exit code 0 where nothing beyond the tolerance differs, 3 where
     something does, 2 where an input is gone or changed. With --out, rerun.json lists every file.
     """
+    from tpjb_ident.runtime.differences import compared
+
     folder = record if record.is_dir() else record.parent
     if not record.is_dir() and record.name != RECORD:
         raise BadInputError(f"{record}: is no {RECORD}. Give that of an output folder, or the folder.")
-    entries = recorded(folder)
-    repeated = {name: entry for name, entry in entries.items() if name.split(" ")[0] in _REPEATABLE}
-    for name in set(entries) - set(repeated):
-        c.note(f"{name} is not repeated")
+    repeated = {}
+    for name, entry in recorded(folder).items():
+        if name.split(" ")[0] in _REPEATABLE:
+            repeated[name] = entry
+            _refuse_other_inputs(folder, name, entry)
+        else:
+            c.note(f"{name} is not repeated")
     if not repeated:
         raise BadInputError(f"{record}: names no command that can be repeated ({', '.join(_REPEATABLE)}).")
-    for name, entry in repeated.items():
-        for known in files_of(folder, name, entry, ()):
-            if known["role"] == "input" and known["state"] != "same":
-                place = f"{folder}: input {known['file']} of {name}"
-                raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
-    from tpjb_ident.runtime.differences import compared
-
     found = []
     with tempfile.TemporaryDirectory(prefix="tpjb-rerun-") as scratch:
         for number, (name, entry) in enumerate(repeated.items()):
@@ -66,13 +64,20 @@ def rerun(c: Command, record: Path, tolerance: float = 1e-6) -> None:
     c.print(f"{folder}: {count} by more than {tolerance:g}.")
     c.next("verify", folder)
     rows = [[name, d.file, _WORDS[d.state], f"{d.size:.1e}" if d.size else "-"] for name, d in found]
-    c.show(f"{folder}: computed again", [*words("command", "file", "state"), Column("largest difference")], rows)
+    c.show(f"{folder}: computed again", [*words("command", "file", "state"), "largest difference"], rows)
     if c.out is not None:
         files = [{"command": name, **vars(difference)} for name, difference in found]
         with c.results():
             c.json("rerun.json", {"schema": "tpjb-rerun/1", "folder": folder.name, "files": files})
     if different:
         raise NotTrustedError(f"{folder}: {len(different)} of {len(found)} files:\n{listed(different, 8, chr(10))}")
+
+
+def _refuse_other_inputs(folder: Path, name: str, entry: Mapping[str, Any]) -> None:
+    for known in files_of(folder, name, entry, ()):
+        if known["role"] == "input" and known["state"] != "same":
+            place = f"{folder}: input {known['file']} of {name}"
+            raise BadInputError(f"{place} {STATES[known['state']]}. Bring it back to where it was.")
 
 
 def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> None:
@@ -93,24 +98,22 @@ def _run_again(name: str, entry: Mapping[str, Any], folder: Path, out: Path) -> 
         raise TpjbError(f"{name}: ended with exit code {code}, see above; nothing was compared.")
 
 
-def _typed(parameters: list[Any], entry: Mapping[str, Any], folder: Path) -> list[str]:
+def _typed(parameters: Iterable[Any], entry: Mapping[str, Any], folder: Path) -> list[str]:
     """Words of a command line from the options of an entry; files by their place."""
-    options, places = entry.get("options"), entry.get("inputs_at")
-    if not isinstance(options, dict) or not isinstance(places, dict):
+    options, places = entry.get("options"), texts_of(entry, "inputs_at")
+    if not isinstance(options, dict):
         raise BadInputError(f"{folder / RECORD}: names no options. It was written by an older version: run it by hand.")
     flags, arguments = [], []
     for parameter in parameters:
         if parameter.name in _OURS:
             continue
-        value = options.get(parameter.name)
-        if files := [str(folder / str(p)) for key, p in places.items() if key.partition(".")[0] == parameter.name]:
-            value = files
-        if value is None or value is False:
-            flags += [parameter.secondary_opts[0]] if value is False and parameter.secondary_opts else []
-        elif parameter.param_type_name == "argument":
-            arguments += [str(item) for item in (value if isinstance(value, list) else [value])]
-        elif value is True:
-            flags.append(parameter.opts[0])
-        else:
-            flags += [f"{parameter.opts[0]}={item}" for item in (value if isinstance(value, list) else [value])]
+        given = options.get(parameter.name)
+        files = [str(folder / place) for key, place in places.items() if key.partition(".")[0] == parameter.name]
+        for value in files or (given if isinstance(given, list) else [given]):
+            if isinstance(value, bool):
+                flags += (parameter.opts if value else parameter.secondary_opts)[:1]
+            elif value is not None and parameter.param_type_name == "argument":
+                arguments.append(str(value))
+            elif value is not None:
+                flags.append(f"{parameter.opts[0]}={value}")
     return [*flags, "--", *arguments]

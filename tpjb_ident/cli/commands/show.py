@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,6 @@ from tpjb_ident.columns import Column, channel_unit, in_us_units, size, symbol, 
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.presentation import UNITS
 from tpjb_ident.rounding import counted
-from tpjb_ident.runtime.provenance import sha256
 
 if TYPE_CHECKING:
     from rigdata.campaign import Campaign
@@ -28,6 +27,21 @@ MOST_RUNS = 200
 BARS = " ▁▂▃▄▅▆▇█"
 #: What is this far below the highest bar is blank.
 DECADES = 3.0
+#: Columns of channels.csv at the terminal.
+_COLUMNS: dict[str, Column | str] = {
+    "channel": Column("channel", words=True),
+    "unit": Column("unit", words=True),
+    "samples": "samples",
+    "sample_rate_Hz": "rate {frequency}",
+    "mean": Column("mean", ".4g"),
+    "standard_deviation": Column("std", ".3g"),
+    "minimum": Column("min", ".4g"),
+    "maximum": Column("max", ".4g"),
+    "line1_Hz": Column("line {frequency}", ".4g"),
+    "line2_Hz": Column("2nd", ".4g"),
+    "line3_Hz": Column("3rd", ".4g"),
+    "missing": "missing",
+}
 
 
 @command(
@@ -48,40 +62,45 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     place = campaign_place(source)
     if not place.exists():
         raise BadInputError(f"{source}: there is no such file or folder. Check the path.")
-    campaign = c.open(source) if place.is_dir() or place.suffix.lower() in (*HDF5, ".toml") else None
-    if campaign is None:
-        c.next("init", source.parent)
-        if run is not None:
-            raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
-    else:
+    if place.is_dir() or place.suffix.lower() in (*HDF5, ".toml"):
+        campaign = c.open(source)
         c.next("check", source)
         if run is None:
             _show_campaign(c, campaign)
             if picture:
                 raise BadInputError("--picture: of a campaign needs --run ID; the runs are listed above.")
             return
-    with c.progress(f"looking at {source.name}"):
-        if campaign is not None and run is not None:
-            title, series, displayed = _run_series(campaign.run(run))
-        else:
-            title = source.name
-            displayed = series = list(read_export(source).series)
-        looks = {s.name: look_at(s.values, s.rate) for s in displayed}
+        chosen = campaign.run(run)
+        title = f"{chosen.id} ({chosen.kind})"
+        with c.progress(f"looking at {source.name}"):
+            series, displayed = _run_series(chosen)
+    else:
+        c.next("init", source.parent)
+        if run is not None:
+            raise BadInputError(f"--run: {source.name} is a single record, not a campaign. Leave the option out.")
+        title = source.name
+        with c.progress(f"looking at {source.name}"):
+            displayed = series = list(read_export(c.file(source)).series)
+    looks = {s.name: look_at(s.values, s.rate) for s in displayed}
     dead = [name for name, look in looks.items() if look.flat]
     c.print(f"{title}: {counted(len(displayed), 'channel')}, {', '.join(dead) or 'none'} dead.")
-    _show_channels(c, title, displayed, looks)
-    if not picture and c.out is None:
-        return
-    import pandas as pd
+    rows = [_row(s, looks[s.name]) for s in displayed]
+    c.show(title, _COLUMNS.values(), map(itemgetter(*_COLUMNS), rows))
+    spectra = [
+        [name, look.amplitude[4:], look.frequency[-1]] for name, look in looks.items() if len(look.frequency) > 4
+    ]
+    bars = Column("from 0", lambda *values: sparkline(values), words=True)
+    c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], spectra)
+    if picture or c.out is not None:
+        import pandas as pd
 
-    c.options = {"source": source, "shown": title}
-    c.inputs = {source.name: sha256(source)} if source.is_file() else {}
-    with c.results():
-        c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
-        if picture:
-            from tpjb_ident.report.panels import quick_look
+        c.options = {"source": source, "shown": title}
+        with c.results():
+            c.table("channels", pd.DataFrame([_row(s, look_at(s.values, s.rate)) for s in series]))
+            if picture:
+                from tpjb_ident.report.panels import quick_look
 
-            c.draw([quick_look(title, displayed, looks)])
+                c.draw([quick_look(title, displayed, looks)])
 
 
 def _show_campaign(c: Command, campaign: Campaign) -> None:
@@ -101,8 +120,8 @@ def _show_campaign(c: Command, campaign: Campaign) -> None:
         c.print(f"... and {len(campaign.runs) - len(rows)} more runs")
 
 
-def _run_series(run: Run) -> tuple[str, list[Series], list[Series]]:
-    """Title and channels of a run, calibrated: in SI, and in the units that people read."""
+def _run_series(run: Run) -> tuple[list[Series], list[Series]]:
+    """Channels of a run, calibrated: in SI, and in the units that people read."""
     from rigdata.calibration import DIMENSIONS
     from rigdata.problem import Problem, RigDataError
     from rigdata.readers.series import Series
@@ -125,7 +144,7 @@ def _run_series(run: Run) -> tuple[str, list[Series], list[Series]]:
             displayed.append(Series(name, shown, (record.values - zero) / scale, record.time))
     if not series:
         raise RigDataError(problems)
-    return f"{run.id} ({run.kind})", series, displayed
+    return series, displayed
 
 
 def _shown_in(quantity: str, unit: str) -> tuple[str, float, float]:
@@ -136,24 +155,6 @@ def _shown_in(quantity: str, unit: str) -> tuple[str, float, float]:
         return symbol("speed"), 2 * math.pi * size("speed"), 0.0
     shown, scale = channel_unit(quantity)
     return shown or unit, scale, 0.0
-
-
-def _show_channels(c: Command, title: str, series: list[Series], looks: dict[str, Look]) -> None:
-    """Print statistics and a spectrum per channel."""
-    rows, spectra = [], []
-    for s in series:
-        look = looks[s.name]
-        lines = ", ".join(f"{line.frequency:.4g}" for line in look.lines)
-        flag = "dead" if look.flat else f"{look.missing} missing" if look.missing else ""
-        samples = [str(look.count), s.rate if s.rate > 0 else "?"]
-        rows.append([s.name, s.unit, *samples, look.mean, look.deviation, look.low, look.high, lines, flag])
-        if len(look.amplitude) > 4:
-            spectra.append([s.name, sparkline(look.amplitude[4:].tolist()), look.frequency[-1]])
-    figures = [Column("mean", ".4g"), Column("std", ".3g"), Column("min", ".4g"), Column("max", ".4g")]
-    columns = [*words("channel", "unit"), "samples", "rate {frequency}", *figures, *words("lines Hz", "")]
-    c.show(title, columns, rows)
-    if spectra:
-        c.show("spectra, 3 decades", [*words("channel", "from 0"), "to {frequency}"], spectra)
 
 
 def _row(series: Series, look: Look) -> dict[str, Any]:
@@ -179,15 +180,11 @@ def sparkline(values: Sequence[float], width: int = 48) -> str:
     >>> sparkline([1.0, 10.0, 100.0, 1000.0], width=4)
     ' ▃▅█'
     """
-    finite = [v if math.isfinite(v) and v > 0 else 0.0 for v in values]
-    width = min(width, len(finite))
-    top = max(finite, default=0.0)
-    if top <= 0:
-        return " " * width
-    edges = [round(i * len(finite) / width) for i in range(width + 1)]
-    bars = []
-    for first, last in itertools.pairwise(edges):
-        peak = max(finite[first:last])
-        share = 1.0 + math.log10(peak / top) / DECADES if peak > 0 else 0.0
-        bars.append(BARS[max(0, min(len(BARS) - 1, round(share * (len(BARS) - 1))))])
-    return "".join(bars)
+    import numpy as np
+
+    heights = np.nan_to_num(values, nan=0.0, posinf=0.0)
+    peaks = np.array([cell.max() for cell in np.array_split(heights, min(width, len(heights)) or 1) if len(cell)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = 1.0 + np.log10(peaks / peaks.max(initial=0.0)) / DECADES
+    steps = np.rint(np.nan_to_num(shares, nan=0.0).clip(0.0, 1.0) * (len(BARS) - 1))
+    return "".join(BARS[int(step)] for step in steps)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rigdata.virtual_rig import RigPlan
 
 PLANS = ("paper", "short")
-FAULT_KEYS = ("run", "channel", "value", "start", "length", "other")
+_NUMBERS = ("value", "start", "length")
+FAULT_KEYS = ("run", "channel", "other", *_NUMBERS)
 
 
 @command(
@@ -82,9 +83,9 @@ def _plan(plan: str, pads: int, load: str | None, excitation: str | None, speed:
     rig_plan = RigPlan.like_paper(pads) if plan == "paper" else RigPlan.short(pads)
     points = tuple(operating_points(load or "5 kN", "-90 deg", speed, excitation or "25 Hz"))
     turning = points[0].shaft_speed
-    locus = tuple(replace(point, shaft_speed=turning) for point in rig_plan.locus)
     if load is None and excitation is None:
         points = tuple(replace(point, shaft_speed=turning) for point in rig_plan.dynamic)
+    locus = tuple(replace(point, shaft_speed=turning) for point in rig_plan.locus)
     return replace(rig_plan, dynamic=points, locus=locus)
 
 
@@ -98,7 +99,7 @@ def _fault_arguments(text: str) -> dict[str, Any]:
             use = hint(key, FAULT_KEYS, "Write KEY=VALUE, with one of")
             raise BadInputError(f"--fault {text!r}: {pair!r} is not understood. {use}")
         try:
-            arguments[key] = float(value) if key in ("value", "start", "length") else value
+            arguments[key] = float(value) if key in _NUMBERS else value
         except ValueError:
             raise BadInputError(f"--fault {text!r}: {value!r} is not a number (SI, without unit).") from None
     return arguments

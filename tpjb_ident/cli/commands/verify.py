@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from tpjb_ident.cli.command import Command, campaign_place, command, refuse_special
-from tpjb_ident.columns import words
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import listed
-from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of
+from tpjb_ident.runtime.output_folder import READY, RECORD, former_runs, outputs_of, texts_of
 from tpjb_ident.runtime.provenance import sha256, versions
 
 #: What may have become of a file since its SHA-256 was recorded.
@@ -33,19 +32,25 @@ def verify(c: Command, results: Path, given: list[Path] | None = None) -> None:
     files = [file for name, entry in entries.items() for file in files_of(results, name, entry, given or ())]
     if not files:
         raise BadInputError(f"{results}: {RECORD} names no results. Run the command again.")
-    same = sum(f["state"] == "same" for f in files)
-    count = "all" if same == len(files) else f"{same} of {len(files)}"
+    others = [file for file in files if file["state"] != "same"]
+    count = f"{len(files) - len(others)} of {len(files)}" if others else "all"
     c.print(f"{results}: {count} results and inputs are the same bytes as when the commands ended.")
-    _show(c, results, entries, files)
+    for file in others:
+        c.print(f"{file['command']}: {file['role']} {file['file']} {STATES[file['state']]}")
+    for name, entry in entries.items():
+        former = texts_of(entry, "versions")
+        changed = [f"{key} {former[key]} (now {now})" for key, now in versions().items() if former.get(key, now) != now]
+        if changed:
+            c.note(f"{name} was computed with {', '.join(changed)}")
     c.next("rerun", results)
     if c.out is not None:
         c.options = {"results": results}
         with c.results():
             c.json("verify.json", {"schema": "tpjb-verify/1", "folder": results.name, "files": files})
-    missing = [f["file"] for f in files if (f["role"], f["state"]) == ("input", "missing")]
-    changed = [f["file"] for f in files if f["state"] != "same" and (f["role"], f["state"]) != ("input", "missing")]
-    if changed:
-        raise NotTrustedError(f"{results}: not as it was computed: {listed(changed)}. Run the command again.")
+    missing = [file["file"] for file in others if (file["role"], file["state"]) == ("input", "missing")]
+    if len(missing) < len(others):
+        names = [file["file"] for file in others if file["file"] not in missing]
+        raise NotTrustedError(f"{results}: not as it was computed: {listed(names)}. Run the command again.")
     if missing:
         raise BadInputError(
             f"{results}: the results are unchanged, but {len(missing)} inputs ({listed(missing, 1)}) are not where "
@@ -63,32 +68,26 @@ def recorded(results: Path) -> dict[str, dict[str, Any]]:
     if not entries:
         raise BadInputError(f"{results}: has no {RECORD} that can be read. Give an output folder of tpjb commands.")
     for name, entry in entries.items():
-        if set(outputs_of(entry)) - set(_texts(entry.get("outputs_sha256"))):
+        if set(outputs_of(entry)) - set(texts_of(entry, "outputs_sha256")):
             raise BadInputError(f"{results}: {RECORD} has no SHA-256 of every result of {name}. Run it again.")
     return entries
 
 
-def files_of(results: Path, name: str, entry: dict[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
+def files_of(results: Path, name: str, entry: Mapping[str, Any], given: Sequence[Path]) -> Iterator[dict[str, str]]:
     """Compare the files of one command with its entry: as verify.json lists them."""
-    hashes = _texts(entry.get("outputs_sha256"))
+    hashes = texts_of(entry, "outputs_sha256")
     for file in outputs_of(entry):
         yield {"command": name, "role": "result", "file": file, "state": _state([results], file, hashes[file])}
-    places = given or [results / place for place in _texts(entry.get("inputs_at")).values()]
     folders: list[Path] = []
-    for place in places:
+    for place in given or [results / place for place in texts_of(entry, "inputs_at").values()]:
         inner = campaign_place(place)
         folders += [inner if inner.is_dir() else inner.parent, *([place] if place.is_dir() else ())]
     around = [parent for folder in folders for parent in folder.resolve().parents]
-    for file, recorded_hash in _texts(entry.get("inputs_sha256")).items():
+    for file, recorded_hash in texts_of(entry, "inputs_sha256").items():
         if recorded_hash != "missing":  # it was not there then either
-            state = _state(folders, file, recorded_hash)
-            if state == "missing" and "/" in file:  # its folder tells it from another file of its name
-                state = _state(around, file, recorded_hash)
+            # its folder tells it from another file of its name
+            state = _state([*folders, *(around if "/" in file else ())], file, recorded_hash)
             yield {"command": name, "role": "input", "file": file, "state": state}
-
-
-def _texts(entry: Any) -> dict[str, str]:
-    return {k: v for k, v in entry.items() if isinstance(v, str)} if isinstance(entry, dict) else {}
 
 
 def _state(folders: Iterable[Path], name: str, recorded_hash: str) -> str:
@@ -107,26 +106,3 @@ def _state(folders: Iterable[Path], name: str, recorded_hash: str) -> str:
                 return "same"
             state = "differs"
     return state
-
-
-def _show(c: Command, results: Path, entries: dict[str, dict[str, Any]], files: Sequence[dict[str, str]]) -> None:
-    """Print counts per command, what differs by name, and which versions are others now."""
-    rows = []
-    for name, entry in entries.items():
-        row = [name, str(entry.get("finished", ""))]
-        for role in ("result", "input"):
-            states = [f["state"] for f in files if (f["command"], f["role"]) == (name, role)]
-            row.append(f"{states.count('same')} of {len(states)}")
-        rows.append(row)
-    columns = [*words("command", "finished"), "results", "inputs"]
-    c.show(f"{results}: unchanged files", columns, rows)
-    for f in files:
-        if f["state"] != "same":
-            c.print(f"{f['command']}: {f['role']} {f['file']} {STATES[f['state']]}")
-    installed = versions()
-    for name, entry in entries.items():
-        former = _texts(entry.get("versions"))
-        changed = [key for key in installed if former.get(key, installed[key]) != installed[key]]
-        if changed:
-            packages = ", ".join(f"{key} {former[key]} (now {installed[key]})" for key in changed)
-            c.note(f"{name} was computed with {packages}")

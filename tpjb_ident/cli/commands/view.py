@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,16 +35,15 @@ def view(
     The page is served on 127.0.0.1 only, under a random path that is printed, and loads nothing from anywhere else.
     Stop with Ctrl-C.
     """
-    from tpjb_ident.view.server import Session
+    from tpjb_ident.view.server import Session, private_link, serve
 
     place = campaign_place(source)
     if place.is_dir() and not (place / "campaign.toml").exists() and former_runs(place):
         session = Session(name=place.resolve().name, tables=_tables(c, place))
+        c.next("verify", source)
     else:
         session = _campaign_session(c, source, bearing)
-    c.next("verify" if session.campaign is None else "check", source)
-    from tpjb_ident.view.server import private_link, serve
-
+        c.next("check", source)
     with contextlib.ExitStack() as links:
 
         def ready(address: str) -> None:
@@ -74,37 +72,28 @@ def _campaign_session(c: Command, source: Path, bearing: Path | None) -> Session
         settings = identify_settings(c, campaign, "mm-eiv", None)
         session.identify = lambda: identify(campaign, settings)
         if bearing is not None or campaign.bearing_text:
-            drawing = c.bearing_of(campaign, bearing)
-            session.bearing = drawing
-            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, drawing)}
+            session.bearing = c.bearing_of(campaign, bearing)
+            session.pivots = {"rigid": "rigid", "kirk": "kirk", **_measured_laws(c, campaign, session.bearing)}
     return session
 
 
 def _tables(c: Command, folder: Path) -> dict[str, Any]:
     """Tables of a results folder, and the problems that `check` found."""
+    import pandas as pd
+
     from tpjb_ident.runtime.provenance import read_document
     from tpjb_ident.runtime.table_reader import read_table
 
-    tables: dict[str, Any] = {}
-    for name in TABLES:
-        path = folder / f"{name}.csv"
-        if path.exists():
-            tables[name] = read_table(c.file(path))
+    files = {name: folder / f"{name}.csv" for name in TABLES}
+    tables: dict[str, Any] = {name: read_table(c.file(path)) for name, path in files.items() if path.exists()}
     findings = folder / "check.json"
     if findings.exists():
-        tables["problems"] = _problems(read_document(c.file(findings), "tpjb-check"))
+        problems = read_document(c.file(findings), "tpjb-check").get("problems")
+        rows = [entry for entry in problems if isinstance(entry, dict)] if isinstance(problems, list) else []
+        tables["problems"] = pd.DataFrame(rows or [{"what": "none"}]).astype(str)
     if not tables:
         raise BadInputError(f"{folder}: holds no tables. Give a campaign, or the --out folder of another command.")
     return tables
-
-
-def _problems(document: Mapping[str, Any]) -> Any:
-    """Problems of a check, one row each."""
-    import pandas as pd
-
-    problems = document.get("problems")
-    rows = [entry for entry in problems if isinstance(entry, dict)] if isinstance(problems, list) else []
-    return pd.DataFrame(rows or [{"what": "none"}]).astype(str)
 
 
 def _measured_laws(c: Command, campaign: Campaign, bearing: Bearing) -> dict[str, Any]:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.commands.identify import KEPT
-from tpjb_ident.cli.inputs import parse_value
+from tpjb_ident.cli.inputs import parse_share, parse_value
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted, listed
 from tpjb_ident.runtime.interrupts import heard
 
 if TYPE_CHECKING:
-    from model.bearing import Bearing
     from tpjb_ident.watch.watcher import Snapshot, Watcher
 
 #: Steps that forbid to go on as planned.
@@ -40,8 +40,7 @@ def watch(
     next; writes watch.html (loads itself again), watch.json and coefficients. Ctrl-C ends it, the same command goes on.
     """
     pause, patience = parse_value(every, "time", "--every", 0.0), parse_value(settle, "time", "--settle", 0.0)
-    width = None if within is None else parse_value(within, "ratio", "--within", 0.0)
-    watcher, drawing = _open_watcher(c, folder, bearing, patience, width)
+    watcher = _open_watcher(c, folder, bearing, patience, parse_share(within, "--within"))
     c.next("check", folder)
     c.options = {"folder": folder, "every": every, "settle": settle, "within": within or "-"}
     c.doing(f"watching {folder}; the page: {c.target / 'watch.html'}")
@@ -54,7 +53,7 @@ def watch(
             if snapshot is not None:
                 printed = _show_news(c, snapshot, printed)
                 try:
-                    _write_results(c, snapshot, drawing, 0 if once else max(2, round(pause)))
+                    _write_results(c, snapshot, watcher, 0 if once else max(2, round(pause)))
                 except (BadInputError, OSError) as error:
                     if latest is None or once:
                         raise
@@ -68,53 +67,42 @@ def watch(
         heard()
         c.print("Stopped. The same command goes on from here.")
         return
-    urgent = [step for step in (latest.steps if latest else ()) if step.kind in URGENT]
+    urgent = [step.runs for step in (latest.steps if latest else ()) if step.kind in URGENT]
     if urgent:
-        runs = list(dict.fromkeys(run for step in urgent for run in step.runs))
+        runs = list(dict.fromkeys(sum(urgent, ())))
         raise NotTrustedError(f"{counted(len(runs), 'run')} to be repeated: {listed(runs, 8)}")
 
 
-def _open_watcher(
-    c: Command, folder: Path, bearing: Path | None, settle: float, within: float | None
-) -> tuple[Watcher, Bearing | None]:
-    """Make the watcher of a campaign folder, and load the bearing."""
-    if not folder.is_dir():
-        raise BadInputError(f"{folder}: is no folder. Give the folder that the logger writes to, with campaign.toml.")
+def _open_watcher(c: Command, folder: Path, bearing: Path | None, settle: float, within: float | None) -> Watcher:
+    """Make the watcher of a campaign folder, with its bearing."""
     if not (folder / "campaign.toml").is_file():
         raise BadInputError(
-            f"{folder}: has no campaign.toml. Write one with `tpjb init {folder}` as soon as the first "
-            "record is there, and list the runs that you plan."
+            f"{folder}: has no campaign.toml. Give the folder that the logger writes to; write one with `tpjb init "
+            f"{folder}` as soon as the first record is there, and list the runs that you plan."
         )
-    from tpjb_ident.identification.settings import IdentifySettings
+    from model.bearing import BearingError
     from tpjb_ident.runs.run_store import RunStore
     from tpjb_ident.watch.landing import NewFiles
     from tpjb_ident.watch.watcher import Watcher
 
     campaign = c.open(folder)
-    angles: tuple[float, ...] = ()
-    drawing = clearance = None
+    drawing = None
     if bearing is not None or campaign.bearing_text:
-        from model.bearing import BearingError
-
         try:
             drawing = c.bearing_of(campaign, bearing)
         except BearingError as error:
             c.warn(f"{error} Until then pivots and clearance wait.")
-        else:
-            angles = tuple(pad.pivot_angle for pad in drawing.pads)
-            clearance = min(pad.assembled_clearance for pad in drawing.pads)
-    settings = IdentifySettings(clearance=clearance, keep_weights=False)
-    return Watcher(folder, NewFiles(settle), settings, angles, RunStore(c.target / KEPT), within), drawing
+    return Watcher(folder, NewFiles(settle), drawing, RunStore(c.target / KEPT), within)
 
 
-def _write_results(c: Command, snapshot: Snapshot, drawing: Bearing | None, refresh: int) -> None:
+def _write_results(c: Command, snapshot: Snapshot, watcher: Watcher, refresh: int) -> None:
     """Write page, state and coefficients into the output folder, all of them or none."""
     from tpjb_ident.report.watch_page import write_watch_page
 
     c.inputs = dict(snapshot.hashes)
     with c.results():
         settings = {name: str(value) for name, value in c.options.items()}
-        write_watch_page(c.folder, snapshot, refresh, settings, c.following, drawing)
+        write_watch_page(c.folder, snapshot, refresh, settings, c.following, watcher.bearing)
         if snapshot.measured.identification is not None:
             c.table("coefficients", snapshot.measured.identification.to_frame())
         c.json("watch.json", _state_document(snapshot))
@@ -124,15 +112,13 @@ def _state_document(snapshot: Snapshot) -> dict[str, Any]:
     """Content of watch.json."""
     runs = []
     for s in snapshot.states:
-        problems = [finding.problem for finding in s.findings]
-        findings = [{key: getattr(p, key) for key in ("severity", "place", "what", "cure")} for p in problems]
         run = {key: getattr(s.run, key) for key in ("id", "kind", "file")}
         state = {key: getattr(s, key) for key in ("state", "landed", "planned")}
-        runs.append({**run, **state, "findings": findings})
+        runs.append({**run, **state, "findings": [asdict(finding.problem) for finding in s.findings]})
     return {
         "schema": "tpjb-watch/1",
         "campaign": snapshot.campaign.id,
-        "steps": [{"kind": s.kind, "text": s.text, "runs": list(s.runs)} for s in snapshot.steps],
+        "steps": [asdict(step) for step in snapshot.steps],
         "lacks": list(snapshot.lacks),
         "runs": runs,
         "unnamed": [{"file": u.file, "like": u.like, "why": u.why} for u in snapshot.placed],
