@@ -29,6 +29,7 @@ from rigdata.problem import RigError
 from tpjb_ident.cli.options import option
 from tpjb_ident.cli.terminal import Progress, Terminal
 from tpjb_ident.columns import in_us_units, use_units
+from tpjb_ident.conditions import Condition, sentences, untrusted
 from tpjb_ident.errors import BadInputError, NotTrustedError, TpjbError
 from tpjb_ident.runtime.interrupts import heard, interrupt_behind
 from tpjb_ident.runtime.output_folder import RECORD, contradiction, files_in, former_runs, output_folder, record_text
@@ -159,6 +160,19 @@ class Command(Terminal):
         from tpjb_ident.report.figure import save_panels
 
         save_panels(panels, self.folder / "figures")
+
+    def judge(self, parts: Mapping[str, Sequence[Condition]]) -> None:
+        """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust."""
+        places: dict[str, list[str]] = {}
+        for name, conditions in parts.items():
+            for text in sentences(conditions):
+                places.setdefault(text, []).append(name)
+        serious = sentences(untrusted(condition for conditions in parts.values() for condition in conditions))
+        notes = {text: f"{', '.join(names)}: {text}" for text, names in places.items()}
+        for note in notes.values():
+            self.note(note)
+        if serious:
+            raise NotTrustedError("; ".join(notes[text] for text in dict.fromkeys(serious)))
 
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
-from tpjb_ident.conditions import sentences, untrusted
+from tpjb_ident.conditions import Condition
 from tpjb_ident.errors import BadInputError, NotTrustedError
 
 if TYPE_CHECKING:
@@ -49,41 +49,37 @@ def locus(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     if static.clearance is not None:
         # a table's reader has no other place that says how far the probes' gains are known
         c.show_table(clearance_table(static.clearance, drawn, calibrated=True), source.id)
-    if static.locus is not None:
-        c.print(f"locus: {static.locus}")
-    conditions = [*sentences(static.clearance.status if static.clearance else ()), *sentences(static.left_out)]
-    printed = sentences(static.locus.status) if static.locus else ()
-    for text in dict.fromkeys([*conditions, *refused]):
-        if text not in printed:
-            c.note(text)
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
+    if static.locus is not None:
+        c.print(f"locus: {str(static.locus).partition('; ')[0]}")
     for polygon in polygons:
         c.print(str(polygon))
+    c.judge({name: part.status for name, part in parts.items()} | {"left out": (*static.left_out, *refused)})
     if static.clearance is None and source.of_kind("clearance"):
         raise NotTrustedError(
             "no clearance run can be used: positions count from the probes' zero, not from the centre."
         )
-    if bad := [text for part in parts.values() for text in sentences(untrusted(part.status))]:
-        raise NotTrustedError("; ".join(bad))
 
 
 def _other_polygons(
     c: Command, source: Campaign, angles: list[float], static: StaticTests
-) -> tuple[tuple[ClearancePolygon, ...], list[str]]:
+) -> tuple[tuple[ClearancePolygon, ...], list[Condition]]:
     """Measure the sweeps besides the one that counts, and write their tables; what is wrong with those of no use."""
     from rigdata.problem import RigDataError
     from tpjb_ident.clearance.measure import measure_run, pairs_frame
 
     first = static.clearance
     polygons: list[ClearancePolygon] = []
-    refused: list[str] = []
-    for run in source.of_kind("clearance") if first is not None else ():
+    refused: list[Condition] = []
+    if first is None:
+        return (), []
+    for run in source.of_kind("clearance"):
         try:
-            if first is not None and run.id != first.run:
+            if run.id != first.run:
                 polygons.append(measure_run(run, angles, static.curves or None))
         except RigDataError as error:
-            refused.append(f"runs-refused: {run.id} ({error.problems[0]})")
-    if first is not None and polygons:
+            refused.append(Condition("runs-refused", f"{run.id} ({error.problems[0]})"))
+    if polygons:
         import pandas as pd
 
         frames = [polygon.to_frame() for polygon in (first, *polygons)]

@@ -6,11 +6,7 @@ from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
-from tpjb_ident.conditions import untrusted
 from tpjb_ident.errors import NotTrustedError
-
-#: Conditions of the campaign rather than of one pad.
-ABOUT_ALL = ("runs-refused",)
 
 
 @command(f"tpjb pivot {DEMO}")
@@ -41,15 +37,7 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
-    notes, bad = [], []
-    for curve in curves:
-        for condition in curve.status:
-            text = condition.sentence()
-            notes.append(text if condition in ABOUT_ALL else f"pad #{curve.pad}: {text}")
-        bad += [f"pad {curve.pad}: {condition.sentence()}" for condition in untrusted(curve.status)]
-    for text in dict.fromkeys(notes):
-        c.note(text)
-    without = sorted(tested - {curve.pad for curve in curves})
-    bad += [f"pad {pad}: has no curve, its records were refused" for pad in without]
-    if bad:
-        raise NotTrustedError("; ".join(bad))
+    c.judge({f"pad #{curve.pad}": curve.status for curve in curves})
+    if without := sorted(tested - {curve.pad for curve in curves}):
+        pads = ", ".join(f"#{pad}" for pad in without)
+        raise NotTrustedError(f"pad {pads}: has no curve, its records were refused")
