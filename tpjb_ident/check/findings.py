@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -82,14 +82,21 @@ def _alike(findings: Iterable[Finding]) -> Iterable[list[Finding]]:
     return groups.values()
 
 
-def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
-    """Tell a finding once that a third (three at least) of the runs of its kinds share."""
+def grouped(findings: Iterable[Finding], runs: Sequence[Run]) -> Iterator[tuple[list[Finding], list[str]]]:
+    """Equal findings, and the runs concerned where a third (three at least) of the runs of their kinds share them."""
     kind_of = {run.id: run.kind for run in runs}
-    merged: list[Problem] = []
     for group in _alike(findings):
         concerned = list(dict.fromkeys(f.problem.run for f in group if f.problem.run))
         kinds = {kind_of[r] for r in concerned}
-        if not is_shared(len(concerned), sum(run.kind in kinds for run in runs)):
+        shared = is_shared(len(concerned), sum(run.kind in kinds for run in runs))
+        yield group, concerned if shared else []
+
+
+def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
+    """Tell a finding once that many runs share."""
+    merged: list[Problem] = []
+    for group, concerned in grouped(findings, runs):
+        if not concerned:
             merged.extend(finding.problem for finding in group)
             continue
         first = group[0].problem

@@ -358,14 +358,14 @@ def write_record(
         "inputs_sha256": dict(inputs),
         "outputs": outputs,
         "outputs_sha256": {name: sha256(staging / name) for name in outputs},
-        "inputs_at": _places(settings, target, inputs),
+        "inputs_at": _places(settings, target),
         **{name: note for name, note in (notes or {}).items() if note},
     }
     write_text(staging / RECORD, record_text({**former_runs(target), entry: record}))
     return outputs
 
 
-def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]) -> dict[str, str]:
+def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
     """Where files and folders among `settings` are, as seen from the output folder; only those that exist.
 
     Several of one option are numbered: ``prediction.0``.
@@ -375,10 +375,8 @@ def _places(settings: Mapping[str, Any], target: Path, inputs: Mapping[str, str]
         several = enumerate(value) if isinstance(value, (list, tuple)) else ()
         values |= {name: value, **{f"{name}.{number}": item for number, item in several}}
     places = {}
-    for key, value in values.items():
-        # a word may name a file in place of a choice, as of --pivots
-        is_place = isinstance(value, Path) or (isinstance(value, str) and Path(value).name in inputs)
-        if is_place and (path := Path(value)).exists():
+    for key, path in values.items():
+        if isinstance(path, Path) and path.exists():
             with contextlib.suppress(ValueError):  # another drive: there is no relative way
                 places[key] = Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
     return places

@@ -138,7 +138,8 @@ def pivot_choice(c: Command, text: str) -> str | float | Path:
         return text
     path = Path(text)
     if path.is_file():
-        return c.file(path)
+        c.options["pivots"] = c.file(path)
+        return path
     if text[:1].isdigit():
         return parse_value(text, "stiffness", "--pivots")
     use = hint(text, _PIVOTS, "Give a pivots.toml, a stiffness, or one of")

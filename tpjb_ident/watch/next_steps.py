@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -13,7 +13,7 @@ import numpy as np
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem
 from rigdata.run import Run
-from tpjb_ident.check.findings import Finding, is_shared
+from tpjb_ident.check.findings import Finding, grouped
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.columns import amount, place_of
 from tpjb_ident.conditions import SEVERITIES
@@ -48,55 +48,34 @@ class RunStatus:
 
 
 def judge_states(
-    runs: Sequence[Run],
-    observations: Sequence[Observation],
-    landed: Mapping[str, str],
-    planned: frozenset[str],
-    written: frozenset[str],
+    expected: Sequence[RunStatus], observations: Sequence[Observation]
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
     """State of every run, and the findings that so many runs share that no repeat will cure them."""
-    common = _common(observations)
-    shared = {id(finding) for group in common for finding in group}
-    of_run: dict[str, list[Finding]] = {}
-    for observation in observations:
-        findings = [finding for finding in observation.report.found if id(finding) not in shared]
-        of_run[observation.run.id] = sorted(findings, key=lambda f: SEVERITIES.index(f.problem.severity))
+    seen = {observation.run.id: observation.report.found for observation in observations}
+    grave = [f for f in itertools.chain.from_iterable(seen.values()) if f.problem.severity != "note"]
+    groups = grouped(grave, [observation.run for observation in observations])
+    common = [group for group, concerned in groups if concerned]
+    shared = set(map(id, itertools.chain.from_iterable(common)))
     states = []
-    for run in runs:
-        findings = of_run.get(run.id, [])
-        state: State = "good"
-        if run.id in written:
-            state = "being written"
-        elif run.id not in of_run:
-            state = "to run"
-        elif any(_forces_repeat(finding) for finding in findings):
-            state = "repeat"
-        elif any(finding.problem.severity == "warning" for finding in findings):
-            state = "look"
-        states.append(RunStatus(run, state, tuple(findings), landed.get(run.id, ""), run.id in planned))
+    for status in expected:
+        found = seen.get(status.run.id)
+        if status.state == "to run" and found is not None:
+            findings = sorted((f for f in found if id(f) not in shared), key=_gravity)
+            grave = [finding for finding in findings if finding.problem.severity != "note"]
+            repeat = any(map(_forces_repeat, findings))
+            state: State = "repeat" if repeat else "look" if grave else "good"
+            status = replace(status, state=state, findings=tuple(findings))
+        states.append(status)
     return _replaced(states), common
+
+
+def _gravity(finding: Finding) -> int:
+    return SEVERITIES.index(finding.problem.severity)
 
 
 def _forces_repeat(finding: Finding) -> bool:
     severity = finding.problem.severity
     return severity == "error" or (severity == "warning" and finding.key.startswith(_LOST_SAMPLES))
-
-
-def _common(observations: Sequence[Observation]) -> list[list[Finding]]:
-    """Findings that a third of the runs of their kinds have alike; notes are nobody's trouble."""
-    groups: dict[str, list[tuple[Finding, str]]] = {}
-    for observation in observations:
-        for finding in observation.report.found:
-            if finding.problem.severity != "note":
-                groups.setdefault(finding.key, []).append((finding, observation.run.kind))
-    common = []
-    for group in groups.values():
-        affected = {finding.problem.run for finding, _ in group}
-        kinds = {kind for _, kind in group}
-        comparable = sum(observation.run.kind in kinds for observation in observations)
-        if is_shared(len(affected), comparable):
-            common.append([finding for finding, _ in group])
-    return common
 
 
 def _replaced(states: Sequence[RunStatus]) -> list[RunStatus]:

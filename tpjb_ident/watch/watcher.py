@@ -32,7 +32,7 @@ from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.runs.run_store import RunStore
 from tpjb_ident.runtime.provenance import sha256
 from tpjb_ident.watch.landing import FileState, NewFiles, Unplanned, file_state, place_record
-from tpjb_ident.watch.next_steps import RunStatus, Step, judge_states, next_steps, plan_lacks
+from tpjb_ident.watch.next_steps import RunStatus, State, Step, judge_states, next_steps, plan_lacks
 
 #: Share of the usual length below which a record was cut off.
 _WHOLE = 0.8
@@ -191,19 +191,19 @@ class Watcher:
         written: set[Path],
         new: list[str],
     ) -> Snapshot:
-        landed = tuple(run for run in runs if run.id in self._records)
-        records = [self._records[run.id] for run in landed]
-        observations, _ = judged(replace(campaign, runs=landed), [record.observation for record in records])
-        _name_cut_records(observations, [record.seconds for record in records])
-        open_runs = frozenset(run.id for run in runs if (self.folder / run.file).resolve() in written)
+        records = {run.id: self._records[run.id] for run in runs if run.id in self._records}
+        landed = tuple(run for run in runs if run.id in records)
+        observations, _ = judged(replace(campaign, runs=landed), [record.observation for record in records.values()])
+        _name_cut_records(observations, [record.seconds for record in records.values()])
+        planned = {run.id for run in campaign.runs}
         done = {record.like for record in placed if record.run is not None}
-        states, common = judge_states(
-            [run for run in runs if run.id in self._records or run.id in open_runs or run.id not in done],
-            observations,
-            {run.id: record.landed for run, record in zip(landed, records, strict=True)},
-            frozenset(run.id for run in campaign.runs),
-            open_runs,
-        )
+        expected = []
+        for run in runs:
+            state: State = "being written" if (self.folder / run.file).resolve() in written else "to run"
+            if run.id in records or state == "being written" or run.id not in done:
+                moment = records[run.id].landed if run.id in records else ""
+                expected.append(RunStatus(run, state, landed=moment, planned=run.id in planned))
+        states, common = judge_states(expected, observations)
         measured = self._measured(replace(campaign, runs=tuple(status.run for status in states if status.counts)))
         cure = "Add a [[runs]] table for it to campaign.toml, or move it out of the folder"
         unknown = [Problem("warning", record.file, "", record.why, cure) for record in placed if record.run is None]
@@ -215,7 +215,7 @@ class Watcher:
             measured=measured,
             problems=(*problems, *campaign.notes, *unknown),
             new=tuple(new),
-            hashes={run.file: record.digest for run, record in zip(landed, records, strict=True)},
+            hashes={run.file: records[run.id].digest for run in landed},
             placed=tuple(placed),
         )
 
