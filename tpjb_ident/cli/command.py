@@ -370,7 +370,7 @@ def _places(settings: Mapping[str, Any], target: Path) -> dict[str, str]:
 
     Several of one option are numbered: ``prediction.0``.
     """
-    values = {}
+    values: dict[str, Any] = {}
     for name, value in settings.items():
         several = enumerate(value) if isinstance(value, (list, tuple)) else ()
         values |= {name: value, **{f"{name}.{number}": item for number, item in several}}

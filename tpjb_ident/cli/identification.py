@@ -134,7 +134,8 @@ def show_identification(c: Command, result: Identification) -> None:
     """Print what was identified: a summary, tables as they are on disk, in the units that people read, remarks."""
     bad = len(_untrusted_places(result))
     trust = f"{bad} NOT to be trusted" if bad else "all to be trusted"
-    flagged = sum(bool(part.quality) and not untrusted(part.quality) for part in (*result.points, *result.bands))
+    qualities = [p.quality for p in result.points] + [band.quality for band in result.bands]
+    flagged = sum(bool(quality) and not untrusted(quality) for quality in qualities)
     flags = f", {flagged} with flags" if flagged else ""
     c.print(f"{result.campaign}: {counted(_counted_places(result), 'operating point')}, {trust}{flags}.")
     if "coefficients" in c.frames:

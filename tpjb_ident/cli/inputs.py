@@ -14,6 +14,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +62,7 @@ def parse_values(text: str, dimension: str, option: str, is_positive: bool = Fal
         for part in reversed([start, *end.split(":", 1)] if dots else [item]):
             quantity, unit = _quantity(part, unit, dimension, option)
             quantities.insert(0, quantity)
-        values[:0] = _range(*quantities, where) if dots else quantities
+        values[:0] = _range(quantities, where) if dots else quantities
     if not values:
         raise BadInputError(f'{option}: is empty. Write, for instance, "{_EXAMPLES[dimension]}".')
     if len(values) > MAX_VALUES:
@@ -86,7 +87,8 @@ def parse_share(text: str | None, option: str) -> float | None:
     return None if text is None else parse_value(text, "ratio", option, 0.0)
 
 
-def _range(start: float, stop: float, step: float, where: str) -> list[float]:
+def _range(quantities: Sequence[float], where: str) -> list[float]:
+    start, stop, step = quantities
     steps = (stop - start) / step if step else -1.0
     if steps < 0:
         raise BadInputError(

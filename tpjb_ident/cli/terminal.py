@@ -81,9 +81,9 @@ class Terminal:
         if not self._silent:
             _print_message("doing", printable(text))
 
-    def show(self, title: str, columns: Iterable[Column | str], rows: Iterable[Sequence[Any]], file: str = "") -> None:
+    def show(self, title: str, titles: Iterable[Column | str], rows: Iterable[Sequence[Any]], file: str = "") -> None:
         """Print a table that fits the terminal, its columns of words to the left; of a long one the `file` with all."""
-        columns = [Column(column) if isinstance(column, str) else column for column in columns]
+        columns = [Column(column) if isinstance(column, str) else column for column in titles]
         headings = [readable(column.heading) for column in columns]
         texts = []
         for row in rows:

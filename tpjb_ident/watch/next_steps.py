@@ -179,7 +179,8 @@ def located(problem: Problem) -> str:
 def _stop(states: Sequence[RunStatus]) -> tuple[list[Step], set[str]]:
     """A fault of one channel in the last records in a row: the next one will have it too."""
     landed = sorted((s for s in states if s.landed), key=lambda s: s.landed)[::-1]
-    steps, stopped = [], set()
+    steps: list[Step] = []
+    stopped: set[str] = set()
     for finding in landed[0].findings if landed else ():
         if not finding.key.startswith(_LOST_SAMPLES) or finding.problem.severity == "note":
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,12 +86,9 @@ def check_summary(c: Command, name: str, problems: Sequence[Problem], campaign: 
         "ok": not counts["error"],
         "runs": {kind: len(campaign.of_kind(kind)) for kind in KINDS} if campaign else {},
         "counts": counts,
-        "problems": [{key: getattr(p, key) for key in _KEYS} for p in problems],
+        "problems": [asdict(problem) for problem in problems],
         "files_sha256": c.inputs,
     }
-
-
-_KEYS = ("severity", "file", "place", "run", "what", "cure")
 
 
 def problem_lines(problems: Sequence[Problem]) -> list[str]:

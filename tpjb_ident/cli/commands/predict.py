@@ -110,8 +110,6 @@ def parse_physics(names: str | None, housing: str | None) -> Options:
     chosen = known_names(names, PHYSICS, "--physics") if names else ()
     if housing is not None and "growth" not in chosen:
         raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
-    if "jfo" in chosen and "turbulence" in chosen:
-        raise BadInputError("--physics: a turbulent film does not conserve mass where it ruptures. Leave out jfo.")
     from model.growth import Growth
     from model.options import Options
 
@@ -119,16 +117,15 @@ def parse_physics(names: str | None, housing: str | None) -> Options:
     if housing is not None:  # the model counts in degC
         temperature = round(parse_value(housing, "temperature", "--housing-temperature") - ZERO_CELSIUS, 9)
     try:
-        growth = Growth(housing=temperature) if "growth" in chosen else None
+        return Options(
+            conduction="conduction" in chosen,
+            isothermal_journal="journal" in chosen,
+            growth=Growth(housing=temperature) if "growth" in chosen else None,
+            cavitation="jfo" if "jfo" in chosen else "swift-stieber",
+            turbulence="ng-pan" if "turbulence" in chosen else "none",
+            perturbed_heat="perturbed-heat" in chosen,
+            perturbed_bending="perturbed-bending" in chosen,
+            axial_tilt="axial-tilt" in chosen,
+        )
     except ValueError as error:
-        raise BadInputError(f"--housing-temperature: {error}.") from error
-    return Options(
-        conduction="conduction" in chosen,
-        isothermal_journal="journal" in chosen,
-        growth=growth,
-        cavitation="jfo" if "jfo" in chosen else "swift-stieber",
-        turbulence="ng-pan" if "turbulence" in chosen else "none",
-        perturbed_heat="perturbed-heat" in chosen,
-        perturbed_bending="perturbed-bending" in chosen,
-        axial_tilt="axial-tilt" in chosen,
-    )
+        raise BadInputError(f"--physics {names}: {error}. Take one of them out, or another temperature.") from error

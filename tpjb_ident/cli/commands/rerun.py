@@ -109,7 +109,8 @@ def _typed(parameters: Iterable[Any], entry: Mapping[str, Any], folder: Path) ->
             continue
         given = options.get(parameter.name)
         files = [str(folder / place) for key, place in places.items() if key.partition(".")[0] == parameter.name]
-        for value in files or (given if isinstance(given, list) else [given]):
+        values: list[Any] = given if isinstance(given, list) else [given]
+        for value in files or values:
             if isinstance(value, bool):
                 flags += (parameter.opts if value else parameter.secondary_opts)[:1]
             elif value is not None and parameter.param_type_name == "argument":
