@@ -94,7 +94,7 @@ class Column(NamedTuple):
 
     def cell(self, value: Any) -> str:
         """Write a value of this column: a number, several, words, or None."""
-        if value is None:
+        if value is None or value != value:  # not a number
             return "-"
         if isinstance(value, str):
             return value

@@ -86,9 +86,10 @@ def show(c: Command, source: Path, run: str | None = None, picture: bool = False
     c.print(f"{title}: {counted(len(displayed), 'channel')}, {', '.join(dead) or 'none'} dead.")
     rows = [_row(s, looks[s.name]) for s in displayed]
     c.show(title, _COLUMNS.values(), map(itemgetter(*_COLUMNS), rows))
-    spectra = [
-        [name, look.amplitude[4:], look.frequency[-1]] for name, look in looks.items() if len(look.frequency) > 4
-    ]
+    spectra = []
+    for name, look in looks.items():
+        if len(look.frequency) > 4:
+            spectra.append([name, look.amplitude[4:].tolist(), look.frequency[-1]])
     bars = Column("from 0", lambda *values: sparkline(values), words=True)
     c.show("spectra, 3 decades", [*words("channel"), bars, "to {frequency}"], spectra)
     if picture or c.out is not None:
