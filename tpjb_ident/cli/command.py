@@ -11,6 +11,7 @@ import contextlib
 import datetime
 import functools
 import inspect
+import io
 import json
 import os
 import re
@@ -223,8 +224,12 @@ class Command(Terminal):
         data: dict[str, Any] = {}
         for name in self._outputs:
             stem, ending = os.path.splitext(name)
-            if ending == ".parquet" and stem in self.frames:
-                frame = self.frames[stem]
+            if ending == ".parquet":
+                frame = self.frames.get(stem)
+                if frame is None:  # of an export
+                    import pandas as pd
+
+                    frame = pd.read_parquet(io.BytesIO((self.target / name).read_bytes()))
                 few = len(frame) <= _MOST_ROWS
                 data[stem] = frame.to_dict("records") if few else {"rows": len(frame), "file": name}
             elif ending == ".json" and name != RECORD:

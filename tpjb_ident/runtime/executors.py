@@ -172,10 +172,9 @@ def _portable(error: Exception) -> Exception:
 
 
 def _begin_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it; its memory is shared as long as no collector walks through it."""
+    """Leave Ctrl-C to the parent, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a copy of the parent has its handler
-    gc.freeze()
     one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
@@ -210,12 +209,14 @@ def local_workers(count: int, start: str | None = None) -> Iterator[Workers]:
         yield Workers()
         return
     context = _context(start)
+    gc.freeze()  # copies share the memory of this process as long as no collector walks through it
     pool = PoolWorkers(lambda: ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker), count)
     try:
         if context.get_start_method() == "fork":  # copies are best made before there are threads, as a bar's
             pool.submit(int).result()
         yield pool
     finally:
+        gc.unfreeze()
         processes: Any = getattr(pool.executor, "_processes", None) or {}
         for process in list(processes.values()):  # nobody waits for what they are still at
             process.terminate()
