@@ -13,9 +13,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rigdata.operating_point import ROTATIONS
 from tests.command_line import tpjb
 from tpjb_ident.cli.commands.app import app
 from tpjb_ident.cli.commands.show import BARS, sparkline
+from tpjb_ident.cli.options import choices
+from tpjb_ident.estimators.estimate import METHODS, NORMS
+from tpjb_ident.exports.formats import FORMATS
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +141,14 @@ def test_the_shell_completes_commands_options_and_values():
     assert "--method" in complete("tpjb identify --me")
     assert complete("tpjb identify --method mm") == ["mm-eiv", "mm"]
     assert complete("tpjb predict --thermal te") == ["tehd"]
+
+
+@pytest.mark.parametrize(
+    ("option", "known"),
+    [("method", METHODS), ("norm", NORMS), ("rotation", ROTATIONS), ("to", FORMATS)],
+)
+def test_the_table_of_options_completes_what_is_known(option, known):
+    assert sorted(choices(option)) == sorted(known)
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -22,7 +22,7 @@ from rigdata.near_names import hint
 from rigdata.operating_point import ROTATIONS, OperatingPoint
 from rigdata.units import LONGEST, UnitError, parse_quantity
 from tpjb_ident.cli.command import Command
-from tpjb_ident.cli.options import THERMAL, refuse_unknown
+from tpjb_ident.cli.options import choices, refuse_unknown
 from tpjb_ident.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def model_settings(
     c: Command, pivots: str | float | Path, thermal: str, path: Path | None, bearing: Bearing | None
 ) -> ModelSettings:
     """Build `ModelSettings` from options; effects that the bearing cannot have, or that count twice, are refused."""
-    refuse_unknown(thermal, THERMAL, "--thermal")
+    refuse_unknown(thermal, choices("thermal"), "--thermal")
     from tpjb_ident.compare.predictions import ModelSettings, refuse_counted_twice
 
     if path is None:

@@ -10,7 +10,7 @@ from rigdata.units import ZERO_CELSIUS
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.identification import POINT
 from tpjb_ident.cli.inputs import model_settings, operating_points, parse_value, pivot_choice, rotation_choice
-from tpjb_ident.cli.options import PHYSICS, ROCKER, known_names
+from tpjb_ident.cli.options import ROCKER, choices, known_names
 from tpjb_ident.columns import Column
 from tpjb_ident.errors import BadInputError, NotTrustedError
 from tpjb_ident.rounding import counted
@@ -107,7 +107,7 @@ def _predicted(c: Command, bearing: Bearing, points: list[OperatingPoint], setti
 
 def parse_physics(names: str | None, housing: str | None) -> Options:
     """Read `--physics` and `--housing-temperature`."""
-    chosen = known_names(names, PHYSICS, "--physics") if names else ()
+    chosen = known_names(names, choices("physics"), "--physics") if names else ()
     if housing is not None and "growth" not in chosen:
         raise BadInputError("--housing-temperature: means nothing without growth. Add --physics growth.")
     from model.growth import Growth
