@@ -12,7 +12,7 @@ from rigdata.problem import Problem, RigDataError, Severity
 from rigdata.run import Run
 from rigdata.survey.exports import records_below
 from tpjb_ident.arguments import as_campaign
-from tpjb_ident.check.findings import Finding, merge
+from tpjb_ident.check.findings import is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
 from tpjb_ident.check.positions import check_positions
@@ -21,11 +21,10 @@ from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
 from tpjb_ident.check.set_points import check_excitation, check_speed, check_static_loads
 from tpjb_ident.check.slow_tests import check_dry, check_locus, check_sweeps
-from tpjb_ident.conditions import Condition
+from tpjb_ident.conditions import SEVERITIES, Condition
+from tpjb_ident.rounding import listed
 
-_ORDER = {"error": 0, "warning": 1, "note": 2}
 Progress = Callable[[int, int], None]
-_LISTED = 5
 _MAX_LOOKED_AT = 10_000
 
 
@@ -60,10 +59,10 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         if progress is not None:
             progress(count, len(campaign.runs))
     observations, conditions = judged(campaign, observations)
-    findings: list[Finding] = [f for observation in observations for f in observation.report.found]
+    findings = [f for observation in observations for f in observation.report.found]
     merged = merge(findings, campaign.path.name, campaign.runs)
-    rig = [_problem(condition, campaign.path.name) for condition in conditions]
-    return _sorted([*campaign.notes, *merged, *rig, *_leftovers(campaign)])
+    merged += [_problem(condition, campaign.path.name) for condition in conditions]
+    return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
 
 
 def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[list[Observation], tuple[Condition, ...]]:
@@ -109,7 +108,7 @@ def _spread_doubts(observations: Sequence[Observation]) -> None:
     """Cells that are wired wrongly in many runs are so in all, also where the load does not show it."""
     judged = [observation for observation in observations if observation.run.kind in {"dynamic", "locus", "dry_pivot"}]
     doubted = sum("force" in observation.report.doubts for observation in judged)
-    if doubted >= 3 and 3 * doubted >= len(judged):
+    if is_shared(doubted, len(judged)):
         for observation in observations:
             observation.report.doubts.add("force")
 
@@ -131,7 +130,7 @@ def _shared_record(first: Run, second: Run) -> bool:
 
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:
-    return sorted(dict.fromkeys(problems), key=lambda p: _ORDER[p.severity])
+    return sorted(dict.fromkeys(problems), key=lambda p: SEVERITIES.index(p.severity))
 
 
 def _leftovers(campaign: Campaign) -> list[Problem]:
@@ -143,16 +142,14 @@ def _leftovers(campaign: Campaign) -> list[Problem]:
         return []
     if not names:
         return []
-    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
-    listed = ", ".join(ascii(name)[1:-1][:60] for name in names[:_LISTED])
-    text = f"no run names the {noun}{'' if len(names) == 1 else 's'} {listed}{more}"
-    return [
-        Problem("note", campaign.path.name, "", text, "Add them to the manifest, or nothing if they are not wanted")
-    ]
+    shown = listed([ascii(name)[1:-1][:60] for name in names])
+    text = f"no run names the {noun}{'s' * (len(names) > 1)} {shown}"
+    cure = "Add them to the manifest, or nothing if they are not wanted"
+    return [Problem("note", campaign.path.name, "", text, cure)]
 
 
 def _files(campaign: Campaign) -> list[str]:
-    known = {path.resolve() for path in campaign.files.values()}
+    known = set(map(Path.resolve, campaign.files.values()))
     return [path.name for path in records_below(campaign.path) if path.resolve() not in known]
 
 

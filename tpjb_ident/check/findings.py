@@ -9,8 +9,8 @@ from typing import Any
 from rigdata.problem import Problem, Severity
 from rigdata.run import Run
 from tpjb_ident.check.questions import QUESTIONS
+from tpjb_ident.rounding import listed
 
-_LISTED = 4
 #: How the key of a finding begins that one channel reads too much or too little in one run.
 RUN_GAIN = "gain "
 
@@ -88,21 +88,19 @@ def grouped(findings: Iterable[Finding], runs: Sequence[Run]) -> Iterator[tuple[
     for group in _alike(findings):
         concerned = list(dict.fromkeys(f.problem.run for f in group if f.problem.run))
         kinds = {kind_of[r] for r in concerned}
-        shared = is_shared(len(concerned), sum(run.kind in kinds for run in runs))
-        yield group, concerned if shared else []
+        yield group, concerned if is_shared(len(concerned), sum(run.kind in kinds for run in runs)) else []
 
 
 def merge(findings: Sequence[Finding], file: str, runs: Sequence[Run]) -> list[Problem]:
     """Tell a finding once that many runs share."""
     merged: list[Problem] = []
     for group, concerned in grouped(findings, runs):
-        if not concerned:
-            merged.extend(finding.problem for finding in group)
-            continue
         first = group[0].problem
-        listed = ", ".join(concerned[:_LISTED]) + (", ..." if len(concerned) > _LISTED else "")
-        text = f"{first.what}; and so in {len(concerned)} runs ({listed})"
-        merged.append(Problem(first.severity, file, first.place, text, first.cure))
+        if concerned:
+            text = f"{first.what}; and so in {len(concerned)} runs ({listed(concerned)})"
+            merged.append(Problem(first.severity, file, first.place, text, first.cure))
+        else:
+            merged.extend(finding.problem for finding in group)
     return merged
 
 

@@ -185,7 +185,6 @@ def sparkline(values: Sequence[float], width: int = 48) -> str:
 
     heights = np.nan_to_num(values, nan=0.0, posinf=0.0)
     peaks = np.array([cell.max() for cell in np.array_split(heights, min(width, len(heights)) or 1) if len(cell)])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = 1.0 + np.log10(peaks / peaks.max(initial=0.0)) / DECADES
-    steps = np.rint(np.nan_to_num(shares, nan=0.0).clip(0.0, 1.0) * (len(BARS) - 1))
-    return "".join(BARS[int(step)] for step in steps)
+    least = 10.0**-DECADES
+    shares = 1.0 + np.log10(np.maximum(peaks / (peaks.max(initial=0.0) or 1.0), least)) / DECADES
+    return "".join(BARS[int(step)] for step in np.rint(shares * (len(BARS) - 1)))
