@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
 from functools import cache
-from math import ceil, isfinite, log10
+from math import ceil, log10
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
-from rigdata.virtual_rig.faults import Fault
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.motion import answer
@@ -24,10 +23,9 @@ from rigdata.virtual_rig.rig import SimulatedRun, VirtualRig, converter_step, fe
 from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, point_facts
 
 Progress = Callable[[int, int, str], None]
-_Records = Iterable[tuple[SimulatedRun, tuple[Fault, ...]]]
+#: Names and readings of a file's columns.
+_Columns = list[tuple[str, FloatArray]]
 _UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
-
-
 _PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 
 
@@ -38,7 +36,8 @@ class CampaignTruth(dict[str, Any]):
         """Write as JSON, whole or not at all; never into the campaign itself. What is infinite becomes null."""
         target = Path(path)
         spare = target.with_name(f".{target.name}.part")
-        spare.write_text(json.dumps(_finite(self), indent=1, allow_nan=False), encoding="utf-8")
+        finite = json.loads(json.dumps(self), parse_constant=lambda infinite: None)
+        spare.write_text(json.dumps(finite, indent=1), encoding="utf-8")
         os.replace(spare, target)
 
 
@@ -59,9 +58,8 @@ def write_campaign(
     _check_faults(rig, chosen)
     laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
     rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
-    runs = rig.runs()
     header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
-    manifest = manifest_text(header, rig.instruments, runs, chosen, rig.faults)
+    manifest = manifest_text(header, rig.instruments, rig.runs(), chosen, rig.faults)
     facts: dict[str, dict[str, object]] = {}
     records = _written_records(rig, facts, progress)
     # the temporary sibling is on the same file system, so that the last step is one rename
@@ -78,60 +76,69 @@ def write_campaign(
 
 def _written_records(
     rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None
-) -> Iterator[tuple[SimulatedRun, tuple[Fault, ...]]]:
-    """Simulate every record and note its facts; those whose file is there, with the faults of it."""
-    own = [run.id for run in rig.runs() if run.record == run.id]
-    for done, run in enumerate(own, 1):
+) -> Iterator[SimulatedRun]:
+    """Simulate every record and note its facts; those whose file is there."""
+    records = [run.id for run in rig.runs() if run.record == run.id]
+    for done, run in enumerate(records, 1):
         record = rig.simulate(run)
-        facts[run] = _run_facts(record)
-        faults = rig.faults_of(run)
-        if not _has("missing_file", faults):
-            yield record, faults
+        facts[run] = {
+            "kind": record.run.kind,
+            "recorded_in": record.source,
+            **record.motion.facts,
+            "glitches": [asdict(glitch) for glitch in record.glitches],
+        }
+        if "missing_file" not in rig.fault_kinds(run):
+            yield record
         if progress is not None:
-            progress(done, len(own), run)
+            progress(done, len(records), run)
 
 
 def _check_faults(rig: VirtualRig, layout: Layout) -> None:
     """Refuse faults that this layout cannot show: a campaign must hold what was asked for."""
+    shown = {type(layout).__name__, "times" if layout.time_name else ""}
     for fault in rig.faults:
-        other = {"CsvLayout", "Hdf5Layout"}.intersection(fault.needs) - {type(layout).__name__}
-        if other:
-            raise VirtualRigError(f"fault {fault.kind!r} does not exist in {type(layout).__name__}")
-        if "times" in fault.needs and layout.time_name is None:
-            raise VirtualRigError(f"fault {fault.kind!r} needs a time column; give the layout a time_name")
+        missing = {"CsvLayout", "Hdf5Layout", "times"}.intersection(fault.needs) - shown
+        if missing:
+            raise VirtualRigError(f"fault {fault.kind!r} needs {missing.pop()}, which this layout does not have")
 
 
-def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, layout: Hdf5Layout) -> None:
+def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
+    """Columns of a record as its file holds them, times first, with the faults of the file."""
+    readings, run = record.readings, record.run.id
+    columns: _Columns = [] if layout.time_name is None else [(layout.time_name, readings.time)]
+    doubled: _Columns = []
+    for name, values in readings.columns.items():
+        kinds = rig.fault_kinds(run, name)
+        if "missing_channel" in kinds:
+            continue
+        columns.append((name, values[: len(values) * 3 // 4] if "short_channel" in kinds else values))
+        if "duplicate_column" in kinds:
+            doubled.append((name, values))
+    columns += doubled
+    is_empty = "empty_file" in rig.fault_kinds(run)
+    return [(name, values[:0]) for name, values in columns] if is_empty else columns
+
+
+def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: Iterator[SimulatedRun], layout: Layout) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
     """
     import h5py
 
-    kind = np.dtype("float64" if rig.noise.bits is None else "float32")
+    kind = "float64" if rig.noise.bits is None else "float32"
     with h5py.File(path, "w-", libver="earliest") as file:
         file.attrs["manifest"] = manifest
         file.attrs["bearing"] = rig.truth.bearing_text
         groups = file.create_group("runs")
-        for record, faults in records:
-            _write_record(groups.create_group(record.run.id), record, layout, kind, faults)
+        for record in records:
+            group = groups.create_group(record.run.id)
+            group.attrs["sample_rate_hz"] = float(record.readings.rate)
+            for name, values in _stored(record, rig, layout):
+                _write_dataset(group, name, values if name == layout.time_name else values.astype(kind))
         for run in rig.runs():
             if run.record != run.id and run.record in groups:
                 groups[run.id] = groups[run.record]  # a hard link
-
-
-def _write_record(
-    group: Any, record: SimulatedRun, layout: Hdf5Layout, kind: np.dtype, faults: tuple[Fault, ...]
-) -> None:
-    group.attrs["sample_rate_hz"] = float(record.readings.rate)
-    length = 0 if _has("empty_file", faults) else len(record.readings.time)
-    if layout.time_name is not None:
-        _write_dataset(group, layout.time_name, record.readings.time[:length])
-    for name, values in record.readings.columns.items():
-        if _has("missing_channel", faults, name):
-            continue
-        count = length * 3 // 4 if _has("short_channel", faults, name) else length
-        _write_dataset(group, name, values[:count].astype(kind))
 
 
 def _write_dataset(group: Any, name: str, values: FloatArray) -> None:
@@ -142,70 +149,49 @@ def _write_dataset(group: Any, name: str, values: FloatArray) -> None:
     group.create_dataset(name, data=values, track_times=False, **packing)
 
 
-def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: _Records, layout: CsvLayout) -> None:
+def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: Iterator[SimulatedRun], layout: CsvLayout) -> None:
     """Write manifest, bearing and all records into a new folder."""
     (folder / "runs").mkdir(parents=True)
     (folder / "campaign.toml").write_bytes(manifest.encode())
     (folder / rig.truth.bearing_name).write_bytes(rig.truth.bearing_text.encode())
-    for record, faults in records:
-        text = _record_text(record, rig, layout, faults)
+    for record in records:
+        text = _record_text(record, rig, layout)
         (folder / "runs" / f"{record.run.id}.csv").write_bytes(text.encode(layout.encoding))
 
 
-def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout, faults: tuple[Fault, ...]) -> str:
-    readings = record.readings
-    sensors = [s for s in rig.instruments.sensors if not _has("missing_channel", faults, s.name)]
-    sensors += [s for s in sensors if _has("duplicate_column", faults, s.name)]
-    names, units, columns, forms = [], [], [], []
-    if layout.time_name is not None:
-        names, units, columns = [layout.time_name], ["s"], [readings.time]
-        forms = ["%.6f" if (1e6 / readings.rate).is_integer() else "%.9f"]
-    for sensor in sensors:
-        names.append(sensor.name)
-        units.append(sensor.unit)
-        columns.append(readings.columns[sensor.name])
+def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> str:
+    columns, rate = _stored(record, rig, layout), record.readings.rate
+    sensors = {sensor.name: sensor for sensor in rig.instruments.sensors}
+    names, units, forms = [], [], []
+    for name, _ in columns:
+        names.append(name)
+        if name == layout.time_name:
+            units.append("s")
+            forms.append("%.6f" if (1e6 / rate).is_integer() else "%.9f")
+            continue
+        units.append(sensors[name].unit)
         # decimals that keep a hundredth of a converter step
-        decimals = ceil(-log10(converter_step(sensor, rig.noise.bits or _UNQUANTISED_BITS))) + 2
+        decimals = ceil(-log10(converter_step(sensors[name], rig.noise.bits or _UNQUANTISED_BITS))) + 2
         forms.append(f"%.{max(0, decimals)}f")
-    count = 0 if _has("empty_file", faults) else len(readings.time)
+    table = np.stack([values for _, values in columns], axis=1)
     tail = layout.delimiter if layout.trailing_delimiter else ""
-    head = [line.format(rate=f"{readings.rate:g}", count=count) for line in layout.preamble]
-    head.append(layout.delimiter.join(names) + tail)
-    if layout.units_line:
-        head.append(layout.delimiter.join(units) + tail)
-    body = _rows(np.stack(columns, axis=1)[:count], forms, layout, tail)
-    if _has("truncated_line", faults) and body:
+    head = [line.format(rate=f"{rate:g}", count=len(table)) for line in layout.preamble]
+    for cells in [names, units] if layout.units_line else [names]:
+        head.append(layout.delimiter.join(cells) + tail)
+    body = _rows(table, forms, layout, tail)
+    if "truncated_line" in rig.fault_kinds(record.run.id) and body:
         body[-1] = body[-1][: len(body[-1]) * 3 // 5]
         return layout.newline.join([*head, *body])
     return layout.newline.join([*head, *body, *[""] * (1 + layout.blank_last_lines)])
 
 
-def _rows(table: np.ndarray, forms: list[str], layout: CsvLayout, tail: str) -> list[str]:
+def _rows(table: FloatArray, forms: list[str], layout: CsvLayout, tail: str) -> list[str]:
     """Format the lines of a table; one format string for a whole row is the fastest way in Python."""
     form = "\0".join(forms)
     text = "\n".join([form % tuple(row) for row in table.tolist()])
-    if np.isnan(table).any():
-        text = text.replace("nan", layout.missing)
-    if layout.decimal != ".":
-        text = text.replace(".", layout.decimal)
-    text = text.replace("\0", layout.delimiter)
+    for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
+        text = text.replace(written, wanted)
     return [line + tail for line in text.split("\n")] if text else []
-
-
-def _has(kind: str, faults: tuple[Fault, ...], channel: str | None = None) -> bool:
-    """Whether one of a record's faults is of a kind, and in a channel."""
-    return any(f.kind == kind and (channel is None or f.is_in(channel)) for f in faults)
-
-
-def _finite(value: object) -> object:
-    """Copy plain data with None for infinite numbers (rigid pivots, rigid cells), which JSON does not know."""
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    return value
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
@@ -223,19 +209,9 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
         housing_mass_kg=instruments.true_mass,
         cell_stiffness_N_per_m=instruments.cell_stiffness,
         sensor_errors={s.name: asdict(s.error) for s in instruments.sensors},
-        faults=[_fault(fault) for fault in rig.faults],
+        faults=[fault.stated() for fault in rig.faults],
         runs=runs,
     )
-
-
-def _run_facts(record: SimulatedRun) -> dict[str, object]:
-    """Facts of one record for the truth."""
-    return {
-        "kind": record.run.kind,
-        "recorded_in": record.source,
-        **record.motion.facts,
-        "glitches": [asdict(glitch) for glitch in record.glitches],
-    }
 
 
 def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
@@ -264,11 +240,6 @@ def _pivot_curve(truth: RigTruth, pad: int) -> dict[str, object]:
         "deflection_m": truth.deflection(pad, _PIVOT_LOADS).tolist(),
         "stiffness_N_per_m": stiffness.tolist(),
     }
-
-
-def _fault(fault: Fault) -> dict[str, object]:
-    """Fault without what was not given; an open end is not a JSON number."""
-    return {k: v for k, v in asdict(fault).items() if v is not None and v != float("inf")}
 
 
 def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instruments) -> ComplexArray:

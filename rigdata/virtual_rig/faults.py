@@ -7,8 +7,9 @@ after the converter), a run (the test was done or noted wrongly) and a file.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase
+from math import inf
 from typing import Literal
 
 from rigdata.near_names import unknown_name
@@ -56,7 +57,7 @@ class Fault:
     channel: str | None = None
     value: float | None = None
     start: float = 0.0
-    length: float = float("inf")
+    length: float = inf
     other: str | None = None
 
     def __post_init__(self) -> None:
@@ -75,6 +76,14 @@ class Fault:
     def place(self) -> Place:
         """Where it sits."""
         return KINDS[self.kind][0]
+
+    def stated(self) -> dict[str, object]:
+        """Its entries that say something; an open end is not a JSON number."""
+        return {key: value for key, value in asdict(self).items() if value not in (None, inf)}
+
+    def size(self, usual: float) -> float:
+        """Its value, or the usual one."""
+        return usual if self.value is None else self.value
 
     def affects(self, run: str) -> bool:
         """Whether it concerns a run."""

@@ -5,6 +5,7 @@ Every sensor carries both: its stated calibration (in the manifest) and its `Sen
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import radians
 
@@ -16,6 +17,14 @@ from rigdata.virtual_rig.truth import VirtualRigError, hz
 _STANDARD_GRAVITY = 9.80665
 #: Full scales that cells are sold with [N].
 _CELL_SIZES = (20e3, 50e3, 100e3, 200e3, 500e3)
+#: Quantity and entry of `SensorError` of every effect that acts on readings.
+_EFFECTS = {
+    "probe_gain": ("displacement", "gain"),
+    "probe_rotation": ("displacement", "angle"),
+    "channel_delay": ("displacement", "delay"),
+    "loadcell_gain": ("force", "gain"),
+    "loadcell_crosstalk": ("force", "cross"),
+}
 
 
 @dataclass(frozen=True)
@@ -41,41 +50,41 @@ class Sensor:
     polarity: int = 1
     zero: float = 0.0
     span: float = 10.0
-    calibration: tuple[tuple[str, str], ...] = ()
+    calibration: Mapping[str, str] = field(default_factory=dict)
     uncertainty: float = 0.0
     pad: int | None = None
+    position: float | None = None
     error: SensorError = SensorError()
 
     @classmethod
     def probe(cls, name: str, axis: float, gap_voltage: float = 8.0) -> Sensor:
         """Eddy-current probe of 7.78 mV/um: the reading falls as the shaft comes nearer."""
-        sensitivity = (("sensitivity", "7.78 mV/um"),)
-        return cls(name, "displacement", "V", 7.78e3, axis, -1, gap_voltage, calibration=sensitivity, uncertainty=0.005)
+        stated = {"sensitivity": "7.78 mV/um"}
+        return cls(name, "displacement", "V", 7.78e3, axis, -1, gap_voltage, calibration=stated, uncertainty=0.005)
 
     @classmethod
     def load_cell(cls, name: str, axis: float, load: float = 0.0) -> Sensor:
         """Strain-gauge cell in a bridge: 2 mV/V at full scale, supplied with 5 V; 20 kN, or more for a `load` [N]."""
         full_scale = next((size for size in _CELL_SIZES if size >= 1.5 * load), 1.5 * load)
-        calibration = (("sensitivity", "2.0 mV/V"), ("full_scale", f"{full_scale / 1e3:g} kN"), ("excitation", "5 V"))
-        return cls(name, "force", "mV", 10.0 / full_scale, axis, calibration=calibration, uncertainty=0.002)
+        stated = {"sensitivity": "2.0 mV/V", "full_scale": f"{full_scale / 1e3:g} kN", "excitation": "5 V"}
+        return cls(name, "force", "mV", 10.0 / full_scale, axis, calibration=stated, uncertainty=0.002)
 
     @classmethod
     def accelerometer(cls, name: str, axis: float) -> Sensor:
         """Accelerometer of 10 mV/g on a converter of 0.05 V."""
-        calibration = (("sensitivity", "10 mV/g"),)
-        return cls(name, "acceleration", "V", 10.0 * 1e-3 / _STANDARD_GRAVITY, axis, span=0.05, calibration=calibration)
+        scale = 10.0 * 1e-3 / _STANDARD_GRAVITY
+        return cls(name, "acceleration", "V", scale, axis, span=0.05, calibration={"sensitivity": "10 mV/g"})
 
     @classmethod
     def thermometer(cls, name: str, pad: int) -> Sensor:
         """Pt100 with its amplifier, at three quarters of a pad's arc."""
-        calibration = (("position", "0.75"), ("sensitivity", "15 K/V"), ("zero", "0 degC"))
-        return cls(name, "temperature", "V", 1 / 15.0, calibration=calibration, pad=pad)
+        stated = {"sensitivity": "15 K/V", "zero": "0 degC"}
+        return cls(name, "temperature", "V", 1 / 15.0, calibration=stated, pad=pad, position=0.75)
 
     @classmethod
-    def tachometer(cls, name: str, mv_per_hz: float = 100.0) -> Sensor:
+    def tachometer(cls, name: str) -> Sensor:
         """Speed as a voltage."""
-        calibration = (("sensitivity", f"{mv_per_hz:g} mV/Hz"),)
-        return cls(name, "speed", "V", mv_per_hz * 1e-3 / hz(1.0), calibration=calibration)
+        return cls(name, "speed", "V", 0.1 / hz(1.0), calibration={"sensitivity": "100 mV/Hz"})
 
     def with_error(self, **changes: float) -> Sensor:
         """Return the sensor with these errors on top of its own: a gain multiplies, all else adds."""
@@ -156,20 +165,12 @@ class Instruments:
         """Reading of every probe with the shaft in the bearing centre."""
         return {s.name: s.zero + s.polarity * s.scale * s.error.offset for s in self.of("displacement")}
 
-    def with_errors(
-        self,
-        probe_gain: float = 1.0,
-        probe_rotation: float = 0.0,
-        loadcell_gain: float = 1.0,
-        loadcell_crosstalk: float = 0.0,
-        channel_delay: float = 0.0,
-        mass_error: float = 0.0,
-    ) -> Instruments:
+    def with_errors(self, mass_error: float = 0.0, **effects: float) -> Instruments:
         """Add measurement effects by their canonical names and meanings (physics.md)."""
-        errors = {
-            "displacement": {"gain": probe_gain, "angle": probe_rotation, "delay": channel_delay},
-            "force": {"gain": loadcell_gain, "cross": loadcell_crosstalk},
-        }
+        errors: dict[str, dict[str, float]] = {}
+        for name, value in effects.items():
+            quantity, entry = _EFFECTS[name]
+            errors.setdefault(quantity, {})[entry] = value
         return replace(
             self,
             sensors=tuple(s.with_error(**errors.get(s.quantity, {})) for s in self.sensors),

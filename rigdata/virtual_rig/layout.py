@@ -114,76 +114,77 @@ def manifest_text(
 
 
 def _table(title: str | None, entries: dict[str, object]) -> str:
+    """A table of the manifest; entries without a value are left out."""
     lines = [] if title is None else [title]
-    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entries.items()]
+    for key, value in entries.items():
+        if value is not None:
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     return "\n".join(lines) + "\n"
 
 
 def _dialect(layout: CsvLayout) -> dict[str, object]:
     header_line = len(layout.preamble) + 1
-    entries: dict[str, object] = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
-    entries["header_line"] = header_line
-    if layout.units_line:
-        entries["units_line"] = header_line + 1
-    return entries
+    return {
+        "delimiter": layout.delimiter,
+        "decimal": layout.decimal,
+        "encoding": layout.encoding,
+        "header_line": header_line,
+        "units_line": header_line + 1 if layout.units_line else None,
+    }
 
 
 def _channel(sensor: Sensor) -> str:
-    entries: dict[str, object] = {"quantity": sensor.quantity}
-    if sensor.axis is not None:
-        entries["axis"] = _degrees(sensor.axis)
-    if sensor.pad is not None:
-        entries["pad"] = sensor.pad
-    calibration = dict(sensor.calibration)
-    if "position" in calibration:
-        entries["position"] = float(calibration.pop("position"))
-    entries |= {"unit": sensor.unit, **calibration}
-    if sensor.polarity != 1:
-        entries["polarity"] = sensor.polarity
-    if sensor.uncertainty:
-        entries["uncertainty"] = f"{100 * sensor.uncertainty:g} %"
+    entries: dict[str, object] = {
+        "quantity": sensor.quantity,
+        "axis": None if sensor.axis is None else _degrees(sensor.axis),
+        "pad": sensor.pad,
+        "position": sensor.position,
+        "unit": sensor.unit,
+        **sensor.calibration,
+        "polarity": sensor.polarity if sensor.polarity < 0 else None,
+        "uncertainty": f"{100 * sensor.uncertainty:g} %" if sensor.uncertainty else None,
+    }
     return _table(f"[channels.{sensor.name}]", entries)
 
 
 def _run(run: PlannedRun, layout: Layout, common_rate: float, faults: tuple[Fault, ...], rotation: str) -> str:
     noted = _as_noted(run, faults)
-    entries: dict[str, object] = {"id": run.id}
-    if isinstance(layout, CsvLayout):
-        entries["file"] = f"runs/{run.record}.csv"
-    entries["kind"] = run.kind
-    if isinstance(noted.test, DryTest):
-        entries["pad"] = noted.test.pad
+    test, point = noted.test, noted.point
+    entries: dict[str, object] = {
+        "id": run.id,
+        "file": f"runs/{run.record}.csv" if isinstance(layout, CsvLayout) else None,
+        "kind": run.kind,
+    }
+    if isinstance(test, DryTest):
+        entries["pad"] = test.pad
         entries["static_load_direction"] = _degrees(noted.direction)
-        if noted.test.branch != "up":
-            entries["branch"] = noted.test.branch
-    elif noted.test is None:
-        entries["shaft_speed"] = f"{noted.point.shaft_speed_hz:.10g} Hz"
-        entries["static_load"] = f"{noted.point.static_load / 1e3:.10g} kN"
-        entries["static_load_direction"] = _degrees(noted.point.static_load_direction)
-        if noted.point.rotation != rotation:
-            entries["rotation"] = noted.point.rotation
-        if noted.kind == "dynamic":
-            entries["excitation_frequency"] = f"{noted.point.excitation_hz:.10g} Hz"
-            entries["excitation_direction"] = _degrees(noted.direction)
-    if run.rate != common_rate:
-        entries["sample_rate"] = _rate(run.rate)
+        entries["branch"] = test.branch if test.branch != "up" else None
+    elif test is None:
+        entries["shaft_speed"] = f"{point.shaft_speed_hz:.10g} Hz"
+        entries["static_load"] = f"{point.static_load / 1e3:.10g} kN"
+        entries["static_load_direction"] = _degrees(point.static_load_direction)
+        entries["rotation"] = point.rotation if point.rotation != rotation else None
+    if run.kind == "dynamic":
+        entries["excitation_frequency"] = f"{point.excitation_hz:.10g} Hz"
+        entries["excitation_direction"] = _degrees(noted.direction)
+    entries["sample_rate"] = _rate(run.rate) if run.rate != common_rate else None
     return _table("[[runs]]", entries)
 
 
 def _as_noted(run: PlannedRun, faults: tuple[Fault, ...]) -> PlannedRun:
     """Give the run as somebody noted it, with that person's mistakes."""
     for fault in faults:
-        if fault.value is None or fault.place != "run" or not fault.affects(run.id):
+        point, value = run.point, fault.size(0.0)
+        if not fault.affects(run.id):
             continue
         if fault.kind == "wrong_pad" and isinstance(run.test, DryTest):
-            run = replace(run, test=replace(run.test, pad=int(fault.value)))
+            run = replace(run, test=replace(run.test, pad=int(value)))
         elif fault.kind == "wrong_direction":
-            run = replace(run, direction=run.direction + fault.value)
+            run = replace(run, direction=run.direction + value)
         elif fault.kind == "wrong_frequency":
-            excitation = run.point.excitation + hz(fault.value)
-            run = replace(run, point=replace(run.point, excitation=excitation))
+            run = replace(run, point=replace(point, excitation=point.excitation + hz(value)))
         elif fault.kind == "wrong_load":
-            run = replace(run, point=replace(run.point, static_load=run.point.static_load * fault.value))
+            run = replace(run, point=replace(point, static_load=point.static_load * value))
     return run
 
 

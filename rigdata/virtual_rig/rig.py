@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.fft import irfft, next_fast_len
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.virtual_rig.faults import Fault, check_faults
 from rigdata.virtual_rig.instruments import Instruments, Sensor
 from rigdata.virtual_rig.motion import Motion, clearance_motion, dry_motion, running_motion
@@ -169,63 +169,52 @@ _ERRORS = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "
 
 def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
     """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
-    sensors = list(instruments.sensors)
+    sensors = instruments.sensors
     for fault in faults:
-        for i, sensor in enumerate(sensors):
-            if fault.place == "sensor" and fault.is_in(sensor.name) and fault.value is not None:
-                sensors[i] = sensor.with_error(**{_ERRORS[fault.kind]: fault.value})
-    return replace(instruments, sensors=tuple(sensors))
+        if fault.place == "sensor":
+            change = {_ERRORS[fault.kind]: fault.size(0.0)}
+            sensors = tuple(s.with_error(**change) if fault.is_in(s.name) else s for s in sensors)
+    return replace(instruments, sensors=sensors)
 
 
 def spoil_record(
-    readings: Readings,
-    instruments: Instruments,
-    faults: Iterable[Fault],
-    rng: np.random.Generator,
+    readings: Readings, instruments: Instruments, faults: Iterable[Fault], rng: np.random.Generator
 ) -> Readings:
     """Readings with the record faults of their run; the given ones stay as they are."""
-    columns = dict(readings.columns)
-    time = readings.time
+    columns, time = dict(readings.columns), readings.time
     for fault in faults:
         if fault.place != "record":
             continue
+        inside = (time >= fault.start) & (time < fault.start + fault.length)
         if fault.kind == "time_gap":
-            recorded = ~_window(fault, time)
-            time, columns = time[recorded], {name: v[recorded] for name, v in columns.items()}
+            time, columns = time[~inside], {name: v[~inside] for name, v in columns.items()}
         elif fault.kind == "time_jitter":
-            spread = 0.2 if fault.value is None else fault.value
-            time = time + np.clip(spread * rng.standard_normal(len(time)), -0.45, 0.45) / readings.rate
-        elif fault.kind == "swapped" and fault.channel is not None and fault.other is not None:
-            columns[fault.channel], columns[fault.other] = columns[fault.other], columns[fault.channel]
+            shift = np.clip(fault.size(0.2) * rng.standard_normal(len(time)), -0.45, 0.45)
+            time = time + shift / readings.rate
+        elif fault.kind == "swapped":
+            first, second = str(fault.channel), str(fault.other)
+            columns[first], columns[second] = columns[second], columns[first]
         else:
-            for name in columns:
-                if fault.is_in(name):
-                    columns[name] = _spoilt(columns[name], fault, instruments.named(name), time)
+            for sensor in instruments.sensors:
+                if fault.is_in(sensor.name):
+                    columns[sensor.name] = _spoilt(columns[sensor.name], fault, sensor, inside)
     return Readings(time, columns, readings.rate)
 
 
-def _window(fault: Fault, time: FloatArray) -> np.ndarray:
-    return (time >= fault.start) & (time < fault.start + fault.length)
-
-
-def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, time: FloatArray) -> FloatArray:
-    """Readings (n,) of one channel with a fault of its record."""
-    inside = _window(fault, time)
+def _spoilt(v: FloatArray, fault: Fault, sensor: Sensor, inside: BoolArray) -> FloatArray:
+    """Readings (n,) of one channel with a fault of its record, which a few have `inside` a stretch only."""
     if fault.kind == "dead":
-        return np.full_like(v, fault.value or 0.0)
-    if fault.kind == "stuck":
-        return np.where(inside, v[np.argmax(inside)], v)
-    if fault.kind == "clipped":
-        low, high = float(v.min()), float(v.max())
-        middle = 0.5 * (low + high)
-        reach = 0.5 * (high - low) * (0.6 if fault.value is None else fault.value)
-        return np.clip(v, middle - reach, middle + reach)
+        return np.full_like(v, fault.size(0.0))
     if fault.kind == "inverted":
         # a probe wired the wrong way round still has its gap voltage: only what moves changes sign
         return 2 * sensor.zero - v
-    if fault.kind == "nan_gap":
-        return np.where(inside, np.nan, v)
-    return v + sensor.polarity * sensor.scale * (fault.value or 0.0) * inside  # a glitch
+    if fault.kind == "clipped":
+        low, high = float(v.min()), float(v.max())
+        middle, reach = 0.5 * (low + high), 0.5 * (high - low) * fault.size(0.6)
+        return np.clip(v, middle - reach, middle + reach)
+    if fault.kind == "glitch":
+        return v + sensor.polarity * sensor.scale * fault.size(0.0) * inside
+    return np.where(inside, np.nan if fault.kind == "nan_gap" else v[np.argmax(inside)], v)  # or stuck
 
 
 @dataclass(frozen=True)
@@ -285,15 +274,19 @@ class VirtualRig:
         members = [run.id for run in self.runs() if run.record == record]
         return tuple(fault for fault in self.faults if any(map(fault.affects, members)))
 
+    def fault_kinds(self, record: str, channel: str | None = None) -> set[str]:
+        """Kinds of the faults of a record, or of those in one of its channels."""
+        return {fault.kind for fault in self.faults_of(record) if channel is None or fault.is_in(channel)}
+
     def _simulated(self, run: PlannedRun) -> SimulatedRun:
         faults = self.faults_of(run.record)
-        if any(fault.kind == "missing_excitation" for fault in faults):
+        if "missing_excitation" in self.fault_kinds(run.record):
             run = replace(run, lines=())
         instruments = faulty_instruments(self.instruments, faults)
         motion = self._motion(run, instruments)
         columns = analogue_readings(motion, instruments, self.noise, self.seed, run.id)
         glitches: tuple[Glitch, ...] = ()
-        if run.kind in ("dynamic", "locus"):
+        if run.test is None:
             glitches = draw_glitches(instruments, self.noise, len(motion.time), self.seed, run.id)
         for glitch in glitches:
             sensor = instruments.named(glitch.channel)
@@ -301,9 +294,7 @@ class VirtualRig:
             columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
         columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
         readings = Readings(motion.time, columns, run.rate)
-        if faults:
-            rng = stream(self.seed, run.id, "faults")
-            readings = spoil_record(readings, instruments, faults, rng)
+        readings = spoil_record(readings, instruments, faults, stream(self.seed, run.id, "faults"))
         return SimulatedRun(run, readings, motion, glitches, run.id)
 
     def _motion(self, run: PlannedRun, instruments: Instruments) -> Motion:
