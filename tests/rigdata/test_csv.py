@@ -209,10 +209,10 @@ def test_missing_channel_names_the_nearest_column(tmp_path):
 @pytest.mark.parametrize(
     ("encoding", "csv", "says"),
     [
-        ("utf-8", 'delimiter = ","', ["delimiter ','", "';' finds 3", "leave it out"]),
+        ("utf-8", 'delimiter = ","', ["delimiter ','", "line 1 with ';' holds 3", "leave it out"]),
         ("utf-8", 'decimal = "."', ["decimal is '.'", "'0,0000'"]),
-        ("utf-8", "header_line = 3", ["line 3", "names are in line 1"]),
-        ("utf-8", "header_line = 300", ["header_line is 300", "names are in line 1"]),
+        ("utf-8", "header_line = 3", ["header_line 3", "line 1 with ';' holds 3"]),
+        ("utf-8", "header_line = 300", ["header_line 300", "line 1 with ';' holds 3"]),
         ("utf-16-le", 'encoding = "utf-16"', ["cannot be read (", "does not start with BOM)"]),
     ],
 )

@@ -111,8 +111,7 @@ _MISSING_WORDS = """
     -1,#INF 1.#R OVL +OVL -OVL OL +OL -OL OVER OVERLOAD OVERFLOW Overflow INVALID Invalid ERR inf -inf +inf Inf
     -Inf INF -INF
 """
-MISSING = ("", *_MISSING_WORDS.split())
-_MISSING = frozenset(MISSING)
+MISSING = dict.fromkeys(["", *_MISSING_WORDS.split()])
 _NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
     for mark in ".,"
@@ -131,6 +130,11 @@ def is_stamp(cell: str) -> bool:
 def is_date(cell: str) -> bool:
     """Whether a cell holds a date alone: such a column tells nothing within a run."""
     return _DATE.fullmatch(cell) is not None
+
+
+def is_entry(cell: str) -> bool:
+    """Whether a cell can stand in a table of numbers: a number, none, a time of day or a date."""
+    return looks_like(cell) or cell in MISSING or is_stamp(cell) or is_date(cell)
 
 
 def stamp_seconds(cells: Sequence[str | None]) -> tuple[FloatArray, int]:
@@ -189,11 +193,6 @@ def _spread(time: FloatArray) -> FloatArray:
     slope, start = np.polyfit(index, time, 1)
     even = start + slope * index
     return even - even[0] if np.abs(even - time).max() <= 1.5 * resolution else time
-
-
-def is_missing(cell: str) -> bool:
-    """Whether `cell` (stripped) stands for no value."""
-    return cell in _MISSING
 
 
 def is_number(cell: str, decimal: str) -> bool:

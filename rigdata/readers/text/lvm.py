@@ -30,11 +30,14 @@ def read_lvm(path: Path) -> list[Series]:
     return [_joined(segments) for segments in parts.values()]
 
 
-class _LvmFile:
+class _LvmFile(io.TextIOBase):
+    """A file, of which `read` gives pandas the rows of one table: as text it takes several times its numbers' memory."""
+
     def __init__(self, path: Path) -> None:
         """Read the file's own header, which tells separator and decimal mark."""
         self.file = path.name
         self.lines = all_lines(path, text_encoding(path, None))
+        self.rows: Iterator[str] = iter(())
         self.separator, self.decimal = "\t", "."
         if not next(self.lines, "").startswith(_MAGIC):
             remedy = "Is it a LabVIEW measurement file?"
@@ -47,25 +50,31 @@ class _LvmFile:
             elif line.startswith(_END):
                 break
 
-    def channels(self) -> Iterator[Series]:
-        """Channels of all segments in order; without headings of their own all samples are one."""
-        while (line := next(self.lines, None)) is not None:  # a table puts the next heading back
-            first, *_ = self._cells(line)
-            if first == _CHANNELS:
-                header = self._heading()
-                line = next(self.lines, "")
-            elif first == _X:
-                header = {}
-            else:
-                continue
-            names = self._cells(line)
-            yield from self._segment(header, names, self._table(names))
+    def read(self, size: int | None = -1) -> str:
+        """The next rows, however much is asked for."""
+        return "".join(itertools.islice(self.rows, _LINES))
 
-    def _segment(self, header: dict[str, list[str]], names: Sequence[str], table: FloatArray) -> Iterator[Series]:
-        """Channels over time of one table (n, columns); the group of each is when the segment began."""
+    def channels(self) -> Iterator[Series]:
+        """Channels over time of all segments in order; special blocks of their headings are left alone."""
+        header: dict[str, list[str]] = {}
+        special = False
+        while (line := next(self.lines, None)) is not None:  # a table puts the next heading back
+            key, *cells = self._cells(line)
+            special = (special or key.startswith("***Start_Special")) and not key.startswith("***End_Special")
+            if key and not special:
+                header[key] = cells  # of one channel each
+            if _CHANNELS in header and key.startswith(_END):
+                key, *cells = self._cells(next(self.lines, ""))
+            elif key != _X:
+                continue
+            yield from self._segment(header, [key, *cells])
+            header = {}
+
+    def _segment(self, header: Mapping[str, Sequence[str]], names: Sequence[str]) -> Iterator[Series]:
+        """Channels over time of the table that begins here; the group of each is when the segment began."""
         x: FloatArray | None = None
         number = 0
-        for name, values in zip(names, table.T, strict=True):
+        for name, values in zip(names, self._table(names).T, strict=True):
             if name == _X:
                 x = values if np.isfinite(values).any() else None
             elif name and name != _COMMENT:
@@ -92,31 +101,16 @@ class _LvmFile:
     def _cells(self, line: str) -> list[str]:
         return [cell.strip() for cell in line.split(self.separator)]
 
-    def _heading(self) -> dict[str, list[str]]:
-        """Entries of a segment's heading, one cell per channel, up to its end mark; special blocks are left alone."""
-        entries: dict[str, list[str]] = {}
-        special = False
-        for line in self.lines:
-            key, *cells = self._cells(line)
-            if key.startswith(_END):
-                break
-            if key.startswith("***Start_Special"):
-                special = True
-            elif key.startswith("***End_Special"):
-                special = False
-            if key and not special:
-                entries[key] = cells
-        return entries
-
     def _table(self, names: Sequence[str]) -> FloatArray:
         """Numbers (n, columns) of the table that begins here, NaN where blank; the column of comments is left out."""
         import pandas as pd
 
         width = len(names)
         used = [i for i, name in enumerate(names) if name and name != _COMMENT]
+        self.rows = self._rows(width)
         try:
             frame = pd.read_csv(
-                _Rows(self._rows(width)), sep=self.separator, decimal=self.decimal, header=None, names=range(width),
+                self, sep=self.separator, decimal=self.decimal, header=None, names=range(width),
                 usecols=used, index_col=False, dtype=float, skip_blank_lines=False, quoting=3,
             )  # fmt: skip
         except pd.errors.EmptyDataError:
@@ -137,17 +131,6 @@ class _LvmFile:
                 return
             if line.strip(blank):
                 yield line + self.separator * max(0, width - 1 - line.count(self.separator)) + "\n"
-
-
-class _Rows(io.TextIOBase):
-    """Lines in place of a file: as text a table takes several times the memory of its numbers."""
-
-    def __init__(self, lines: Iterator[str]) -> None:
-        self._lines = lines
-
-    def read(self, size: int | None = -1) -> str:
-        """The next lines, however much is asked for."""
-        return "".join(itertools.islice(self._lines, _LINES))
 
 
 def _joined(parts: Sequence[Series]) -> Series:
