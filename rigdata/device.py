@@ -7,6 +7,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 
 #: Share by which a stated rate may miss that of the samples.
@@ -54,6 +57,27 @@ class Grid:
     begin: float = 0.0  #: first time [s]; NaN where it is missing
     times: int | None = None  #: of a time column that should serve it but has not its length
     channels: list[str] = field(default_factory=list)
+
+
+def rate_of_time(time: FloatArray) -> float:
+    """Nominal sample rate of a time column (n,) [Hz].
+
+    The median step over many samples is free of gaps, of jitter and of the rounding of the column
+    (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are finite or time does not advance.
+    """
+    finite = time[np.isfinite(time)]
+    span = min(1000, len(finite) // 4) or len(finite) - 1
+    if span < 1:
+        return float("nan")
+    step = float(np.median(finite[span:] - finite[:-span])) / span
+    # Ten digits: as much as a column of rounded times holds; keeps 1000 Hz from being 999.9999999999.
+    return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")
+
+
+def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: float | None) -> Grid:
+    """The grid of a time column (n,) [s], of which the first samples are enough; a stated rate where times do not tell it."""
+    rate = rate_of_time(time)
+    return Grid(length, clock, rate if rate > 0 else stated or rate, label, float(time[0]) if len(time) else 0.0)
 
 
 def planned(

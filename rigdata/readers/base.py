@@ -215,21 +215,6 @@ class RunReader(RecordFile):
         return tuple(problems)
 
 
-def rate_of_time(time: FloatArray) -> float:
-    """Nominal sample rate of a time column (n,) [Hz].
-
-    The median step over many samples is free of gaps, of jitter and of the rounding of the column
-    (0.000, 0.001, 0.001, 0.002 at 2 kHz); NaN where no two times are finite or time does not advance.
-    """
-    finite = time[np.isfinite(time)]
-    span = min(1000, len(finite) // 4) or len(finite) - 1
-    if span < 1:
-        return float("nan")
-    step = float(np.median(finite[span:] - finite[:-span])) / span
-    # Ten digits: as much as a column of rounded times holds; keeps 1000 Hz from being 999.9999999999.
-    return float(f"{1.0 / step:.10g}") if step > 0 else float("nan")
-
-
 def suffix_hint(path: Path) -> str:
     """What to do about a suffix that no reader is known by; "" where it is known."""
     suffix = path.suffix.lower()

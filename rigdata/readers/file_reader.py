@@ -18,10 +18,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.device import Grid
+from rigdata.device import Grid, timed_grid
 from rigdata.near_names import hint
 from rigdata.problem import Problem, RigDataError
-from rigdata.readers.base import FORMATS, Layout, RecordFile, RunReader, rate_of_time, suffix_hint
+from rigdata.readers.base import FORMATS, Layout, RecordFile, RunReader, suffix_hint
 from rigdata.readers.series import SAME_STEP, Contents, Series, is_time, table, with_unique_names
 
 #: Larger files of a logger's format are rejected: they are read whole [bytes].
@@ -159,11 +159,9 @@ class FileReader(RunReader):
                 times.setdefault(clock, channel.time)
                 if len(times) > _MOST_TIMES:
                     raise self.refuse("", f"has more than {_MOST_TIMES} different times", "Split the run")
-                rate = rate_of_time(times[clock])
-                rate = rate if rate > 0 else self.stated_rate or rate
-                label = channel.group if is_time(channel.group) else f"{rate:.6g} Hz"
-                begin = float(times[clock][0]) if len(channel) else 0.0
-                timings[channel.name] = Grid(len(channel), clock, rate, label, begin)
+                grid = timed_grid(len(channel), clock, times[clock], channel.group, self.stated_rate)
+                label = grid.label if is_time(grid.label) else f"{grid.rate:.6g} Hz"
+                timings[channel.name] = replace(grid, label=label)
         remedy = "Export it with its times, or correct sample_rate"
         layout = self._planned(timings, self.stated_rate, "channel", remedy)
         faults |= layout.faults

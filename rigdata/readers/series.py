@@ -16,9 +16,9 @@ import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import OVERFLOW, Channel
-from rigdata.device import RATE_MISS
+from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
-from rigdata.readers.base import RecordFile, rate_of_time
+from rigdata.readers.base import RecordFile
 
 #: Longer channels are in a file without a name, and are read from there in pieces [bytes].
 IN_MEMORY = 2**23

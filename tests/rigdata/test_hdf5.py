@@ -107,7 +107,7 @@ def test_time_dataset(tmp_path):
 def test_senseless_rates(tmp_path, rate):
     """A text stands elsewhere in the file."""
     make(tmp_path / "c.h5", rate=rate)
-    refused(tmp_path / "c.h5", "attribute sample_rate_hz", *(["is not a number"] if isinstance(rate, str) else []))
+    refused(tmp_path / "c.h5", "attribute sample_rate_hz", "is no rate")
 
 
 def external_link(group):

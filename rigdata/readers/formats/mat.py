@@ -27,8 +27,8 @@ _SHORTEST, _MOST_NAMES, _LONGEST = 8, 4096, 1000
 _DEEPEST = 4
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
-#: Number types of the format; text types come on top.
+#: Types of elements: variables, names, whole numbers, numbers of any size, and texts on top of these.
+_MATRIX, _COMPRESSED, _NAME, _WHOLE = frozenset({14}), 15, frozenset({1}), frozenset({5})
 _NUMBERS = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13})
 _TEXTS = _NUMBERS | {16, 17, 18}
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
@@ -199,23 +199,22 @@ class _Bytes:
     at: int
     end: int
 
-    def element(self, types: frozenset[int]) -> tuple[int, int, int]:
-        """Type, start and size of the next element, which is passed."""
+    def element(self, types: frozenset[int]) -> _Bytes:
+        """What the next element holds; it is passed."""
         if self.at + 8 > self.end:
             raise ValueError("ends inside an element")
         kind, size = struct.unpack_from(f"{self.order}II", self.data, self.at)
+        start, step = self.at + 8, 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
         if kind >> 16:  # at most four bytes, kept in the tag itself
             kind, size, start, step = kind & 0xFFFF, kind >> 16, self.at + 4, 8
-            if size > 4:
-                raise ValueError(f"a short element claims {size} bytes")
-        else:
-            start, step = self.at + 8, 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
-        if kind not in types:
-            raise ValueError(f"an element has the type {kind}, which is not allowed there")
-        if start + size > self.end:
-            raise ValueError(f"an element claims {size} bytes, more than there are")
+        if kind not in types or start + size > self.end:
+            raise ValueError(f"an element of type {kind} claims {size} bytes, which is not allowed there")
         self.at = min(self.at + step, self.end)
-        return kind, start, size
+        return _Bytes(self.data, self.order, start, start + size)
+
+    def numbers(self, letter: str) -> tuple[int, ...]:
+        """All that is left as whole numbers of four bytes."""
+        return struct.unpack_from(f"{self.order}{(self.end - self.at) // 4}{letter}", self.data, self.at)
 
 
 def check_mat5(path: Path) -> None:
@@ -230,87 +229,60 @@ def check_mat5(path: Path) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if len(data) < _HEADER or not any(data[:4]) or order is None:
         return  # version 4, or no MATLAB file
-    walk = _Bytes(data, order, _HEADER, len(data))
-    claimed = 0
+    walk, claimed = _Bytes(data, order, _HEADER, len(data)), 0
     try:
         while walk.at < walk.end:
-            kind, start, size = walk.element(frozenset({_MATRIX, _COMPRESSED}))
-            if kind == _COMPRESSED:
-                packed = data[start : start + size]
-                _, length = struct.unpack(f"{order}II", _unpacked(packed, 8))
+            is_packed = walk.numbers("I")[:1] == (_COMPRESSED,)
+            element = walk.element(_MATRIX | {_COMPRESSED})
+            if is_packed:
+                packed = data[element.at : element.end]
+                length = _Bytes(zlib.decompressobj().decompress(packed, 8), order, 0, 8).numbers("I")[1]
                 claimed += SAMPLE * length  # small numbers take a byte each
                 refuse_claim(claimed, len(data), path.name)
-                plain = _unpacked(packed, length + 16)
-                _inner(_Bytes(plain, order, 0, len(plain)), 0)
-            elif size:
-                _matrix(_Bytes(data, order, start, start + size), 0)
+                plain = zlib.decompressobj().decompress(packed, length + 16)
+                element = _Bytes(plain, order, 0, len(plain)).element(_MATRIX)
+            _walk_matrix(element, 0)
     except RigDataError:
         raise
-    except (ValueError, struct.error) as error:
+    except (ValueError, struct.error, zlib.error) as error:
         remedy = "Copy it again from the logger"
         raise refuse(path.name, f"byte {walk.at}", f"is damaged: {error}", remedy) from error
 
 
-def _unpacked(packed: bytes, limit: int) -> bytes:
-    """The first bytes of a compressed variable, up to a limit."""
-    try:
-        return zlib.decompressobj().decompress(packed, limit)
-    except zlib.error as error:
-        raise ValueError(f"a compressed variable cannot be unpacked ({error})") from error
-
-
-def _matrix(walk: _Bytes, depth: int) -> None:
-    """Walk the parts of one variable."""
+def _walk_matrix(walk: _Bytes, depth: int) -> None:
+    """Walk the parts of one variable: flags, shape and name, then what its class has."""
     if depth > _DEEPEST_ELEMENT:
         raise ValueError("nests too deeply")
     if walk.at == walk.end:
         return  # an empty matrix has no parts at all
-    _, start, size = walk.element(frozenset({6}))
-    if size != 8:
-        raise ValueError("a variable's flags have a wrong size")
-    (flags,) = struct.unpack_from(f"{walk.order}I", walk.data, start)
+    flags, _ = walk.element(frozenset({6})).numbers("I")
     kind, is_complex = flags & 0xFF, bool(flags & 0x800)
+    count = 1
     if kind == _OPAQUE:
         for _ in range(3):
-            walk.element(frozenset({1}))
-        _inner(walk, depth + 1)
-        return
-    _, start, size = walk.element(frozenset({5}))
-    shape = struct.unpack_from(f"{walk.order}{size // 4}i", walk.data, start)
-    if size % 4 or not 1 <= len(shape) <= 32 or min(shape) < 0:
-        raise ValueError("a variable has an impossible shape")
-    walk.element(frozenset({1}))
-    count = math.prod(shape)
-    if kind in (_CELL, _STRUCT, _OBJECT, _FUNCTION):
-        if kind == _OBJECT:
-            walk.element(frozenset({1}))
-        _members(walk, kind, count, depth)
-    elif kind == _CHAR:
+            walk.element(_NAME)
+    else:
+        shape = walk.element(_WHOLE).numbers("i")
+        walk.element(_NAME)
+        count = math.prod(shape)
+        if not 1 <= len(shape) <= 32 or min(shape) < 0:
+            raise ValueError("a variable has an impossible shape")
+    if kind == _CHAR:
         walk.element(_TEXTS)
     elif kind == _SPARSE or 6 <= kind <= 15:
         for _ in range((2 if kind == _SPARSE else 0) + 1 + is_complex):
             walk.element(_NUMBERS)
+    elif kind in (_CELL, _STRUCT, _OBJECT, _FUNCTION, _OPAQUE):
+        if kind == _OBJECT:
+            walk.element(_NAME)
+        if kind in (_STRUCT, _OBJECT):
+            (length,) = walk.element(_WHOLE).numbers("i")
+            names = walk.element(_NAME)
+            count *= (names.end - names.at) // max(length, 1)
+        count = 1 if kind == _FUNCTION else count
+        if 8 * count > walk.end - walk.at or (kind in (_STRUCT, _OBJECT) and length <= 0):
+            raise ValueError(f"claims {count} members, more than there is room for")
+        for _ in range(count):
+            _walk_matrix(walk.element(_MATRIX), depth + 1)
     else:
         raise ValueError(f"a variable is of the unknown class {kind}")
-
-
-def _members(walk: _Bytes, kind: int, count: int, depth: int) -> None:
-    """Walk what a cell array, structure or function holds: as many variables as it claims."""
-    if kind in (_STRUCT, _OBJECT):
-        _, start, size = walk.element(frozenset({5}))
-        (length,) = struct.unpack_from(f"{walk.order}i", walk.data, start) if size == 4 else (0,)
-        _, _, size = walk.element(frozenset({1}))
-        if length <= 0 or size % length:
-            raise ValueError("a structure's field names have an impossible length")
-        count *= size // length
-    if kind == _FUNCTION:
-        count = 1
-    if 8 * count > walk.end - walk.at:
-        raise ValueError(f"claims {count} members, more than there is room for")
-    for _ in range(count):
-        _inner(walk, depth + 1)
-
-
-def _inner(walk: _Bytes, depth: int) -> None:
-    _, start, size = walk.element(frozenset({_MATRIX}))
-    _matrix(_Bytes(walk.data, walk.order, start, start + size), depth)

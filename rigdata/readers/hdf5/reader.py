@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.device import Grid
+from rigdata.device import Grid, timed_grid
 from rigdata.problem import Problem, RigDataError, refuse
-from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, SAMPLE, Layout, RunReader, rate_of_time
+from rigdata.readers.base import MAX_REQUEST, MAX_SAMPLES, MOST_RATE, SAMPLE, Layout, RunReader
 from rigdata.readers.hdf5.guards import (
     TEXT,
     UNIT,
@@ -144,40 +145,34 @@ class Hdf5Reader(RunReader):
         return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def _dataset(self, group: Any, name: str) -> Any:
-        if name in self.opened_members:
-            return self.opened_members[name]
-        dataset = self._checked_dataset(group, name)
-        if _GROUP in self.opened_members:
-            self.opened_members[name] = dataset
-        return dataset
-
-    def _checked_dataset(self, group: Any, name: str) -> Any:
+        """A dataset that can be read without leaving the file, foreign code or vast memory."""
         import h5py
 
-        place = f"dataset {name}"
+        if name in self.opened_members:
+            return self.opened_members[name]
         dataset = resolve(group, name, self.file, self.run)
         if dataset is None:
             names = ", ".join(str(member)[:40] for member in itertools.islice(group, 20))
-            remedy = f"It holds: {names or 'nothing'}"
-            raise self.refuse(place, "channel is missing in the file", remedy)
+            raise self.refuse(f"dataset {name}", "channel is missing in the file", f"It holds: {names or 'nothing'}")
+        fault = ""
         if not isinstance(dataset, h5py.Dataset):
-            raise self.refuse(place, "is not a dataset", "Store one 1-D dataset per channel")
-        if dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
+            fault = "is not a dataset"
+        elif dataset.dtype.kind not in "fiu" or dataset.ndim != 1:
             fault = f"has type {dataset.dtype} and shape {dataset.shape}, not 1-D numbers"
-            raise self.refuse(place, fault, "Store one 1-D dataset of numbers per channel")
-        if dataset.shape[0] > MAX_SAMPLES:
-            raise self.refuse(place, f"claims {dataset.shape[0]} samples", "Split the run")
-        self._check_storage(dataset, place)
+        elif dataset.shape[0] > MAX_SAMPLES:
+            fault = f"claims {dataset.shape[0]} samples"
+        elif dataset.is_virtual or dataset.external:
+            fault = "holds its data in another file"
+        elif foreign := foreign_filters(dataset):
+            fault = f"needs HDF5 filter {foreign[0]}, which is not a built-in one"
+        elif chunk_bytes(dataset) > _MAX_CHUNK:
+            fault = f"has chunks of {dataset.chunks[0]} samples"
+        if fault:
+            remedy = "Store one 1-D dataset of numbers per channel in this file, packed by gzip at most"
+            raise self.refuse(f"dataset {name}", fault, remedy)
+        if _GROUP in self.opened_members:
+            self.opened_members[name] = dataset
         return dataset
-
-    def _check_storage(self, dataset: Any, place: str) -> None:
-        """Reject data that is outside the file, or needs foreign code or vast memory to unpack."""
-        if dataset.is_virtual or dataset.external:
-            raise self.refuse(place, "holds its data in another file", "Copy the data into this file")
-        for code in foreign_filters(dataset):
-            raise self.refuse(place, f"needs HDF5 filter {code}, which is not a built-in one", "Use gzip")
-        if chunk_bytes(dataset) > _MAX_CHUNK:
-            raise self.refuse(place, f"has chunks of {dataset.chunks[0]} samples", "Use chunks below 100 MB")
 
     def _layout(self) -> _Members:
         """What is sampled together; it is looked for once where the file is kept open."""
@@ -188,7 +183,7 @@ class Hdf5Reader(RunReader):
         signature = (state.st_size, state.st_mtime_ns)
         if signature not in self.cached_layout:
             with self._group() as group:
-                layout = self._arranged(group, self._checked_rate(group.attrs))
+                layout = self._arranged(group)
             self.cached_layout.clear()
             self.cached_layout[signature] = layout
         return self.cached_layout[signature]
@@ -202,39 +197,29 @@ class Hdf5Reader(RunReader):
                 lengths[name] = int(self._dataset(group, name).shape[0])
             except RigDataError as error:  # raised again when that channel is asked for
                 problems.extend(error.problems)
-        if not lengths and problems:
-            raise RigDataError(problems[:_LISTED])
         if not lengths:
             fault = "the group holds no dataset of numbers"
-            raise self.refuse("", fault, "Store one dataset per channel")
+            empty = self.problem("error", "", fault, "Store one dataset per channel")
+            raise RigDataError(problems[:_LISTED] or empty)
         return lengths
 
-    def _arranged(self, group: Any, attribute: float | None) -> _Members:
+    def _arranged(self, group: Any) -> _Members:
         """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
         members = tuple(itertools.islice(group, _MAX_MEMBERS))
-        lengths = self._lengths(group, members)
+        lengths, stated = self._lengths(group, members), self._checked_rate(group.attrs)
         names = [name for name in self.channels if name in lengths]
         clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
-        rates: dict[str, float] = {}
-        begins: dict[str, float] = {}
-        run_rate = attribute or self.stated_rate
+        run_rate = stated or self.stated_rate
+        timed: dict[str, Grid] = {}
         for clock in [names[i] for i in clocks]:
             time = self._seconds(group, clock, 0, min(lengths[clock], _LOOK))
-            rate = rate_of_time(time)
-            begins[clock] = float(time[0]) if len(time) else 0.0
-            rates[clock] = rate if rate > 0 else run_rate or rate
-            if attribute is not None and not self.channels[clock].clock:
-                rates[clock] = attribute
-        timings = {name: Grid(length) for name, length in lengths.items() if name not in rates}
+            grid = timed_grid(lengths[clock], clock, time, clock, run_rate)
+            timed[clock] = grid if stated is None or self.channels[clock].clock else replace(grid, rate=stated)
+        timings = {name: Grid(length) for name, length in lengths.items() if name not in timed}
         for name, i in zip(names, serving(names, clocks, self.channels), strict=True):
-            same = [names[c] for c in clocks if lengths[names[c]] == lengths[name]]
-            if i is None or name in rates:
-                continue
-            if same:
-                clock = names[i] if names[i] in same else same[0]
-                timings[name] = Grid(lengths[name], clock, rates[clock], clock, begins[clock])
-            else:
-                timings[name] = Grid(lengths[name], times=lengths[names[i]])
+            if i is not None and name in timings:
+                same = [clock for clock in (names[i], *timed) if lengths[clock] == lengths[name]]
+                timings[name] = timed[same[0]] if same else Grid(lengths[name], times=lengths[names[i]])
         remedy = "State its sample_rate or a time dataset of its clock, or store channels of one length"
         layout = self._planned(timings, run_rate, "dataset", remedy)
         unserved = Grid(max(lengths.values()), "", run_rate or float("nan"))
@@ -247,15 +232,12 @@ class Hdf5Reader(RunReader):
     def _checked_rate(self, attributes: Any) -> float | None:
         if _RATE not in attributes:
             return None
-        place, remedy = f"attribute {_RATE}", "Store one positive number, in Hz"
-        if not is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
-            raise self.refuse(place, "is not a number", remedy)
-        try:
-            rate = float(np.asarray(attributes[_RATE]).reshape(()))
-        except (ValueError, TypeError) as error:
-            raise self.refuse(place, "is not a number", remedy) from error
+        rate = math.nan
+        if is_plain(attributes.get_id(_RATE), _MOST_NUMBER):
+            with suppress(ValueError, TypeError):
+                rate = float(np.asarray(attributes[_RATE]).reshape(()))
         if not 0.0 < rate < MOST_RATE:
-            raise self.refuse(place, f"is {rate}", remedy)
+            raise self.refuse(f"attribute {_RATE}", "is no rate", "Store one positive number, in Hz")
         return rate
 
     def _clock_times(self, clock: str, start: int, stop: int) -> FloatArray:
@@ -305,14 +287,14 @@ class Hdf5Reader(RunReader):
                 with suppress(RigDataError):  # raised when that channel is asked for
                     attributes = self._dataset(group, name).attrs
                     stated = [key for key in UNIT if key in attributes and is_text(attributes.get_id(key), self.path)]
-                    units[name] = _text(attributes[stated[0]]) if stated else ""
+                    units[name] = str(_text(attributes[stated[0]]) or "") if stated else ""
         return units
 
 
-def _text(value: Any) -> str:
-    """A short attribute as text, "" where it is none."""
-    plain = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-    return plain if isinstance(plain, str) else ""
+def _text(value: Any) -> object:
+    """An attribute as text where it is one; as it is where it is none."""
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 
 
 def _hash_dataset(digest: Any, file: BinaryIO, name: str, dataset: Any) -> None:
@@ -354,18 +336,10 @@ def read_texts(path: Path, file: str) -> tuple[str, str]:
 
 
 def _text_attribute(handle: Any, name: str, file: str) -> str:
-    place, remedy = f"root attribute {name}", "Store it as one UTF-8 string"
-    no_text = refuse(file, place, "is not a text, or far too long", remedy)
-    stored = handle.attrs.get_id(name)
-    if stored.get_storage_size() > _MAX_TEXT or stored.get_type().get_class() != TEXT:
-        raise no_text
-    value = handle.attrs[name]
-    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
-    if isinstance(value, bytes):
-        try:
-            value = value.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise refuse(file, place, "is not UTF-8 text", remedy) from error
-    if not isinstance(value, str) or len(value) > _MAX_TEXT:
-        raise no_text
+    stored, value = handle.attrs.get_id(name), None
+    if stored.get_storage_size() <= _MAX_TEXT and stored.get_type().get_class() == TEXT:
+        value = _text(handle.attrs[name])
+    if not isinstance(value, str) or len(value) > _MAX_TEXT or "\ufffd" in value:  # what is no UTF-8
+        fault = "is not a text, or far too long"
+        raise refuse(file, f"root attribute {name}", fault, "Store it as one UTF-8 string")
     return value
