@@ -75,7 +75,7 @@ def rate_of_time(time: FloatArray) -> float:
 
 
 def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: float | None) -> Grid:
-    """The grid of a time column (n,) [s], of which the first samples are enough; a stated rate where times do not tell it."""
+    """The grid of a time column, by its first times (n,) [s]; of a stated rate where these tell none."""
     rate = rate_of_time(time)
     return Grid(length, clock, rate if rate > 0 else stated or rate, label, float(time[0]) if len(time) else 0.0)
 

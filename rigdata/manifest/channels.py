@@ -11,7 +11,6 @@ from typing import Any
 
 from rigdata.calibration import (
     DIMENSIONS,
-    UNCALIBRATED,
     VECTOR_QUANTITIES,
     Channel,
     ChannelResponse,
@@ -20,16 +19,15 @@ from rigdata.calibration import (
     reading_gain,
     reading_zero,
 )
-from rigdata.manifest.fields import CHANNEL, RUNS_OF, Findings, Table, nearest
+from rigdata.manifest.fields import CHANNEL, RUNS_OF, SCHEMA, Findings, Table, nearest
 from rigdata.problem import RigDataError, shown
 from rigdata.units import UnitError, is_signal
 
 _FIELD = {field.key: field for field in CHANNEL}
 #: Entries that say where a sensor sits: a channel that is `like` another has its own.
 _PLACE = ("axis", "pad", "position", "plane", "for")
+_SENSITIVITY = ("sensitivity", "full_scale", "excitation")
 _MAX_CHANNELS = 4096
-
-
 #: Parts of a name that lead elsewhere in an HDF5 file; "Date/Time" is a name.
 _PATH_STEPS = {"", ".", ".."}
 #: Keys of a channel that cannot change from run to run.
@@ -87,90 +85,60 @@ def read_channel(name: str, table: Table) -> Channel | None:
     if quantity is None or quantity == "ignore":
         table.only(CHANNEL, heading)
         return Channel(name, "ignore") if quantity else None
-    plain = quantity in UNCALIBRATED
     directed = quantity in VECTOR_QUANTITIES or quantity == "command"
-    needed = (["axis"] if directed else []) + ([] if plain else ["unit"])
-    values = table.read(CHANNEL, heading, needed)
-    if isinstance(values["polarity"], bool) or values["polarity"] not in (1, -1):
-        table.error("polarity", f"polarity is {shown(values['polarity'])}", "Give 1 or -1, without quotes")
-        return None
-    values["polarity"] = int(values["polarity"])
-    if plain:
-        values["unit"] = values["unit"] or ""
-        gain: float | None = 1.0
-        values["zero"] = 0.0
-    else:
-        gain, values["zero"] = _calibration(table, quantity, values["unit"])
-    values["zero_uncertainty"] = _zero_uncertainty(table, quantity)
+    errors = table.findings.errors
+    values = table.read(CHANNEL, heading, ["axis"] * directed + ["unit"] * (quantity in DIMENSIONS))
+    values |= {"unit": values["unit"] or "", "gain": 1.0, "zero": 0.0}
+    if quantity in DIMENSIONS:
+        values |= _calibration(table, quantity, values["unit"])
+    elif values["zero_uncertainty"]:
+        table.error("zero_uncertainty", f"a {quantity} channel has no zero", "Delete zero_uncertainty")
     response = _response(table, values)
-    if gain is None or values["zero"] is None:
+    if table.findings.errors > errors:
         return None
     entries = {key: value for key, value in values.items() if key in Channel.__dataclass_fields__}
-    return Channel(name, gain=gain, response=response, **entries)
-
-
-def _zero_uncertainty(table: Table, quantity: str) -> float:
-    field = _FIELD["zero_uncertainty"]
-    if quantity in DIMENSIONS:
-        return float(table.value(replace(field, kind=DIMENSIONS[quantity])))
-    if field.key in table.data:
-        table.error(field.key, f"a {quantity} channel has no zero", "Delete zero_uncertainty")
-    return 0.0
+    return Channel(name, response=response, **entries)
 
 
 def _response(table: Table, values: dict[str, Any]) -> ChannelResponse:
     """Filter and delay; what is wrong is noted and left out."""
-    findings = table.findings
-    responses: list[Any] = []
-    try:
-        if values["filter"] is not None:
+    findings, responses = table.findings, list[Any]()
+    if values["filter"] is not None:
+        with table.noted("filter", "Or give filter_table, a measured response"):
             responses.append(parse_filter(values["filter"]))
-    except UnitError as error:
-        table.error("filter", f"filter: {error}", "Or give filter_table, a measured response")
     file = values["filter_table"]
     if file is not None and findings.files is None:
         table.error("filter_table", "a table cannot be read here", "Give filter, or a campaign in a folder")
     elif file is not None and findings.files is not None:
         try:
-            responses.append(parse_response_table(findings.files(file, ".".join(str(p) for p in table.path))))
-        except UnitError as error:
-            table.error("filter_table", f"{shown(file)}: {error}", "Give lines of frequency_Hz, gain, phase_deg")
+            with table.noted("filter_table", f"Give lines of frequency_Hz, gain, phase_deg in {shown(file)}"):
+                responses.append(parse_response_table(findings.files(file, ".".join(map(str, table.path)))))
         except RigDataError as error:
             for problem in error.problems:
                 findings.append(problem)
     return ChannelResponse(tuple(responses), values["delay"])
 
 
-def _calibration(table: Table, quantity: str, unit: str | None) -> tuple[float | None, float | None]:
-    gain = zero = None
-    if unit is None:
-        return None, None
-    data = table.data
-    try:
-        gain = reading_gain(quantity, unit, data.get("sensitivity"), data.get("full_scale"), data.get("excitation"))
-    except UnitError as error:
-        key = "unit" if "sensitivity" not in data else "sensitivity"
-        table.error(key, f"{quantity} channel: {error}", "See the channel tables of the tpjb-rig/1 format")
-    else:
-        if not 0.0 < gain < 1e30:
-            table.error("sensitivity", f"one {unit} would be {gain:g} SI", "Check the calibration")
-        _note_unused(table, unit)
-    try:
-        zero = reading_zero(quantity, unit, data.get("zero"))
-    except UnitError as error:
-        table.error("zero", f"zero: {error}", f"Give the {quantity} at reading zero")
-    return gain, zero
-
-
-def _note_unused(table: Table, unit: str) -> None:
-    """Say which parts of a calibration are not used, so that none is believed to act."""
-    if is_signal(unit):
-        return
-    for key in ("sensitivity", "full_scale", "excitation"):
-        if key in table.data:
-            text = f"{key} is not used: readings in {unit} are already converted"
-            remedy = f"Delete {key}, or set unit to what the logger recorded"
-            table.findings.error((*table.path, key), text, remedy, severity="warning")
+def _calibration(table: Table, quantity: str, unit: str) -> dict[str, float]:
+    """Gain and zero of a channel with a unit, and the uncertainty of the zero; what is wrong is noted."""
+    data, values = table.data, dict[str, float]()
+    field = replace(_FIELD["zero_uncertainty"], kind=DIMENSIONS[quantity])
+    values["zero_uncertainty"] = float(table.value(field))
+    if not unit:
+        return values
+    stated = [data.get(key) for key in _SENSITIVITY]
+    with table.noted("sensitivity" if "sensitivity" in data else "unit", f"See the channel tables of {SCHEMA}"):
+        values["gain"] = reading_gain(quantity, unit, *stated)
+        if not 0.0 < values["gain"] < 1e30:
+            raise UnitError(f"one {unit} would be {values['gain']:g} SI")
+        for key in data if not is_signal(unit) else ():
+            if key in _SENSITIVITY:  # said, so that none is believed to act
+                text = f"{key} is not used: readings in {unit} are already converted"
+                remedy = f"Delete {key}, or set unit to what the logger recorded"
+                table.findings.error((*table.path, key), text, remedy, severity="warning")
+    with table.noted("zero", f"Give the {quantity} at reading zero"):
+        values["zero"] = reading_zero(quantity, unit, data.get("zero"))
+    return values
 
 
 def channels_by_run(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +27,7 @@ Path = tuple[str | int, ...]
 TextFile = Callable[[str, str], str]
 #: Frequencies of the mains in any country [Hz].
 MAINS_FREQUENCIES = (50.0, 60.0)
+SCHEMA = "tpjb-rig/1"
 _QUANTITIES = (*DIMENSIONS, *UNCALIBRATED, "ignore")
 KINDS = ("dynamic", "dry_pivot", "locus", "clearance", "baseline")
 #: How a dynamic run is excited.
@@ -33,7 +35,7 @@ _EXCITATIONS = ("sine", "multisine", "sweep", "random", "impact")
 _BRANCHES = ("up", "down", "cycle")
 
 #: Kinds that are not read key by key: what they mean hangs on the quantity, or they hold more than one value.
-_RAW = ("table", "tables", "sign", "calibration")
+_RAW = ("table", "tables", "calibration")
 #: Begins a value of `tpjb init` that only the person at the rig knows.
 MARK = "??"
 
@@ -43,36 +45,62 @@ class Field:
     """One key of a table: what it holds, what it means, and its default."""
 
     key: str
-    #: A dimension of `rigdata.units`, "text", "choice", "whole" (number), "list" (of texts), or one of `_RAW`.
+    #: A dimension of `rigdata.units`, "text", "choice", "whole" (number), "sign", "list" (of texts), or one of `_RAW`.
     kind: str
     meaning: str
     example: str
     default: Any = None
     required: bool = False
-    choices: tuple[str, ...] = ()
-    low: float | None = None  #: bounds in SI: from, to; `above` and `below` exclude their ends
-    high: float | None = None
-    above: float | None = None
-    below: float | None = None
-    remedy: str = ""  #: what to do about a value out of bounds, where the bounds alone do not say it
+    choices: tuple[Any, ...] = ()
+    low: float = -math.inf  #: bounds in SI: from, to; `above` and `below` exclude their ends
+    high: float = math.inf
+    above: float = -math.inf
+    below: float = math.inf
+    remedy: str = ""  #: what to do about a wrong value, where kind and bounds alone do not say it
 
     def holds(self, value: float) -> bool:
         """Whether a number is within the bounds."""
-        return (
-            (self.low is None or value >= self.low)
-            and (self.high is None or value <= self.high)
-            and (self.above is None or value > self.above)
-            and (self.below is None or value < self.below)
-        )
+        return self.low <= value <= self.high and self.above < value < self.below
 
-    def advice(self) -> str:
-        """What to do about a value out of bounds."""
-        bound = f"not below {self.low:g}" if self.low is not None else f"above {self.above:g}"
-        return self.remedy or f"It must be {bound}"
+    def read(self, value: Any) -> Any:
+        """The value in SI; UnitError where it is none."""
+        stated = shown(value)
+        if self.kind in _RAW:
+            return value
+        if self.kind in ("text", "choice"):
+            is_good = isinstance(value, str) and len(value) <= _MAX_TEXT and "\0" not in value
+            fault = "is not text that can be used: too long, a NUL in it, or without quotes"
+        elif self.kind == "list":
+            is_good = isinstance(value, list) and bool(value)
+            is_good = is_good and all(isinstance(text, str) and text.strip() for text in value)
+            fault = "is no list of texts"
+        else:
+            number = value
+            if self.kind not in ("whole", "sign"):
+                number = parse_quantity(value, self.kind)
+            is_good = isinstance(number, int | float) and not isinstance(number, bool) and self.holds(number)
+            if self.kind in ("whole", "sign"):
+                is_good = is_good and isinstance(value, int)
+            fault, value = "cannot be", number
+        if not is_good:
+            raise UnitError(f"{stated} {fault}")
+        if self.choices and value not in self.choices:
+            raise UnitError(f"{stated} is unknown")
+        return value
+
+    def advice(self, value: object) -> str:
+        """What to do about a wrong value."""
+        if self.remedy or self.kind == "choice":
+            return self.remedy or nearest(str(value), self.choices)
+        if self.kind == "whole":
+            return f"Give a whole number from {self.low:g} on, without quotes"
+        bound = f", not below {self.low:g}" if self.low > -math.inf else ""
+        bound = f", above {self.above:g}" if self.above > -math.inf else bound
+        return f"Write it like {self.key} = {self.example}{bound}"
 
 
 TOP = (
-    Field("schema", "text", "name of the format", '"tpjb-rig/1"', required=True),
+    Field("schema", "choice", "name of the format", '"tpjb-rig/1"', required=True, choices=(SCHEMA,)),
     Field("id", "text", "name of the campaign", '"rocker-A"', required=True),
     Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', required=True),
     Field("description", "text", "free text", '"after overhaul"', default=""),
@@ -99,7 +127,14 @@ HOUSING = (
 )
 ACQUISITION = (
     Field("sample_rate", "frequency", "where the records hold no times", '"2 kHz"', above=0.0),
-    Field("mains", "frequency", "50 or 60 Hz; else found in the records", '"60 Hz"', low=0.0),
+    Field(
+        "mains",
+        "frequency",
+        "50 or 60 Hz; else found in the records",
+        '"60 Hz"',
+        choices=MAINS_FREQUENCIES,
+        remedy='Give "50 Hz" or "60 Hz"',
+    ),
 )
 CSV = (
     Field("delimiter", "text", 'one character, or "tab"', '";"'),
@@ -117,7 +152,10 @@ CHANNEL = (
     Field("sensitivity", "calibration", "reading per quantity; of a bridge: mV/V at full scale", '"7.78 mV/um"'),
     Field("full_scale", "calibration", "of a bridge", '"20 kN"'),
     Field("excitation", "calibration", "supply of a bridge", '"5 V"'),
-    Field("polarity", "sign", "-1: the reading falls as the quantity grows (eddy-current probes)", "-1", default=1),
+    Field(
+        "polarity", "sign", "-1: the reading falls as the quantity grows (eddy-current probes)", "-1",
+        default=1, choices=(1, -1), remedy="Give 1 or -1, without quotes",
+    ),
     Field("zero", "calibration", "value at reading zero", '"0 degC"'),
     Field("pad", "whole", "number of the pad with the sensor", "1", low=1, high=100),
     Field(
@@ -266,65 +304,22 @@ class Table:
     def value(self, field: Field, needed: bool = False) -> Any:
         """The value of one field, SI."""
         key, value = field.key, self.data.get(field.key)
-        if value is None:
-            if needed or field.required:
-                is_text = field.kind in ("text", "choice")
-                remedy = f'Add {key} = "..."' if is_text else f"Add {key}, a {field.kind} with its unit"
-                self.error(key, f"{key} is missing", remedy)
+        is_needed = needed or field.required
+        if value is None or (is_needed and value == ""):
+            if is_needed:
+                self.error(key, f"{key} is missing", f"Add {key}, such as {key} = {field.example}")
             return field.default
-        if field.kind in _RAW:
-            return value
-        if field.kind == "whole":
-            checked: Any = self._whole_number(field, value)
-        elif field.kind == "list":
-            checked = self._texts(field, value)
-        elif field.kind in ("text", "choice"):
-            checked = self._text(field, value, needed)
-        else:
-            checked = self._quantity(field, value)
-        return field.default if checked is None else checked
+        with self.noted(key, field.advice(value)):
+            return field.read(value)
+        return field.default
 
-    def _text(self, field: Field, value: object, needed: bool) -> str | None:
-        """A string, not longer than is sane; a choice is one of those known."""
-        key = field.key
-        if not isinstance(value, str):
-            self.error(key, f"{key} is {shown(value)}, not text", "Put it in quotes")
-        elif len(value) > _MAX_TEXT or "\0" in value:
-            self.error(key, f"{key} is too long or holds a NUL character", "Shorten it")
-        elif (needed or field.required) and not value.strip():
-            self.error(key, f"{key} is empty", "Give a value")
-        elif field.choices and value not in field.choices:
-            self.error(key, f"{key} {shown(value)} is unknown", nearest(value, field.choices))
-        else:
-            return value
-        return None
-
-    def _texts(self, field: Field, value: object) -> list[str] | None:
-        if isinstance(value, list) and value and all(isinstance(text, str) and text.strip() for text in value):
-            return value
-        self.error(
-            field.key, f"{field.key} is {shown(value)}, no list of texts", f"Write {field.key} = {field.example}"
-        )
-        return None
-
-    def _whole_number(self, field: Field, value: object) -> int | None:
-        if isinstance(value, bool) or not isinstance(value, int) or not field.holds(value):
-            advice = f"Give a whole number from {field.low:g} on, without quotes"
-            self.error(field.key, f"{field.key} is {shown(value)}", advice)
-            return None
-        return value
-
-    def _quantity(self, field: Field, value: object) -> float | None:
-        key = field.key
+    @contextmanager
+    def noted(self, key: str, remedy: str) -> Iterator[None]:
+        """Note a UnitError of the block as an error of `key`."""
         try:
-            number = parse_quantity(value, field.kind)
+            yield
         except UnitError as error:
-            self.error(key, f"{key}: {error}", f"Give a {field.kind} as number and unit in quotes")
-            return None
-        if not field.holds(number):
-            self.error(key, f"{key} is {shown(value)}", field.advice())
-            return None
-        return number
+            self.error(key, f"{key}: {error}", remedy)
 
 
 def key_lines(text: str) -> dict[Path, int]:

@@ -25,6 +25,7 @@ from rigdata.virtual_rig.truth import RigTruth, VirtualRigError, point_facts
 Progress = Callable[[int, int, str], None]
 #: Names and readings of a file's columns.
 _Columns = list[tuple[str, FloatArray]]
+_Records = Iterator[SimulatedRun]
 _UNQUANTISED_BITS = 36  # without a converter, digits are written as if it had this many bits
 _PIVOT_LOADS = np.arange(250.0, 8001.0, 250.0)
 
@@ -74,9 +75,7 @@ def write_campaign(
     return truth
 
 
-def _written_records(
-    rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None
-) -> Iterator[SimulatedRun]:
+def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progress: Progress | None) -> _Records:
     """Simulate every record and note its facts; those whose file is there."""
     records = [run.id for run in rig.runs() if run.record == run.id]
     for done, run in enumerate(records, 1):
@@ -119,7 +118,7 @@ def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
     return [(name, values[:0]) for name, values in columns] if is_empty else columns
 
 
-def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: Iterator[SimulatedRun], layout: Layout) -> None:
+def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, layout: Layout) -> None:
     """Write all records to a new file; runs that share a record share its group.
 
     No time stamps are stored: the same rig gives the same bytes.
@@ -149,7 +148,7 @@ def _write_dataset(group: Any, name: str, values: FloatArray) -> None:
     group.create_dataset(name, data=values, track_times=False, **packing)
 
 
-def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: Iterator[SimulatedRun], layout: CsvLayout) -> None:
+def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: _Records, layout: CsvLayout) -> None:
     """Write manifest, bearing and all records into a new folder."""
     (folder / "runs").mkdir(parents=True)
     (folder / "campaign.toml").write_bytes(manifest.encode())
@@ -176,8 +175,7 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
     table = np.stack([values for _, values in columns], axis=1)
     tail = layout.delimiter if layout.trailing_delimiter else ""
     head = [line.format(rate=f"{rate:g}", count=len(table)) for line in layout.preamble]
-    for cells in [names, units] if layout.units_line else [names]:
-        head.append(layout.delimiter.join(cells) + tail)
+    head += [layout.delimiter.join(cells) + tail for cells in [names, units][: 1 + layout.units_line]]
     body = _rows(table, forms, layout, tail)
     if "truncated_line" in rig.fault_kinds(record.run.id) and body:
         body[-1] = body[-1][: len(body[-1]) * 3 // 5]

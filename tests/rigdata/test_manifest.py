@@ -150,7 +150,7 @@ def test_the_example_of_the_format():
         ('id = "p-1-up"', "id = 7", ["not text"]),
         ("header_line = 7", "header_line = 0", ["whole number from 1"]),
         ("units_line = 8", "units_line = 6", ["not below header_line"]),
-        ('decimal = ","', 'decimal = ";"', ["decimal ';' is unknown"]),
+        ('decimal = ","', 'decimal = ";"', ["decimal: ';' is unknown"]),
         ('encoding = "cp1252"', 'encoding = "klingon"', ["encoding", "cp1252"]),
         ('encoding = "cp1252"', 'encoding = "zip"', ["encoding"]),
         ('branch = "up"', 'branch = "upp"', ["Did you mean 'up'"]),
@@ -178,7 +178,7 @@ def test_every_problem_at_once():
         .replace('sample_rate = "500 Hz"', 'sample_rate = "500"')
     )
     found = "\n".join(problems_of(text))
-    for part in ("'mas'", "mass is missing", "polarity is 3", "dynamik", "has no unit"):
+    for part in ("'mas'", "mass is missing", "polarity: 3 is unknown", "dynamik", "has no unit"):
         if part != "mass is missing":  # not needed while no run is known to be dynamic
             assert part in found
     assert len(problems_of(text)) >= 4
