@@ -5,7 +5,9 @@ A phasor that was recorded through a filter and late by a delay is divided by `C
 
 from __future__ import annotations
 
+import io
 import math
+import re
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
@@ -27,10 +29,12 @@ from rigdata.units import (
     unit_factor,
 )
 
-_FAMILIES = ("bessel", "butterworth")
-_SIDES = ("low", "high")
+_FILTER = re.compile(r"(bessel|butterworth)\s+([0-9]{1,2})\s+(low|high)\s+(.+)", re.IGNORECASE)
 _MAX_ORDER = 12
-_SAY = 'Write for instance "bessel 4 low 800 Hz": bessel or butterworth, order, low or high, corner frequency'
+_SAY = (
+    'Write for instance "bessel 4 low 800 Hz": bessel or butterworth, '
+    f"order as a whole number from 1 to {_MAX_ORDER}, low or high, corner frequency"
+)
 
 
 @dataclass(frozen=True)
@@ -54,15 +58,13 @@ class AnalogFilter:
 
 def parse_filter(text: str) -> AnalogFilter:
     """Read ``"bessel 4 low 800 Hz"``."""
-    parts = text.split(None, 3)
-    if len(parts) != 4 or parts[0].lower() not in _FAMILIES or parts[2].lower() not in _SIDES:
+    parts = _FILTER.fullmatch(text.strip())
+    if parts is None or not 1 <= int(parts[2]) <= _MAX_ORDER:
         raise UnitError(f"{text[:60]!r} is no filter. {_SAY}")
-    if not (parts[1].isdecimal() and 1 <= int(parts[1]) <= _MAX_ORDER):
-        raise UnitError(f"order {parts[1][:20]!r} is not a whole number from 1 to {_MAX_ORDER}. {_SAY}")
-    corner = parse_quantity(parts[3], "frequency")
+    corner = parse_quantity(parts[4], "frequency")
     if not 0 < corner < 1e12:
-        raise UnitError(f"corner frequency {parts[3][:20]!r} must be above zero. {_SAY}")
-    return AnalogFilter(parts[0].lower(), int(parts[1]), parts[2].lower(), corner)
+        raise UnitError(f"corner frequency {parts[4][:20]!r} must be above zero. {_SAY}")
+    return AnalogFilter(parts[1].lower(), int(parts[2]), parts[3].lower(), corner)
 
 
 @dataclass(frozen=True)
@@ -83,25 +85,19 @@ class ResponseTable:
 
 def parse_response_table(text: str) -> ResponseTable:
     """Read a table of frequency_Hz, gain, phase_deg, one line each, separated by commas or semicolons."""
-    rows: list[tuple[float, float, float]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        cells = [c.strip() for c in line.replace(";", ",").split(",")]
-        if not line.strip() or line.lstrip().startswith("#") or (not rows and cells[0].lower().startswith("freq")):
-            continue
-        try:
-            frequency, gain, phase = (float(c) for c in cells[:3])
-        except ValueError:
-            raise UnitError(f"line {number} does not hold frequency_Hz, gain, phase_deg: {line[:60]!r}") from None
-        if not (math.isfinite(frequency + phase) and 0 < gain < math.inf):
-            raise UnitError(f"line {number}: frequency and phase must be finite, the gain above zero: {line[:60]!r}")
-        if rows and frequency <= rows[-1][0]:
-            raise UnitError(f"line {number}: frequencies must rise, {frequency:g} Hz follows {rows[-1][0]:g} Hz")
-        rows.append((frequency, gain, phase))
-    if len(rows) < 2:
-        raise UnitError("the table holds fewer than two lines of frequency_Hz, gain, phase_deg")
-    columns = np.array(rows).T
-    phase = np.unwrap(np.radians(columns[2]))
-    return ResponseTable(tuple(columns[0].tolist()), tuple(columns[1].tolist()), tuple(phase.tolist()))
+    lines = text.replace(";", ",").splitlines()
+    titled = bool(lines) and lines[0].strip().lower().startswith("freq")
+    try:
+        rows = np.loadtxt(
+            io.StringIO("\n".join(lines)), delimiter=",", skiprows=int(titled), usecols=(0, 1, 2), ndmin=2
+        )
+    except ValueError as error:
+        raise UnitError(f"the table does not hold frequency_Hz, gain, phase_deg in every line: {error}") from error
+    frequency, gain, phase = rows.T
+    if len(rows) < 2 or not np.isfinite(rows).all() or gain.min() <= 0 or np.diff(frequency).min() <= 0:
+        raise UnitError("the table needs two lines and more, all finite, gains above zero, and frequencies that rise")
+    turned = np.unwrap(np.radians(phase))
+    return ResponseTable(tuple(frequency.tolist()), tuple(gain.tolist()), tuple(turned.tolist()))
 
 
 @dataclass(frozen=True)
@@ -256,32 +252,25 @@ class Channel:
 def reading_gain(
     quantity: str, unit: str, sensitivity: object, full_scale: object = None, excitation: object = None
 ) -> float:
-    """SI value per unit of reading."""
+    """SI value per unit of reading; of a bridge, full scale over sensitivity and supply."""
     dimension = DIMENSIONS[quantity]
     if not is_signal(unit):
         return unit_factor(unit, dimension)
     if sensitivity is None:
         raise UnitError(f"a reading in {unit} needs a sensitivity")
-    if isinstance(sensitivity, str) and is_bridge_ratio(split_quantity(sensitivity, "ratio")[1]):
-        return _bridge_gain(dimension, unit, sensitivity, full_scale, excitation)
-    return sensitivity_gain(sensitivity, unit, dimension)
-
-
-def _bridge_gain(dimension: str, unit: str, sensitivity: str, full_scale: object, excitation: object) -> float:
-    ratio = parse_quantity(sensitivity, "ratio")
+    if not (isinstance(sensitivity, str) and is_bridge_ratio(split_quantity(sensitivity, "ratio")[1])):
+        return sensitivity_gain(sensitivity, unit, dimension)
+    ratio, supply, dividend = parse_quantity(sensitivity, "ratio"), 1.0, parse_unit(unit).factor
     if full_scale is None:
         raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs full_scale")
     scale = parse_quantity(full_scale, dimension)
-    if ratio <= 0 or scale <= 0:
-        raise UnitError("sensitivity and full_scale must be above zero; a falling reading is polarity = -1")
-    if is_bridge_ratio(unit):
-        return parse_unit(unit).factor / ratio * scale
-    if excitation is None:
-        raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs excitation, the bridge supply")
-    supply = parse_quantity(excitation, "voltage")
-    if supply <= 0:
-        raise UnitError(f"excitation {excitation!r} must be above zero")
-    return unit_factor(unit, "voltage") / (ratio * supply) * scale
+    if not is_bridge_ratio(unit):
+        if excitation is None:
+            raise UnitError(f"a sensitivity in V/V ({sensitivity!r}) needs excitation, the bridge supply")
+        supply, dividend = parse_quantity(excitation, "voltage"), unit_factor(unit, "voltage")
+    if min(ratio, scale, supply) <= 0:
+        raise UnitError("sensitivity, full_scale and excitation must be above zero; a falling reading is polarity = -1")
+    return dividend / (ratio * supply) * scale
 
 
 def reading_zero(quantity: str, unit: str, zero: object) -> float:

@@ -138,16 +138,13 @@ class Campaign(Description):
 
 
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while block := stream.read(2**20):
-                digest.update(block)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except (FileNotFoundError, IsADirectoryError):
         return "missing"
     except OSError as error:
         raise refuse(path.name, "", f"cannot be read ({error.strerror})", "Check the rights of the file") from error
-    return digest.hexdigest()
 
 
 def load_campaign(path: str | Path) -> Campaign:

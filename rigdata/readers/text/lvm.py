@@ -31,7 +31,7 @@ def read_lvm(path: Path) -> list[Series]:
 
 
 class _LvmFile(io.TextIOBase):
-    """A file, of which `read` gives pandas the rows of one table: as text it takes much more memory than its numbers."""
+    """A file, of which `read` gives pandas the rows of one table: as text these take much more memory."""
 
     def __init__(self, path: Path) -> None:
         """Read the file's own header, which tells separator and decimal mark."""
