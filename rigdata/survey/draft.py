@@ -5,19 +5,20 @@ Carried on, open places and guesses are filled in; what was typed stays.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
 from rigdata.manifest.manifest import parse_manifest
 from rigdata.problem import RigDataError, refuse
-from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, quantity_of_unit, usable_unit
+from rigdata.survey.channels import OPEN, PAD, Entry, quantity_of_unit, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.runs import RunGuess
 from rigdata.survey.survey import Survey, survey
@@ -49,72 +50,71 @@ _OWN = re.compile(r"#\s*\((?:guess|records)\)")
 #: Entries that a sensor has of the one that it is like.
 _OF_MODEL = {"unit", "sensitivity", "full_scale", "excitation", "polarity", "zero"}
 
+#: Lines of tables by the key of their block.
+_Tables = dict[tuple[str, str], list[str]]
+
 
 def draft_manifest(surveyed: Survey, name: str, bearing: str | None) -> str:
     """Write the text of a draft."""
     lines = [*_HEAD, 'schema = "tpjb-rig/1"', f"id = {_toml_string(name)}"]
     lines.append(f"bearing = {_toml_string(bearing)}" if bearing else f'bearing = "{MARK}"   # file in this folder')
-    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", "", OPEN, HOUSING, "kg"), _MOUNT, ""]
+    lines += [*_TOLD, "", "[shaft]", _TURNS, "", "[housing]", _line("mass", OPEN, HOUSING, "kg"), _MOUNT, ""]
     if not all(rate > 0 for rate in surveyed.rates):
-        lines += ["[acquisition]", _line("sample_rate", "", OPEN, ACQUISITION, "Hz"), ""]
+        lines += ["[acquisition]", _line("sample_rate", OPEN, ACQUISITION, "Hz"), ""]
     if surveyed.nameless:
         names = ", ".join(_toml_string(f"column{i + 1}") for i in range(surveyed.nameless))
         lines += ["[csv]", f"names = [{names}]   # the files have none: write yours here and below, then --update", ""]
     for clock, unit in surveyed.clocks.items():
-        spelt = usable_unit(unit.value) or "s"
-        lines += [f"[channels.{_key(clock)}]", 'quantity = "time"', _line("unit", f'"{spelt}"', unit), ""]
-    for block in [*channel_blocks(surveyed).values(), *(run_lines(run) for run in surveyed.runs)]:
+        spelt = replace(unit, value=usable_unit(unit.value) or "s")
+        lines += [f"[channels.{_key(clock)}]", 'quantity = "time"', _line("unit", spelt), ""]
+    for block in _tables(surveyed).values():
         lines += [*block, ""]
-    return "\n".join(_explained_once(lines)).rstrip() + "\n"
-
-
-def _explained_once(lines: list[str]) -> list[str]:
-    """Lines whose explanations of open places stand at the first of their kind only."""
     explained = set()
-    shortened = []
-    for line in lines:
+    for number, line in enumerate(lines):  # an open place of a kind is explained once
         entry, mark, meaning = line.partition("   # ")
         if MARK in entry and mark:
-            line = entry if meaning in explained else line
+            lines[number] = entry if meaning in explained else line
             explained.add(meaning)
-        shortened.append(line)
-    return shortened
+    return "\n".join(lines).rstrip() + "\n"
 
 
-def channel_blocks(surveyed: Survey) -> dict[str, list[str]]:
-    """Lines of every channel's table; sensors of one kind and unit are described once, the others are `like` it."""
-    first: dict[tuple[str, str], str] = {}
-    blocks = {}
+def _tables(surveyed: Survey) -> _Tables:
+    """Lines of all channels' and runs' tables; of sensors of a kind and unit one is described, the others `like` it."""
+    models: dict[tuple[str, str], str] = {}
+    tables: _Tables = {}
     for name, guess in surveyed.channels.items():
         quantity = guess.quantity.value
         is_raw = quantity in _EXAMPLE and quantity_of_unit(guess.unit) == ""
-        model = first.setdefault((quantity, guess.unit), name) if is_raw else name
-        polarity = surveyed.channels[model].polarity
-        blocks[name] = _channel_lines(name, guess, "" if model == name else model, polarity)
-        if name in surveyed.per_hertz and guess.unit:
-            ratio = f"{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"
-            text = f'sensitivity = "{ratio}"   # (records) constant over the line that is taken for the shaft\'s'
-            blocks[name] = [text if line.startswith("sensitivity") else line for line in blocks[name]]
-    return blocks
+        model = models.setdefault((quantity, guess.unit), name) if is_raw else name
+        tables["channels", name] = _channel_lines(name, surveyed, model)
+    for run in surveyed.runs:
+        tables["runs", run.file] = run_lines(run)
+    return tables
 
 
-def _channel_lines(name: str, guess: ChannelGuess, like: str, polarity: int) -> list[str]:
-    head, quantity = f"[channels.{_key(name)}]", guess.quantity.value
+def _channel_lines(name: str, surveyed: Survey, model: str) -> list[str]:
+    guess = surveyed.channels[name]
+    head, quantity, is_like = f"[channels.{_key(name)}]", guess.quantity.value, model != name
     if not quantity or quantity == "ignore":
         return [head, 'quantity = "ignore"   # (guess) name and unit are not known; or displacement, force, ..']
-    source = Entry(quantity) if like else guess.quantity  # what it is like bears the mark for both
-    lines = [head, _line("quantity", f'"{quantity}"', source)]
+    # what it is like bears the mark for both
+    lines = [head, _line("quantity", Entry(quantity) if is_like else guess.quantity)]
     if quantity in VECTOR_QUANTITIES:
         is_hinted = guess.axis.value is None and math.isfinite(guess.hint)
         axis = Entry(reason=f"its name hints at {guess.hint:g} deg") if is_hinted else guess.axis
-        lines.append(_line("axis", f'"{axis.number:g} deg"', axis, CHANNEL, "deg"))
-    if like:
-        lines.append(f"like = {_toml_string(like)}   # (guess) same type; or its own unit, sensitivity, ..")
+        lines.append(_line("axis", axis, CHANNEL, "deg", "g"))
+    if is_like:
+        lines.append(f"like = {_toml_string(model)}   # (guess) same type; or its own unit, sensitivity, ..")
     else:
         lines.append(f'unit = "{guess.unit or MARK}"')
-        if quantity_of_unit(guess.unit) == "":
-            lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE.get(quantity, "1 V per unit")}')
-    if guess.axis.value is not None and (guess.polarity < 0 or (like and guess.polarity != polarity)):
+    if name in surveyed.per_hertz and guess.unit and not is_like:
+        ratio = f"{surveyed.per_hertz[name]:.4g} {guess.unit}/Hz"
+        reason = "constant over the line that is taken for the shaft's"
+        lines.append(_line("sensitivity", Entry(ratio, "records", reason)))
+    elif not is_like and quantity_of_unit(guess.unit) == "":
+        lines.append(f'sensitivity = "{MARK}"   # such as {_EXAMPLE.get(quantity, "1 V per unit")}')
+    usual = surveyed.channels[model].polarity if is_like else 1
+    if guess.axis.value is not None and (guess.polarity < 0 or guess.polarity != usual):
         lines.append(f"polarity = {guess.polarity}")
     if quantity == "temperature":
         pad = re.search(rf"(?:{PAD}|t|tc|temp\w*?)[-_ #]*(\d{{1,2}})(?!\d)", name, re.IGNORECASE)
@@ -127,27 +127,26 @@ def run_lines(run: RunGuess) -> list[str]:
     stem = run.file.rpartition("/")[2].rpartition(".")[0]
     kind = run.kind.value
     lines = ["[[runs]]", f"id = {_toml_string(stem)}", f"file = {_toml_string(run.file)}"]
-    lines.append(_line("kind", f'"{kind}"', run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
+    lines.append(_line("kind", run.kind) if kind else f'kind = "{MARK}"   # {", ".join(KINDS)}')
     if kind in ("dynamic", "locus", None):
-        lines.append(_line("shaft_speed", f'"{run.speed.number:.4g} Hz"', run.speed, RUN, "Hz"))
-        lines.append(_line("static_load", f'"{run.load_text}"', run.load, RUN, "kN"))
+        load = replace(run.load, value=run.load_text if run.load.value is not None else None)
+        lines += [_line("shaft_speed", run.speed, RUN, "Hz"), _line("static_load", load, RUN, "kN")]
     if kind == "dry_pivot":
-        lines.append(_line("pad", str(run.pad.value), run.pad, RUN))
+        lines.append(_line("pad", run.pad, RUN))
     if kind != "clearance":
-        direction = f'"{run.direction.number:.4g} deg"'
-        lines.append(_line("static_load_direction", direction, run.direction, RUN, "deg"))
+        lines.append(_line("static_load_direction", run.direction, RUN, "deg"))
     if kind in ("dynamic", None):
-        frequency = f'"{run.excitation.number:.4g} Hz"'
-        lines.append(_line("excitation_frequency", frequency, run.excitation, RUN, "Hz"))
+        lines.append(_line("excitation_frequency", run.excitation, RUN, "Hz"))
     return lines
 
 
-def _line(key: str, value: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "") -> str:
+def _line(key: str, entry: Entry, fields: tuple[Field, ...] = (), unit: str = "", digits: str = ".4g") -> str:
     """One entry with its source (what is read from a file needs none); or an open one with what it means."""
     if entry.value is None:
         meaning = next(field.meaning for field in fields if field.key == key)
         text = f'{key} = "{f"{MARK} {unit}".strip()}"   # {meaning}'
         return f"{text}; {entry.reason}" if entry.reason else text
+    value = f'"{entry.number:{digits}} {unit}"' if unit and isinstance(entry.value, float) else json.dumps(entry.value)
     mark = _SOURCES.get(entry.source)
     return f"{key} = {value}   # {mark}{entry.reason}" if mark else f"{key} = {value}"
 
@@ -169,10 +168,6 @@ class _Block:
     key: tuple[str, str]  #: "channels" and the channel's name, "runs" and the run's file; else empty
     place: str  #: what messages call it
     lines: list[str]
-
-
-#: Lines of tables by the key of their block.
-_Tables = dict[tuple[str, str], list[str]]
 
 
 def _described_channels(text: str) -> dict[str, dict[str, Any]]:
@@ -230,36 +225,25 @@ def _faults(text: str) -> int:
 
 
 def _blocks(text: str) -> list[_Block]:
-    """The head of a manifest and its tables, in order."""
+    """The head of a manifest and its tables, in order; what is neither a channel nor a run has no kind."""
     parts: list[list[str]] = [[]]
     for line in text.splitlines():
         if line.startswith("["):
             parts.append([])
         parts[-1].append(line)
-    return [_block(lines) for lines in parts]
-
-
-def _block(lines: list[str]) -> _Block:
-    """A table by its heading; what is neither a channel nor a run has no kind."""
-    heading = lines[0].replace(" ", "") if lines else ""
-    try:
-        data = tomllib.loads("\n".join(lines))
-    except tomllib.TOMLDecodeError:  # a text over several lines that begins one with a bracket
-        heading = ""
-    if heading.startswith("[[runs]]"):
-        (run,) = data["runs"]
-        file = str(run.get("file", ""))
-        return _Block(("runs", file), f"run {run.get('id', file)}", lines)
-    if heading.startswith("[channels."):
-        (name,) = data["channels"]
-        return _Block(("channels", name), f"channel {name}", lines)
-    return _Block(("", ""), "", lines)
-
-
-def _tables(surveyed: Survey) -> _Tables:
-    """Lines of all tables that a draft has for channels and runs, by kind and name."""
-    tables = {("channels", name): lines for name, lines in channel_blocks(surveyed).items()}
-    return tables | {("runs", run.file): run_lines(run) for run in surveyed.runs}
+    blocks = []
+    for lines in parts:
+        key, place = ("", ""), ""
+        with contextlib.suppress(tomllib.TOMLDecodeError):  # a text over several lines that begins one with a bracket
+            data = tomllib.loads("\n".join(lines))
+            if lines and lines[0].replace(" ", "").startswith("[[runs]]"):
+                file = str(data["runs"][0].get("file", ""))
+                key, place = ("runs", file), f"run {data['runs'][0].get('id', file)}"
+            elif lines and lines[0].replace(" ", "").startswith("[channels."):
+                (name,) = data["channels"]
+                key, place = ("channels", name), f"channel {name}"
+        blocks.append(_Block(key, place, lines))
+    return blocks
 
 
 def _update(blocks: list[_Block], old: _Tables | None, new: _Tables) -> list[str]:
@@ -317,19 +301,13 @@ def _merge(block: _Block, new: Sequence[str], old: Sequence[str], changes: list[
 
 def _entry(line: str) -> tuple[str, str]:
     """Key and value of a line, without its comment; "" where it is none."""
-    if line.startswith(("[", "#")) or "=" not in line:
-        return "", ""
-    try:
+    with contextlib.suppress(tomllib.TOMLDecodeError, ValueError):
         ((key, value),) = tomllib.loads(line).items()
-    except (tomllib.TOMLDecodeError, ValueError):
-        return "", ""
-    return key, repr(value)
+        return ("", "") if line.startswith("[") else (key, repr(value))
+    return "", ""
 
 
 def _values(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
-    entries = {}
-    for line in lines:
-        key, value = _entry(line)
-        if key:
-            entries[key] = (value, line)
-    return entries
+    """Values and lines by their keys."""
+    entries = [(*_entry(line), line) for line in lines]
+    return {key: (value, line) for key, value, line in entries if key}
