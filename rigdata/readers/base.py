@@ -44,12 +44,6 @@ FORMATS = {
     ".mat": ("formats.mat", "read_mat", ""),
     ".parquet": ("formats.loggers", "read_parquet", ""),
 }
-#: Suffixes of loggers and programs that write one of the known kinds on request.
-_EXPORTABLE = {
-    ".tdm": ".tdms or .csv", ".tdx": ".tdms or .csv", ".xlsx": ".csv", ".xls": ".csv", ".ods": ".csv", ".bin": ".csv",
-    ".dxd": ".mat or .csv", ".d7d": ".mat or .csv", ".ltd": ".uff", ".lms": ".uff", ".pro": ".uff",
-    ".wav": ".csv", ".npy": ".csv", ".npz": ".csv", ".rec": ".csv", ".sie": ".csv", ".tst": ".csv",
-}  # fmt: skip
 #: Factors that differ by less are rounded ones of one unit.
 _SAME = 1e-3
 #: Longer texts are remarks.
@@ -217,35 +211,31 @@ class RunReader(RecordFile):
 
 def suffix_hint(path: Path) -> str:
     """What to do about a suffix that no reader is known by; "" where it is known."""
-    suffix = path.suffix.lower()
-    readable = (*TEXT, *FORMATS)
+    suffix, readable = path.suffix.lower(), (*TEXT, *FORMATS)
     if suffix in readable:
         return ""
-    if suffix in _EXPORTABLE:
-        return f"{suffix} files are not read; export it as {_EXPORTABLE[suffix]}"
     near = nearest_name(suffix, readable)
-    hint = f"did you mean {near}?" if near else f"known are {', '.join(readable)}"
-    return f"the suffix {suffix or '(none)'} is not known; {hint}"
+    question = f"did you mean {near}? " if near else ""
+    return f"{suffix or 'no suffix'} is not read; {question}export it as {', '.join(readable)}"
+
+
+def _meaning(unit: str, dimension: str) -> tuple[object, float]:
+    """What a reading in a unit is, a signal's dimension or the quantity with its offset, and the SI value of one."""
+    if is_signal(unit):
+        parsed = parse_unit(unit)
+        return parsed.powers, parsed.factor
+    offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
+    return (dimension, offset), unit_factor(unit, dimension)
 
 
 def _differ(stated: str, channel: Channel) -> bool:
-    """Whether the unit that a file states makes another number of a reading than the manifest's; False if it is none.
-
-    What a reading is counts (a signal's dimension, or the quantity itself), then the offset and the factor.
-    """
+    """Whether the unit that a file states makes another number of a reading than the manifest's."""
     if channel.quantity not in DIMENSIONS:
         return False
-    dimension = DIMENSIONS[channel.quantity]
-    meanings: list[tuple[object, float, float]] = []
     try:
-        for unit in (stated, channel.unit):
-            if is_signal(unit):
-                parsed = parse_unit(unit)
-                meanings.append((parsed.powers, 0.0, parsed.factor))
-            else:
-                offset = temperature_offset(unit) if dimension == "temperature difference" else 0.0
-                meanings.append((dimension, offset, unit_factor(unit, dimension)))
+        (kind, factor), (other_kind, other) = (
+            _meaning(unit, DIMENSIONS[channel.quantity]) for unit in (stated, channel.unit)
+        )
     except UnitError:
         return False
-    (*kind, factor), (*other_kind, other_factor) = meanings
-    return kind != other_kind or not math.isclose(factor, other_factor, rel_tol=_SAME)
+    return kind != other_kind or not math.isclose(factor, other, rel_tol=_SAME)

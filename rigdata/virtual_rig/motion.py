@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.noise import Noise, stream
@@ -78,8 +77,14 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     The actuators' force goes through the film: F_oil = H d at every line, d shaft relative to housing. The
     housing stands on its cells, so F_oil = F_cell + m_h a_h with F_cell = k_cell x_h.
     """
-    rng = stream(seed, run.record, "physics")
-    actual = _missed(run.point, noise, rng)
+    rng, point = stream(seed, run.record, "physics"), run.point
+    load, direction, speed = rng.standard_normal(3)  # by how much the set point is missed
+    actual = replace(
+        point,
+        static_load=point.static_load * (1 + noise.load_miss * load),
+        static_load_direction=point.static_load_direction + noise.direction_miss * direction,
+        shaft_speed=point.shaft_speed * (1 + noise.speed_miss * speed),
+    )
     shaft_angle = rng.uniform(0, 2 * np.pi)
     forces = _actuator_forces(run, noise, rng)
     unbalance = noise.unbalance * actual.shaft_speed**2
@@ -91,31 +96,24 @@ def running_motion(run: PlannedRun, truth: RigTruth, instruments: Instruments, n
     phases = stream(seed, "", "campaign").uniform(0, 2 * np.pi, len(runout))
     orders = np.arange(1, len(runout) + 1)
     steady = replace(actual, excitation=0.0)
-    lines = []
+    lines, line_facts = [], []
     for frequency, force in forces:
-        h = truth.h(replace(actual, excitation=frequency))
-        lines.append(answer(frequency, force, h, instruments))
+        line = answer(frequency, force, truth.h(replace(actual, excitation=frequency)), instruments)
+        lines.append(line)
+        fact: dict[str, object] = {"frequency_Hz": round(frequency / (2 * np.pi), 9)}
+        for name, phasor in (("oil_force_N", line.oil_force), ("displacement_m", line.displacement)):
+            fact[name] = np.stack([phasor.real, phasor.imag], axis=1).tolist()
+        line_facts.append(fact)
     position = truth.centre(steady)
     return Motion(
         time=np.arange(round(run.seconds * run.rate)) / run.rate,
         position=position,
         load=load_vector(actual),
         temperature=truth.temperatures(steady),
-        facts=point_facts(actual, position) | {"lines": [_line_facts(line) for line in lines]},
+        facts=point_facts(actual, position) | {"lines": line_facts},
         lines=tuple(lines),
         speed=actual.spin,
         surface=runout * np.exp(1j * (phases + orders * shaft_angle)),
-    )
-
-
-def _missed(point: OperatingPoint, noise: Noise, rng: np.random.Generator) -> OperatingPoint:
-    """Draw the point that is really run when the set point is `point`."""
-    load, direction, speed = rng.standard_normal(3)
-    return replace(
-        point,
-        static_load=point.static_load * (1 + noise.load_miss * load),
-        static_load_direction=point.static_load_direction + noise.direction_miss * direction,
-        shaft_speed=point.shaft_speed * (1 + noise.speed_miss * speed),
     )
 
 
@@ -151,13 +149,6 @@ def answer(frequency: float, force: ComplexArray, h: ComplexArray, instruments: 
         force=force - instruments.true_mass * acceleration,
         acceleration=acceleration,
     )
-
-
-def _line_facts(line: MotionLine) -> dict[str, object]:
-    """Frequency and phasors ``[[Re x, Im x], [Re y, Im y]]`` of a line."""
-    phasors = {"oil_force_N": line.oil_force, "displacement_m": line.displacement}
-    parts = {name: np.stack([p.real, p.imag], axis=1).tolist() for name, p in phasors.items()}
-    return {"frequency_Hz": round(line.frequency / (2 * np.pi), 9), **parts}
 
 
 def dry_motion(run: PlannedRun, test: DryTest, truth: RigTruth, noise: Noise, seed: int) -> Motion:

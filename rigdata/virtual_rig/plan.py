@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, radians
 from typing import Literal
@@ -118,69 +119,48 @@ class RigPlan:
 
     def runs(self, pivot_angles: Sequence[float]) -> tuple[PlannedRun, ...]:
         """All runs in order; `pivot_angles` [rad] give the dry tests their directions."""
-        runs = (*self._dynamic_runs(), *self._locus_runs(), *self._static_runs(pivot_angles))
-        ids: set[str] = set()
-        for run in runs:
-            if run.id in ids:
-                raise VirtualRigError(f"the plan has two runs with the id {run.id!r}; every test only once")
-            ids.add(run.id)
+        runs = (*self._dynamic_runs(), *self._other_runs(pivot_angles))
+        for name, count in Counter(run.id for run in runs).items():
+            if count > 1:
+                raise VirtualRigError(f"the plan has two runs with the id {name!r}; every test only once")
         if not runs:
             raise VirtualRigError("the plan is empty; give it at least one test")
         return runs
 
-    def _dynamic_runs(self) -> Iterable[PlannedRun]:
+    def _dynamic_runs(self) -> Iterator[PlannedRun]:
         for point in self.dynamic:
-            self._check_dynamic(point)
+            if not 0 < point.excitation < pi * self.dynamic_rate:
+                raise VirtualRigError(
+                    f"an excitation of {point.excitation_hz:g} Hz cannot be sampled at {self.dynamic_rate:g} Hz; "
+                    "choose one between zero and half the sample rate"
+                )
+            if point.static_load <= 0 or self.dynamic_fraction <= 0:
+                raise VirtualRigError("dynamic runs need a positive static load and dynamic_fraction")
             together = [p for p in self.dynamic if p.static_key == point.static_key]
             if not self.joint_frequencies:
                 together = [point]
             amplitude = self.dynamic_fraction * point.static_load / len(together) ** 0.5
+            lines = tuple((p.excitation, amplitude) for p in together)
             for number, direction in enumerate(self.directions, 1):
                 for repeat in range(1, self.repeats + 1):
                     tail = f"-{number:02d}" + (f"-r{repeat}" if self.repeats > 1 else "")
+                    name, record = (f"d-{self._name(p)}-{p.excitation_hz:g}{tail}" for p in (point, together[0]))
+                    seconds = self.dynamic_seconds
                     yield PlannedRun(
-                        id=f"d-{self._name(point)}-{point.excitation_hz:g}{tail}",
-                        kind="dynamic",
-                        rate=self.dynamic_rate,
-                        point=point,
-                        direction=direction,
-                        lines=tuple((p.excitation, amplitude) for p in together),
-                        record=f"d-{self._name(point)}-{together[0].excitation_hz:g}{tail}",
-                        seconds=self.dynamic_seconds,
+                        name, "dynamic", self.dynamic_rate, point, direction, lines, record, seconds=seconds
                     )
 
-    def _check_dynamic(self, point: OperatingPoint) -> None:
-        if not 0 < point.excitation < pi * self.dynamic_rate:
-            raise VirtualRigError(
-                f"an excitation of {point.excitation_hz:g} Hz cannot be sampled at {self.dynamic_rate:g} Hz; "
-                "choose one between zero and half the sample rate"
-            )
-        if point.static_load <= 0 or self.dynamic_fraction <= 0:
-            raise VirtualRigError("dynamic runs need a positive static load and dynamic_fraction")
-
-    def _locus_runs(self) -> Iterable[PlannedRun]:
+    def _other_runs(self, pivot_angles: Sequence[float]) -> Iterator[PlannedRun]:
         for number, point in enumerate(self.locus, 1):
             name = f"l-{_load_name(point)}-{number:02d}"
-            yield PlannedRun(
-                id=name,
-                kind="locus",
-                rate=self.dynamic_rate,
-                point=point,
-                record=name,
-                seconds=self.locus_seconds,
-            )
-
-    def _static_runs(self, pivot_angles: Sequence[float]) -> Iterable[PlannedRun]:
+            yield PlannedRun(name, "locus", self.dynamic_rate, point, record=name, seconds=self.locus_seconds)
         for test in self.dry:
             if not 1 <= test.pad <= len(pivot_angles):
                 raise VirtualRigError(f"dry test on pad {test.pad}: the bearing has pads 1 to {len(pivot_angles)}")
-            name = f"p-{test.pad}-{test.branch}"
-            angle = pivot_angles[test.pad - 1]
-            rate = self.dry_rate
-            yield PlannedRun(id=name, kind="dry_pivot", rate=rate, direction=angle, record=name, test=test)
+            name, angle = f"p-{test.pad}-{test.branch}", pivot_angles[test.pad - 1]
+            yield PlannedRun(name, "dry_pivot", self.dry_rate, direction=angle, record=name, test=test)
         for number, sweep in enumerate(self.clearance, 1):
-            name = f"c-{number}"
-            yield PlannedRun(id=name, kind="clearance", rate=self.dry_rate, record=name, test=sweep)
+            yield PlannedRun(f"c-{number}", "clearance", self.dry_rate, record=f"c-{number}", test=sweep)
 
     def _name(self, point: OperatingPoint) -> str:
         """Load, and whatever else distinguishes the points of this plan."""
