@@ -91,14 +91,11 @@ def read_contents(record: RecordFile) -> Contents:
     except ModuleNotFoundError as error:
         fault = f"{path.suffix} files need the library {error.name}, which is not installed"
         raise record.refuse("", fault, f'Install it with: pip install "tpjb-ident[{extra}]"') from error
-    except MemoryError as error:  # of a file that is small enough: it claims more than it holds
-        remedy = "Export or copy it again, or split the run"
-        raise record.refuse("", "claims more data than fit in memory", remedy) from error
-    except (PermissionError, UnicodeError) as error:
-        raise record.refuse("", f"cannot be read ({error})", "Check the file and its rights") from error
     except Exception as error:  # whatever another library raises on a broken file: it is the file's fault here
         fault = f"cannot be read as {path.suffix.lstrip('.').upper()} ({type(error).__name__}: {str(error)[:120]})"
-        raise record.refuse("", fault, again) from error
+        if isinstance(error, MemoryError):  # of a file that is small enough
+            fault = "claims more data than fit in memory"
+        raise record.refuse("", fault, f"{again}, and check its rights") from error
     contents = table(contents, record)
     if not contents.series:
         raise record.refuse("", "holds no channel of numbers", "Export the run again, with its channels")

@@ -6,13 +6,11 @@ import contextlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
 from rigdata.readers.series import Series
-from rigdata.survey.axes import part_means
 from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, usable_unit
 from rigdata.survey.exports import Export
 from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
@@ -22,6 +20,7 @@ from rigdata.units import UnitError, unit_factor
 _SLOW, _STRAIGHT = 0.9, 0.97
 #: Above this share too, where no line carries that much of the movement: steps that follow each other quickly.
 _MOSTLY, _DRIVEN = 0.5, 0.05
+#: Blocks of which the means are the slow movement [s].
 _BLOCK = 0.25
 #: How far a line may lie from a frequency that is stated or known, as a share.
 NEAR = 0.02
@@ -65,14 +64,14 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     stem = export.name.rpartition("/")[2].rpartition(".")[0]
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     load, text = _load_of(stem)
-    angle = _number_before(stem, r"deg(?:ree)?s?|°|grad")
+    angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
     return RunGuess(
         export=export,
         kind=_kind(stem, forces, moves, lines),
         lines=lines,
         load=load,
         load_text=text,
-        direction=_stated(angle),
+        direction=Entry(angles[0], "file") if angles else OPEN,
         pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else OPEN,
         speed=_speed(export, channels, stem),
         excitation=_stated_frequency(stem, lines),
@@ -82,10 +81,6 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
 def of_quantity(export: Export, channels: Mapping[str, ChannelGuess], quantity: str) -> list[Series]:
     """Channels of a record that measure a quantity."""
     return [s for s in export.series if channels[s.name].quantity.value == quantity]
-
-
-def _stated(number: float) -> Entry:
-    return Entry(number, "file") if math.isfinite(number) else OPEN
 
 
 def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> Entry:
@@ -99,13 +94,13 @@ def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[Spe
     return Entry(named, "guess", "the file's name") if named else OPEN
 
 
-def _number_before(stem: str, unit: str) -> float:
-    """Number before a unit in a file's name: ``-90deg``, ``1320_rpm``; NaN without one."""
-    match = re.search(rf"{_NUMBER}(?:{unit})(?![a-z])", stem, re.IGNORECASE)
-    if match is None:
-        return float("nan")
-    size = float(match[2].replace(",", "."))
-    return -size if match[1] == "-" else size
+def _numbers_before(stem: str, unit: str) -> list[float]:
+    """Numbers before a unit in a file's name: ``-90deg``, ``1320_rpm``."""
+    numbers = []
+    for match in re.finditer(rf"{_NUMBER}(?:{unit})(?![a-z])", stem, re.IGNORECASE):
+        size = float(match[2].replace(",", "."))
+        numbers.append(-size if match[1] == "-" else size)
+    return numbers
 
 
 def _load_of(stem: str) -> tuple[Entry, str]:
@@ -114,11 +109,10 @@ def _load_of(stem: str) -> tuple[Entry, str]:
         unit, size = usable_unit(letters), float(number.replace(",", "."))
         with contextlib.suppress(UnitError):
             return Entry(size * unit_factor(unit, "force"), "file"), f"{size:g} {unit}"
-    bare = [float(n) for n in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.a-z])", stem, re.IGNORECASE)]
-    newtons = next((n for n in bare if 100.0 <= n <= 200_000.0), math.nan)
-    if math.isnan(newtons):
-        return OPEN, ""
-    return Entry(newtons, "guess", "a number in the file's name"), f"{newtons / 1e3:g} kN"
+    for bare in re.findall(r"(?<![\d.])(\d{3,6})(?![\d.a-z])", stem, re.IGNORECASE):
+        if 100.0 <= float(bare) <= 200_000.0:
+            return Entry(float(bare), "guess", "a number in the file's name"), f"{float(bare) / 1e3:g} kN"
+    return OPEN, ""
 
 
 def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> Entry:
@@ -130,13 +124,13 @@ def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> E
         mean = float(np.median(good)) * factor if len(good) and math.isfinite(factor) else 0.0
         if mean > 0:
             return Entry(mean, "records", f"{mean:.4g} Hz by {series.name}")
-    return _stated(_number_before(stem, r"rpm|u[-_]?min|1[-_]min") / 60.0)
+    turns = _numbers_before(stem, r"rpm|u[-_]?min|1[-_]min")
+    return Entry(turns[0] / 60.0, "file") if turns else OPEN
 
 
 def _stated_frequency(stem: str, lines: tuple[SpectralPeak, ...]) -> Entry:
     """Frequency [Hz] that a file's name states and one of the record's lines confirms."""
-    numbers = re.findall(r"(\d+(?:[.,]\d+)?)[ _]?Hz(?![a-z])", stem, re.IGNORECASE)
-    frequencies = [float(number.replace(",", ".")) for number in numbers]
+    frequencies = [abs(f) for f in _numbers_before(stem, "Hz")]
     confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
     return Entry(confirmed[0], "file") if len(confirmed) == 1 else OPEN
 
@@ -145,7 +139,12 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
-    slow = [_slow(s) for s in pair]
+    slow = []
+    for series in pair:  # means over blocks
+        step = max(1, round(_BLOCK * series.rate))
+        count = len(series) // step
+        blocks = np.reshape(series.values[: count * step], (count, step))
+        slow.append(np.nanmean(blocks[np.isfinite(blocks).any(axis=1)], axis=1))
     total = sum(float(np.nanvar(s.values)) for s in pair)
     if total <= 0:
         return "", ""
@@ -158,15 +157,6 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
                 return "clearance", "the force goes around"
         return "dry_pivot", "the force climbs slowly along one line"
     return ("dynamic", "the force oscillates") if lines else ("locus", "the force is constant")
-
-
-def _slow(series: Series) -> FloatArray:
-    """Means over blocks of a quarter of a second."""
-    step = max(1, round(_BLOCK * series.rate))
-    count = len(series.values) // step
-    blocks = replace(series, values=series.values[: count * step])
-    means = part_means([blocks], count)[:, 0] if count else np.empty(0)
-    return np.asarray(means[np.isfinite(means)])
 
 
 def strongest_lines(channels: Sequence[Series]) -> tuple[SpectralPeak, ...]:

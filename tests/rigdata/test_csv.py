@@ -213,7 +213,7 @@ def test_missing_channel_names_the_nearest_column(tmp_path):
         ("utf-8", 'decimal = "."', ["decimal is '.'", "'0,0000'"]),
         ("utf-8", "header_line = 3", ["header_line 3", "line 1 with ';' holds 3"]),
         ("utf-8", "header_line = 300", ["header_line 300", "line 1 with ';' holds 3"]),
-        ("utf-16-le", 'encoding = "utf-16"', ["cannot be read (", "does not start with BOM)"]),
+        ("utf-16-le", 'encoding = "utf-16"', ["cannot be read as CSV (", "does not start with BOM)"]),
     ],
 )
 def test_a_manifest_that_contradicts_the_file(tmp_path, encoding, csv, says):

@@ -159,7 +159,7 @@ def test_a_labview_file_whose_rows_end_before_the_column_of_comments(tmp_path):
         ("c.lvm", lvm("One")[:300], "holds no channel over time"),
         ("a.tmds", "x", "did you mean .tdms"),
         ("b.xlsx", "x", "export it as .csv"),
-        ("c.tdm", "x", "export it as .tdms"),
+        ("c.tdm", "x", "did you mean .tdms"),
     ],
 )
 def test_what_cannot_be_read_says_why(tmp_path, name, content, says):
@@ -177,7 +177,7 @@ def test_a_universal_file_without_time_records_says_what_it_holds(tmp_path):
         id1="H", abscissa_spec_data_type=18, ordinate_spec_data_type=12, orddenom_spec_data_type=13,
     )  # fmt: skip
     pyuff.UFF(str(path)).write_sets(data, "add")
-    with pytest.raises(RigDataError, match="no record over time, only 1 x frequency response function"):
+    with pytest.raises(RigDataError, match="no record over time, only 1 x function type 4"):
         read_series(path, "a.uff")
 
 

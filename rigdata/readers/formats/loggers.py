@@ -17,8 +17,8 @@ from rigdata.readers.series import Series, equidistant, is_time, seconds, to_tem
 
 #: Function types of data set 58 that are records over time.
 _GENERAL, _TIME_RESPONSE = 0, 1
-_FUNCTIONS = {1: "complex time response", 2: "auto spectrum", 3: "cross spectrum", 4: "frequency response function",
-              6: "coherence", 7: "auto correlation", 9: "power spectral density", 12: "spectrum"}  # fmt: skip
+#: Directions of data set 58 by their numbers.
+_DIRECTIONS = {1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
 
 
 def read_tdms(path: Path) -> list[Series]:
@@ -89,7 +89,7 @@ def read_uff(path: Path) -> list[Series]:
         if function in (_GENERAL, _TIME_RESPONSE) and not np.iscomplexobj(data["data"]):
             series.append(_time_record(data, index))
         else:
-            unusable[_FUNCTIONS.get(function, f"function type {function}")] += 1
+            unusable[f"function type {function}"] += 1
     if not series:
         counts = ", ".join([f"{count} x {kind}" for kind, count in unusable.items()][:6])
         fault = f"holds no record over time, only {counts}" if counts else "holds no data set"
@@ -118,11 +118,7 @@ def _record_name(data: dict[str, Any], index: int) -> str:
     node, code = data.get("rsp_node"), data.get("rsp_dir")
     if not node:
         return f"set {index + 1}"
-    number = int(code) if isinstance(code, (int, float)) else 0
-    direction = ""
-    if 1 <= abs(number) <= 3:
-        direction = ("+" if number > 0 else "-") + "XYZ"[abs(number) - 1]
-    return f"Rsp {node}{direction}"
+    return f"Rsp {node}{_DIRECTIONS.get(code, '')}"
 
 
 def read_mdf(path: Path) -> list[Series]:
