@@ -80,18 +80,14 @@ class Campaign(Description):
 
     def _repr_html_(self) -> str:
         """In a notebook: what it is, and a row per kind of run."""
-        rows = []
+        rows = [("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz")]
         for kind in dict.fromkeys(run.kind for run in self.runs):
             points = [run.point for run in self.of_kind(kind)]
-            cells = [kind, str(len(points))]
-            for values in ([p.static_load / 1e3 for p in points], [p.shaft_speed_hz for p in points],
-                           [p.excitation_hz for p in points]):  # fmt: skip
-                low, high = min(values), max(values)
-                cells.append(f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}")
-            rows.append("".join(f"<td>{cell}</td>" for cell in cells))
-        head = "".join(f"<th>{title}</th>" for title in ("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz"))
-        body = "".join(f"<tr>{row}</tr>" for row in rows)
-        return f"<p>{html.escape(str(self))}</p><table><tr>{head}</tr>{body}</table>"
+            columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points), strict=True)
+            spans = [(f"{min(values):.4g}", f"{max(values):.4g}") for values in columns]
+            rows.append((kind, str(len(points)), *(" to ".join(dict.fromkeys(span)) for span in spans)))
+        body = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in rows)
+        return f"<p>{html.escape(str(self))}</p><table>{body}</table>"
 
     def run(self, run_id: str) -> Run:
         """Find the run `run_id`.
@@ -171,34 +167,34 @@ def load_campaign(path: str | Path) -> Campaign:
     """
     source = Path(path)
     try:
-        kind = _kind_of(source)
+        if source.is_dir() and (source / MANIFEST_NAME).exists():
+            inside(source, MANIFEST_NAME, str(source), "")  # a stranger's folder may link it elsewhere
+            return _load_folder(source, source / MANIFEST_NAME)
+        _refuse_other(source)
     except RigDataError:
         raise
     except (OSError, ValueError) as error:  # a name too long or with a NUL, a folder that may not be entered
         message = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
         raise refuse(str(path)[:100], "", message, "Check the path and its rights") from error
-    if kind == "folder":
-        inside(source, MANIFEST_NAME, str(source), "")  # a stranger's folder may link it elsewhere
-        return _load_folder(source, source / MANIFEST_NAME)
-    return _load_folder(source.parent, source) if kind == "manifest" else _load_hdf5(source)
+    return _load_folder(source.parent, source) if source.suffix.lower() == ".toml" else _load_hdf5(source)
 
 
-def _kind_of(source: Path) -> str:
-    """Whether `source` is a "folder", a "manifest" or "hdf5"; refuse what is none of these."""
+def _refuse_other(source: Path) -> None:
+    """Refuse what is neither a manifest nor may be an HDF5 file."""
+    cure, fault = f"Give the folder that holds {MANIFEST_NAME}, or an HDF5 file", ""
     if source.is_dir():
-        if (source / MANIFEST_NAME).exists():
-            return "folder"
-        inside_it = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in _HDF5_SUFFIXES][:3]
-        hint = f", or one of its HDF5 files ({', '.join(inside_it)})" if inside_it else ""
-        cure = f"Give the folder that holds {MANIFEST_NAME}{hint}; `tpjb init FOLDER` drafts one for records"
-        raise refuse(str(source), "", f"the folder has no {MANIFEST_NAME}", cure)
-    if not source.exists():
-        raise refuse(str(source)[:200], "", "there is no such file or folder", "Check the path")
-    if not source.is_file():
-        raise refuse(str(source), "", "is not an ordinary file", f"Give a folder with {MANIFEST_NAME} or an HDF5 file")
-    if source.suffix.lower() in TEXT:
-        raise refuse(str(source), "", "is a record, not a campaign", f"Give the folder that holds {MANIFEST_NAME}")
-    return "manifest" if source.suffix.lower() == ".toml" else "hdf5"
+        fault = f"the folder has no {MANIFEST_NAME}"
+        stored = [p.name for p in itertools.islice(source.iterdir(), 1000) if p.suffix.lower() in _HDF5_SUFFIXES]
+        hint = f" ({', '.join(stored[:3])})" if stored else ""
+        cure += f"{hint}; `tpjb init FOLDER` drafts one for records"
+    elif not source.exists():
+        fault, cure = "there is no such file or folder", "Check the path"
+    elif not source.is_file():
+        fault = "is not an ordinary file"
+    elif source.suffix.lower() in TEXT:
+        fault = "is a record, not a campaign"
+    if fault:
+        raise refuse(str(source)[:200], "", fault, cure)
 
 
 def _read_text(path: Path, file: str, limit: int) -> str:
