@@ -35,32 +35,26 @@ class ChannelStatistics:
         valid = np.isfinite(readings) & (np.abs(np.nan_to_num(readings)) < OVERFLOW)
         self.missing += int(len(readings) - np.count_nonzero(valid))
         values = readings if valid.all() else readings[valid]
-        if not len(values):
-            self._last, self._flat = math.nan, 0
-        else:
+        if len(values):
             self.low = min(self.low, float(values.min()))
             self.high = max(self.high, float(values.max()))
-            self._stretches(np.where(valid, readings, np.nan))
             self.blocks.append(values if not self.samples else values[:: max(1, len(values) // 10_000)])
-        self.samples += len(readings)
-
-    def _stretches(self, readings: FloatArray) -> None:
-        """Extend the count of equal neighbours; a missing value ends a stretch."""
-        previous = np.concatenate([[self._last], readings[:-1]])
-        repeated = readings == previous
+        # equal neighbours; a missing value ends a stretch
+        present = np.where(valid, readings, np.nan)
+        repeated = present == np.concatenate([[self._last], present[:-1]])
         self.repeats += int(np.count_nonzero(repeated))
         breaks = np.flatnonzero(~repeated)
         starts = np.concatenate([[0], breaks]) if repeated[0] else breaks
-        ends = np.append(starts[1:], len(readings))
+        ends = np.append(starts[1:], len(present))
         lengths = ends - starts
         if repeated[0]:
             lengths[0] += self._flat
         best = int(np.argmax(lengths))
-        if int(lengths[best]) > self.longest_flat:
+        if len(values) and int(lengths[best]) > self.longest_flat:
             self.longest_flat = int(lengths[best])
             self.flat_start = self.samples + int(ends[best]) - self.longest_flat
-        self._flat = int(lengths[-1])
-        self._last = float(readings[-1])
+        self._last, self._flat = float(present[-1]), int(lengths[-1])
+        self.samples += len(readings)
 
     @property
     def values(self) -> int:

@@ -205,7 +205,10 @@ def table(contents: Contents, record: RecordFile) -> Contents:
         time = seconds(column) if known is None else known.to_si(column.values)
         label = "" if is_shared else column.name
         rows = slice(None) if is_shared else _filled_rows([time, *(series[i].values for i in members)])
-        time = _without_gaps(time[rows])
+        time = time[rows]
+        usable = np.flatnonzero(np.abs(time) < OVERFLOW)
+        if len(usable) not in (0, len(time)):  # missing times are set between their neighbours
+            time = np.interp(np.arange(len(time)), usable, time[usable])
         for i in members:
             values = to_temporary_file(series[i].values[rows])
             placed[i] = replace(series[i], values=values, time=time, group=label or series[i].group)
@@ -248,11 +251,3 @@ def _filled_rows(columns: Sequence[FloatArray]) -> BoolArray:
     for column in columns:
         rows |= np.isfinite(column)
     return rows
-
-
-def _without_gaps(time: FloatArray) -> FloatArray:
-    """Times with missing ones set between their neighbours."""
-    usable = np.flatnonzero(np.abs(time) < OVERFLOW)
-    if len(usable) in (0, len(time)):
-        return time
-    return np.interp(np.arange(len(time)), usable, time[usable])

@@ -96,15 +96,10 @@ def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[
             break
         around = amplitude[max(4, i - _NEIGHBOURS) : i + _NEIGHBOURS + 1]
         if amplitude[i] > _STANDS_OUT * np.median(around) and i + 1 < len(amplitude):
-            peaks.append(SpectralPeak(_refined(frequency, amplitude, i), float(amplitude[i])))
+            # between the bins by a parabola through the logarithms
+            a, b, c = np.log(np.maximum(amplitude[i - 1 : i + 2], 1e-300))
+            curve = a - 2 * b + c
+            shift = float(np.clip(0.5 * (a - c) / curve, -0.5, 0.5)) if curve < 0 else 0.0
+            peaks.append(SpectralPeak(float(frequency[i] + frequency[1] * shift), float(amplitude[i])))
         remaining[max(0, i - 2) : i + 3] = 0.0  # the window's main lobe
     return tuple(peaks)
-
-
-def _refined(frequency: FloatArray, amplitude: FloatArray, i: int) -> float:
-    """Frequency of a peak between the bins, from a parabola through the logarithms."""
-    step = float(frequency[1])
-    a, b, c = np.log(np.maximum(amplitude[i - 1 : i + 2], 1e-300))
-    curve = a - 2 * b + c
-    shift = 0.5 * (a - c) / curve if curve < 0 else 0.0
-    return float(frequency[i]) + step * float(np.clip(shift, -0.5, 0.5))

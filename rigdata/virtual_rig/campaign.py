@@ -134,18 +134,15 @@ def _write_hdf5(path: Path, rig: VirtualRig, manifest: str, records: _Records, l
             group = groups.create_group(record.run.id)
             group.attrs["sample_rate_hz"] = float(record.readings.rate)
             for name, values in _stored(record, rig, layout):
-                _write_dataset(group, name, values if name == layout.time_name else values.astype(kind))
+                packing: dict[str, Any] = {}
+                if len(values):
+                    chunks = (min(len(values), 16384),)
+                    packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks}
+                data = values if name == layout.time_name else values.astype(kind)
+                group.create_dataset(name, data=data, track_times=False, **packing)
         for run in rig.runs():
             if run.record != run.id and run.record in groups:
                 groups[run.id] = groups[run.record]  # a hard link
-
-
-def _write_dataset(group: Any, name: str, values: FloatArray) -> None:
-    packing: dict[str, Any] = {}
-    if len(values):
-        chunks = (min(len(values), 16384),)
-        packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": chunks}
-    group.create_dataset(name, data=values, track_times=False, **packing)
 
 
 def _write_csv(folder: Path, rig: VirtualRig, manifest: str, records: _Records, layout: CsvLayout) -> None:
@@ -176,20 +173,15 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
     tail = layout.delimiter if layout.trailing_delimiter else ""
     head = [line.format(rate=f"{rate:g}", count=len(table)) for line in layout.preamble]
     head += [layout.delimiter.join(cells) + tail for cells in [names, units][: 1 + layout.units_line]]
-    body = _rows(table, forms, layout, tail)
+    form = "\0".join(forms)  # one format string for a whole row is the fastest way in Python
+    text = "\n".join([form % tuple(row) for row in table.tolist()])
+    for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
+        text = text.replace(written, wanted)
+    body = [line + tail for line in text.split("\n")] if text else []
     if "truncated_line" in rig.fault_kinds(record.run.id) and body:
         body[-1] = body[-1][: len(body[-1]) * 3 // 5]
         return layout.newline.join([*head, *body])
     return layout.newline.join([*head, *body, *[""] * (1 + layout.blank_last_lines)])
-
-
-def _rows(table: FloatArray, forms: list[str], layout: CsvLayout, tail: str) -> list[str]:
-    """Format the lines of a table; one format string for a whole row is the fastest way in Python."""
-    form = "\0".join(forms)
-    text = "\n".join([form % tuple(row) for row in table.tolist()])
-    for written, wanted in (("nan", layout.missing), (".", layout.decimal), ("\0", layout.delimiter)):
-        text = text.replace(written, wanted)
-    return [line + tail for line in text.split("\n")] if text else []
 
 
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:

@@ -102,7 +102,10 @@ def manifest_text(
         _table("[acquisition]", {"sample_rate": _rate(common)}),
     ]
     if isinstance(layout, CsvLayout) and layout.declared:
-        blocks.append(_table("[csv]", _dialect(layout)))
+        line = len(layout.preamble) + 1
+        dialect = {key: getattr(layout, key) for key in ("delimiter", "decimal", "encoding")}
+        lines = {"header_line": line, "units_line": line + 1 if layout.units_line else None}
+        blocks.append(_table("[csv]", dialect | lines))
     if layout.time_name is not None:
         blocks.append(_table(f"[channels.{layout.time_name}]", {"quantity": "time", "unit": "s"}))
     blocks += [_channel(sensor) for sensor in instruments.sensors]
@@ -120,17 +123,6 @@ def _table(title: str | None, entries: dict[str, object]) -> str:
         if value is not None:
             lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     return "\n".join(lines) + "\n"
-
-
-def _dialect(layout: CsvLayout) -> dict[str, object]:
-    header_line = len(layout.preamble) + 1
-    return {
-        "delimiter": layout.delimiter,
-        "decimal": layout.decimal,
-        "encoding": layout.encoding,
-        "header_line": header_line,
-        "units_line": header_line + 1 if layout.units_line else None,
-    }
 
 
 def _channel(sensor: Sensor) -> str:

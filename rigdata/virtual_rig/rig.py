@@ -167,16 +167,6 @@ def _pick_up(noise: Noise, names: list[str], time: FloatArray, seed: int, run: s
 _ERRORS = {"scaled": "gain", "delayed": "delay", "rotated": "angle", "offset": "offset", "crosstalk": "cross"}
 
 
-def faulty_instruments(instruments: Instruments, faults: Iterable[Fault]) -> Instruments:
-    """Instruments of one run, with the faults of its sensors; `faults` are those of the run."""
-    sensors = instruments.sensors
-    for fault in faults:
-        if fault.place == "sensor":
-            change = {_ERRORS[fault.kind]: fault.size(0.0)}
-            sensors = tuple(s.with_error(**change) if fault.is_in(s.name) else s for s in sensors)
-    return replace(instruments, sensors=sensors)
-
-
 def spoil_record(
     readings: Readings, instruments: Instruments, faults: Iterable[Fault], rng: np.random.Generator
 ) -> Readings:
@@ -279,27 +269,29 @@ class VirtualRig:
         return {fault.kind for fault in self.faults_of(record) if channel is None or fault.is_in(channel)}
 
     def _simulated(self, run: PlannedRun) -> SimulatedRun:
-        faults = self.faults_of(run.record)
+        faults, noise, seed = self.faults_of(run.record), self.noise, self.seed
         if "missing_excitation" in self.fault_kinds(run.record):
             run = replace(run, lines=())
-        instruments = faulty_instruments(self.instruments, faults)
-        motion = self._motion(run, instruments)
-        columns = analogue_readings(motion, instruments, self.noise, self.seed, run.id)
+        sensors = self.instruments.sensors
+        for fault in faults:
+            if fault.place == "sensor":
+                change = {_ERRORS[fault.kind]: fault.size(0.0)}
+                sensors = tuple(s.with_error(**change) if fault.is_in(s.name) else s for s in sensors)
+        instruments = replace(self.instruments, sensors=sensors)
         glitches: tuple[Glitch, ...] = ()
-        if run.test is None:
-            glitches = draw_glitches(instruments, self.noise, len(motion.time), self.seed, run.id)
+        if isinstance(run.test, DryTest):
+            motion = dry_motion(run, run.test, self.truth, noise, seed)
+        elif run.test is not None:
+            motion = clearance_motion(run, run.test, self.truth, noise, seed)
+        else:
+            motion = running_motion(run, self.truth, instruments, noise, seed)
+            glitches = draw_glitches(instruments, noise, len(motion.time), seed, run.id)
+        columns = analogue_readings(motion, instruments, noise, seed, run.id)
         for glitch in glitches:
             sensor = instruments.named(glitch.channel)
             burst = slice(glitch.first, glitch.first + glitch.count)
             columns[glitch.channel][burst] += sensor.polarity * sensor.scale * glitch.size
-        columns = {s.name: converted(columns[s.name], s, self.noise.bits) for s in instruments.sensors}
+        columns = {s.name: converted(columns[s.name], s, noise.bits) for s in sensors}
         readings = Readings(motion.time, columns, run.rate)
-        readings = spoil_record(readings, instruments, faults, stream(self.seed, run.id, "faults"))
+        readings = spoil_record(readings, instruments, faults, stream(seed, run.id, "faults"))
         return SimulatedRun(run, readings, motion, glitches, run.id)
-
-    def _motion(self, run: PlannedRun, instruments: Instruments) -> Motion:
-        if isinstance(run.test, DryTest):
-            return dry_motion(run, run.test, self.truth, self.noise, self.seed)
-        if run.test is not None:
-            return clearance_motion(run, run.test, self.truth, self.noise, self.seed)
-        return running_motion(run, self.truth, instruments, self.noise, self.seed)

@@ -86,28 +86,24 @@ def read_uff(path: Path) -> list[Series]:
             continue
         data = file.read_sets(index)
         function = int(data.get("func_type", 0))
-        if function in (_GENERAL, _TIME_RESPONSE) and not np.iscomplexobj(data["data"]):
-            series.append(_time_record(data, index))
-        else:
+        if function not in (_GENERAL, _TIME_RESPONSE) or np.iscomplexobj(data["data"]):
             unusable[f"function type {function}"] += 1
+            continue
+        values, x = to_temporary_file(np.asarray(data["data"], dtype=float)), data.get("x")
+        step = float(data.get("abscissa_inc") or 0.0)
+        time: FloatArray | None = None
+        if x is not None and len(x) == len(values):
+            time = to_temporary_file(np.asarray(x, dtype=float))
+        elif step > 0:
+            time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
+        unit = str(data.get("ordinate_axis_units_lab") or "").strip()
+        unit = "" if unit.upper() == "NONE" else unit
+        series.append(Series(_record_name(data, index), unit, values, time, f"set {index + 1}"))
     if not series:
         counts = ", ".join([f"{count} x {kind}" for kind, count in unusable.items()][:6])
         fault = f"holds no record over time, only {counts}" if counts else "holds no data set"
         raise refuse(path.name, "", fault, "Export the time records (data set 58, time response)")
     return series
-
-
-def _time_record(data: dict[str, Any], index: int) -> Series:
-    values = to_temporary_file(np.asarray(data["data"], dtype=float))
-    x = data.get("x")
-    step = float(data.get("abscissa_inc") or 0.0)
-    time: FloatArray | None = None
-    if x is not None and len(x) == len(values):
-        time = to_temporary_file(np.asarray(x, dtype=float))
-    elif step > 0:
-        time = equidistant(len(values), step, float(data.get("abscissa_min") or 0.0))
-    unit = str(data.get("ordinate_axis_units_lab") or "").strip()
-    return Series(_record_name(data, index), "" if unit.upper() == "NONE" else unit, values, time, f"set {index + 1}")
 
 
 def _record_name(data: dict[str, Any], index: int) -> str:

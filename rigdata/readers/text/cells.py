@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import datetime
 import re
 from collections.abc import Iterator, Sequence
@@ -163,24 +164,17 @@ def _seconds(match: re.Match[str], days: dict[str, float]) -> float:
     *date, hour, minute, second, fraction = match.groups()
     start = 0.0
     if any(date):
-        text = "/".join(part for part in date if part)
+        text = "/".join(filter(None, date))
         if text not in days:
-            days[text] = _start_of_day(date)
+            days[text] = float("nan")
+            year, month, day = (int(part) for part in (date[:3] if date[0] else date[:2:-1]))
+            for month_and_day in ((day, month), (month, day)):  # as it is written; where that is none, month first
+                with contextlib.suppress(ValueError):
+                    days[text] = _DAY * datetime.date(year, *month_and_day).toordinal()
         # counted from the first day: seconds since 1970 would cost the digits below a microsecond
         start = days[text] - next(iter(days.values()))
     fraction_seconds = float(f"0.{fraction}") if fraction else 0.0
     return start + 3600.0 * int(hour) + 60.0 * int(minute) + int(second) + fraction_seconds
-
-
-def _start_of_day(date: Sequence[str]) -> float:
-    """Seconds since 1970 of year, month, day or day, month, year; where that is none, month first."""
-    year, month, day = (int(part) for part in (date[:3] if date[0] else date[:2:-1]))
-    for first, second in ((month, day), (day, month)):
-        try:
-            return (datetime.date(year, first, second) - datetime.date(1970, 1, 1)).total_seconds()
-        except ValueError:
-            continue
-    return float("nan")
 
 
 def _spread(time: FloatArray) -> FloatArray:
