@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -162,44 +163,35 @@ def parse_unit(text: str, dimension: str = "") -> Unit:
     plain = text.strip().translate(_SPELLINGS).replace("°C", "degC").replace("°F", "degF").replace("°", "deg")
     if dimension == "speed" and plain in {"1/s", "s^-1", "s-1", "1/min", "min^-1", "min-1"}:
         plain = "revolution/min" if "min" in plain else "revolution/s"
-    product, sign, needs_name = Unit(1.0), 1, bool(plain)
-    outer: list[tuple[Unit, int]] = []  # products before the open parentheses, and their signs
-    for name, power, symbol, _ in _tokens(plain, text):
-        if needs_name and symbol in ("*", "/", ")"):
-            raise UnitError(f"unit {text!r} has {symbol!r} where a unit name should be")
+    if not plain:
+        return Unit(1.0)
+    pieces = list(_TOKEN.finditer(plain))
+    if "".join(piece[0] for piece in pieces) != plain:
+        raise UnitError(f"unit {text!r} cannot be read")
+    if plain.count("(") != plain.count(")"):
+        raise UnitError(f"unit {text!r} has an unmatched parenthesis")
+    return _product(iter(pieces), text, dimension)
+
+
+def _product(pieces: Iterator[re.Match[str]], text: str, dimension: str) -> Unit:
+    """Product of names, numbers one and parentheses, up to the end or to one that closes."""
+    product, sign, needs_name = Unit(1.0), 1, True
+    for piece in pieces:
+        name, power, symbol, _ = piece.groups("")
+        if symbol == ")":
+            break
         if symbol in ("*", "/"):
+            if needs_name:
+                raise UnitError(f"unit {text!r} has {symbol!r} where a unit name should be")
             sign, needs_name = (-1 if symbol == "/" else 1), True
             continue
-        if symbol == "(":
-            if len(outer) == 2:
-                raise UnitError(f"unit {text!r} has too many parentheses")
-            outer.append((product, sign))
-            product, sign, needs_name = Unit(1.0), 1, True
-            continue
-        factor = _named(name, dimension) ** int(power or 1) if name else Unit(1.0)
-        if symbol == ")":
-            if not outer:
-                raise UnitError(f"unit {text!r} has an unmatched parenthesis")
-            factor = product
-            product, sign = outer.pop()
+        factor = _product(pieces, text, dimension) if symbol else Unit(1.0)
+        if name:
+            factor = _named(name, dimension) ** int(power or 1)
         product, sign, needs_name = product * factor**sign, 1, False
     if needs_name:
         raise UnitError(f"unit {text!r} ends where a unit name should be")
-    if outer:
-        raise UnitError(f"unit {text!r} has an unmatched parenthesis")
     return product
-
-
-def _tokens(plain: str, text: str) -> list[tuple[str, ...]]:
-    """Name, power and symbol of every piece; a plain 1 has none of them."""
-    tokens, at = [], 0
-    while at < len(plain):
-        match = _TOKEN.match(plain, at)
-        if match is None:
-            raise UnitError(f"unit {text!r} cannot be read from {plain[at:].strip()!r} on")
-        tokens.append(match.groups(""))
-        at = match.end()
-    return tokens
 
 
 def _named(name: str, dimension: str) -> Unit:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -45,9 +46,9 @@ def broken_heap(path: Path) -> int | None:
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
         for start, block in _pieces(stream, size):
-            for at in _places(block, _SIGNATURE):
-                if not _is_sound(stream, start + at, size):
-                    return start + at
+            for match in re.finditer(_SIGNATURE, block):
+                if not _is_sound(stream, start + match.start(), size):
+                    return start + match.start()
     return None
 
 
@@ -60,11 +61,10 @@ def too_long_text(path: Path, names: Sequence[str], base: int = 0) -> str | None
         size = stream.seek(0, 2)
         heaps, followers = set[int](), list[tuple[str, bytes]]()
         for start, block in _pieces(stream, size):
-            heaps.update(start + at - base for at in _places(block, _SIGNATURE))
+            heaps.update(start + match.start() - base for match in re.finditer(_SIGNATURE, block))
             for name in names:
-                for at in _places(block, name.encode() + b"\0"):
-                    end = at + len(name)
-                    followers.append((name, block[end : end + _BEHIND]))
+                ends = [match.end() - 1 for match in re.finditer(name.encode() + b"\0", block)]
+                followers += [(name, block[end : end + _BEHIND]) for end in ends]
     for name, piece in followers:
         for place in range(len(piece) - _REFERENCE.size + 1):
             length, address, _ = _REFERENCE.unpack_from(piece, place)
@@ -79,13 +79,6 @@ def _pieces(stream: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
         if not _SCANNED <= start < size - _SCANNED:
             stream.seek(start)
             yield start, stream.read(_PIECE + _NEXT)
-
-
-def _places(block: bytes, wanted: bytes) -> Iterator[int]:
-    at = block.find(wanted)
-    while at >= 0:
-        yield at
-        at = block.find(wanted, at + 1)
 
 
 def _is_sound(stream: BinaryIO, at: int, size: int) -> bool:
