@@ -80,7 +80,7 @@ class Campaign(Description):
 
     def _repr_html_(self) -> str:
         """In a notebook: what it is, and a row per kind of run."""
-        rows = [("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz")]
+        rows: list[tuple[str, ...]] = [("kind", "runs", "load, kN", "shaft, Hz", "excitation, Hz")]
         for kind in dict.fromkeys(run.kind for run in self.runs):
             points = [run.point for run in self.of_kind(kind)]
             columns = zip(*((p.static_load / 1e3, p.shaft_speed_hz, p.excitation_hz) for p in points), strict=True)
@@ -306,21 +306,10 @@ def _assembled(
         except RigDataError as error:
             problems.extend(error.problems)
             continue
-        run = Run(
-            id=entry.id,
-            kind=entry.kind,
-            point=replace(entry.point, rotation=entry.rotation or manifest.rotation),
-            excitation_direction=entry.excitation_direction,
-            pad=entry.pad,
-            branch=entry.branch,
-            channels=channels if own is None else _used(own),
-            stated=entry.stated,
-            reader=reader,
-            excitation_kind=entry.excitation,
-            band=entry.band,
-            temperature=entry.temperature,
-        )
-        runs.append(run)
+        shared = {item.name: getattr(entry, item.name) for item in fields(Run) if hasattr(entry, item.name)}
+        shared |= {"channels": channels if own is None else _used(own), "reader": reader}
+        shared["point"] = replace(entry.point, rotation=entry.rotation or manifest.rotation)
+        runs.append(Run(**shared))
     if any(p.severity == "error" for p in problems):
         raise RigDataError([*manifest.notes, *problems])
     described = {item.name: getattr(manifest, item.name) for item in fields(Description)}

@@ -88,22 +88,24 @@ def planned(
     A time column wins over the channel's stated rate, that over the run's.
     """
     grids: dict[tuple[int, str | float], Grid] = {}
-    lettered = {name for name, channel in channels.items() if channel.clock}
-    untimed = {name: timing for name, timing in timings.items() if not timing.clock}
-    rates = {name: channels[name].sample_rate or 0.0 for name in untimed if name in channels}
     shared: list[Grid] = []  # whose times are those of channels without a clock
+    untimed: dict[str, Grid] = {}
+    rates: dict[str, float] = {}
+    faults: dict[str, str] = {}
     for name, timing in timings.items():
+        channel = channels.get(name)
         if timing.clock:
             grid = grids.setdefault((timing.length, timing.clock), timing)
             grid.channels.append(name)
-            if grid not in shared and (name not in lettered or run_rate is None):
+            if grid not in shared and (channel is None or not channel.clock or run_rate is None):
                 shared.append(grid)
-    counts = Counter(timing.length for name, timing in untimed.items() if not rates.get(name))
+        elif channel is not None and channel.sample_rate:
+            rates[name] = channel.sample_rate
+        else:
+            untimed[name] = timing
+    counts = Counter(timing.length for timing in untimed.values())
     usual = max(counts, key=lambda length: (counts[length], length), default=0)
-    faults: dict[str, str] = {}
     for name, timing in untimed.items():
-        if rates.get(name):
-            continue
         same = [grid for grid in shared if grid.length == timing.length]
         if timing.times is not None:
             faults[name] = f"has {timing.length} samples, its time column {timing.times}"
@@ -115,8 +117,7 @@ def planned(
         else:
             grids.setdefault((usual, ""), Grid(usual, "", run_rate or float("nan"))).channels.append(name)
     for name, rate in rates.items():
-        if rate:
-            faults[name] = _add_stated(grids, channels, name, untimed[name].length, rate)
+        faults[name] = _add_stated(grids, channels, name, timings[name].length, rate)
     return tuple(_own_first(grids.values(), channels)), {name: text for name, text in faults.items() if text}
 
 

@@ -101,8 +101,8 @@ class Field:
 
 TOP = (
     Field("schema", "choice", "name of the format", '"tpjb-rig/1"', required=True, choices=(SCHEMA,)),
-    Field("id", "text", "name of the campaign", '"rocker-A"', required=True),
-    Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', required=True),
+    Field("id", "text", "name of the campaign", '"rocker-A"', "", required=True),
+    Field("bearing", "text", "bearing file in the folder; HDF5: root attribute", '"rocker.toml"', "", required=True),
     Field("description", "text", "free text", '"after overhaul"', default=""),
     Field("date", "text", "when it was measured", '"2026-03-12"', default=""),
     Field("by", "text", "laboratory and person", '"TU Chemnitz, K. Sato"', default=""),

@@ -58,7 +58,7 @@ class RunEntry:
     sample_rate: float | None
     stated: frozenset[str]
     index: int
-    excitation: str = "sine"
+    excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
     rotation: str | None = None
     temperature: float | None = None
@@ -90,15 +90,13 @@ def _read_runs(top: Table) -> tuple[RunEntry, ...]:
 
 
 def _read_run(table: Table, index: int) -> RunEntry | None:
-    values = table.read(RUN, "[[runs]]")
+    needed = _NEEDED.get(str(table.data.get("kind")), ())
+    if table.data.get("excitation", "sine") != "sine":
+        needed = tuple(key.replace("excitation_frequency", "excitation_band") for key in needed)
+    values = table.read(RUN, "[[runs]]", needed)
     name, kind = values["id"], values["kind"]
     if name is not None and not _ID.fullmatch(name):
         table.error("id", f"run id {shown(name)} cannot be used", "Use letters, digits, '-', '_' and '.'")
-    for key in _NEEDED.get(kind, ()):
-        if key == "excitation_frequency" and values["excitation"] != "sine":
-            key = "excitation_band"
-        if key not in table.data:
-            table.error(key, f"{key} is missing in a {kind} run", f"Add {key} to this run")
     band = _band(table, values["excitation_band"])
     if name is None or kind is None:
         return None
@@ -109,7 +107,8 @@ def _read_run(table: Table, index: int) -> RunEntry | None:
         excitation=values["excitation_frequency"],
     )
     plain = {key: value for key, value in values.items() if key in RunEntry.__dataclass_fields__}
-    return RunEntry(**plain, point=point, stated=frozenset(table.data), index=index, band=band)
+    plain |= {"excitation_kind": values["excitation"], "stated": frozenset(table.data)}
+    return RunEntry(**plain, point=point, index=index, band=band)
 
 
 def _band(table: Table, text: str | None) -> tuple[float, float] | None:
@@ -181,9 +180,8 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
     acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")
     manifest = Manifest(
-        id=header["id"] or "",
-        bearing_name=header["bearing"] or "",
-        description=header["description"],
+        **{key: header[key] for key in ("id", "description", "date", "by")},
+        bearing_name=header["bearing"],
         housing_mass=housing["mass"],
         sample_rate=acquisition["sample_rate"],
         csv=_read_csv(top.subtable("csv")),
@@ -194,8 +192,6 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         mains=acquisition["mains"],
         rotation=top.subtable("shaft").read(SHAFT, "[shaft]")["rotation"],
         mount=housing["mount"],
-        date=header["date"],
-        by=header["by"],
         described=described,
     )
     if findings.errors:

@@ -190,29 +190,29 @@ def table(contents: Contents, record: RecordFile) -> Contents:
     for i in clocks:
         series[i] = replace(series[i], unit=time_unit(names[i], series[i].unit))
     for i, clock in enumerate(serving(names, clocks, channels)):
+        if i in clocks:
+            groups[i] += [i] if names[i] in channels else []
+            continue
         if clock is not None and len(series[clock]) != len(series[i]):
             clock = next((other for other in clocks if len(series[other]) == len(series[i])), None)
-        if i not in groups:
-            groups[clock if series[i].time is None else None].append(i)
-        elif names[i] in channels:
-            groups[i].append(i)
-    rest = [series[i] for i in groups[None] if series[i].time is None]
-    is_shared = len(clocks) == 1 and not any(len(column) == len(series[clocks[0]]) for column in rest)
-    placed = {i: series[i] for i in groups.pop(None)}
+        groups[clock if series[i].time is None else None].append(i)
+    lengths = {len(series[i]) for i in groups.pop(None) if series[i].time is None}
+    is_shared = len(clocks) == 1 and len(series[clocks[0]]) not in lengths
+    dropped = set(clocks)
     for clock, members in groups.items():
         column = series[clock or 0]
         known = channels.get(column.name)
         time = seconds(column) if known is None else known.to_si(column.values)
-        label = "" if is_shared else column.name
         rows = slice(None) if is_shared else _filled_rows([time, *(series[i].values for i in members)])
         time = time[rows]
         usable = np.flatnonzero(np.abs(time) < OVERFLOW)
         if len(usable) not in (0, len(time)):  # missing times are set between their neighbours
             time = np.interp(np.arange(len(time)), usable, time[usable])
         for i in members:
-            values = to_temporary_file(series[i].values[rows])
-            placed[i] = replace(series[i], values=values, time=time, group=label or series[i].group)
-    ordered = [placed[i] for i in sorted(placed)]
+            values, group = to_temporary_file(series[i].values[rows]), series[i].group
+            series[i] = replace(series[i], values=values, time=time, group=group if is_shared else column.name or group)
+        dropped -= set(members)
+    ordered = [column for i, column in enumerate(series) if i not in dropped]
     if is_shared or not clocks:
         ordered = _slow_columns(ordered, record)
     return replace(contents, series=ordered, clocks={names[i]: series[i].unit for i in clocks})

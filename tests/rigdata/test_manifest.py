@@ -126,7 +126,7 @@ def test_the_example_of_the_format():
         ('static_load = "5 kN"', "static_load = 5000", [LINE, "no unit"]),
         ('static_load = "5 kN"', 'static_load = "1e400 N"', ["finite"]),
         ('static_load = "5 kN"', 'static_load = "nan N"', ["not a number"]),
-        ('static_load = "5 kN"\n', "", ["static_load is missing in a dynamic run"]),
+        ('static_load = "5 kN"\n', "", ["static_load is missing"]),
         ('sample_rate = "2 kHz"', 'sample_rate = "0 Hz"', [LINE, "above 0"]),
         ('sample_rate = "2 kHz"', 'sample_rate = "-2 kHz"', [LINE, "above 0"]),
         ('sample_rate = "2 kHz"', 'sample_rate = "2 kg"', [LINE, "not one of frequency"]),

@@ -18,7 +18,7 @@ from rigdata.readers.series import Series, equidistant, is_time, seconds, to_tem
 #: Function types of data set 58 that are records over time.
 _GENERAL, _TIME_RESPONSE = 0, 1
 #: Directions of data set 58 by their numbers.
-_DIRECTIONS = {1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
+_DIRECTIONS: dict[Any, str] = {1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
 
 
 def read_tdms(path: Path) -> list[Series]:
