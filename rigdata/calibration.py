@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -247,6 +247,10 @@ class Channel:
         values *= self.slope
         values += self.zero
         return values
+
+
+#: Channels by name.
+Channels = Mapping[str, Channel]
 
 
 def reading_gain(

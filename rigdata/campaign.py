@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from rigdata.calibration import Channel
+from rigdata.calibration import Channel, Channels
 from rigdata.manifest.manifest import MAX_MANIFEST, Description, Manifest, RunEntry, parse_manifest
 from rigdata.near_names import nearest_name
 from rigdata.problem import Problem, RigDataError, refuse
@@ -225,7 +225,7 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
     cache = ReadingCache()
 
-    def reader_of(entry: RunEntry, rate: float | None, channels: Mapping[str, Channel]) -> RunReader:
+    def reader_of(entry: RunEntry, rate: float | None, channels: Channels) -> RunReader:
         place = f"[[runs]] no. {entry.index + 1} file"
         target = inside(folder, entry.file, manifest_path.name, place, entry.id)
         files[entry.file] = target
@@ -274,7 +274,7 @@ def _load_hdf5(path: Path) -> Campaign:
         problems.append(Problem("warning", path.name, "root attribute bearing", "is missing or too long", cure))
         bearing = ""
 
-    def reader_of(entry: RunEntry, rate: float | None, channels: Mapping[str, Channel]) -> RunReader:
+    def reader_of(entry: RunEntry, rate: float | None, channels: Channels) -> RunReader:
         return Hdf5Reader(path, f"{path.name}:/runs/{entry.id}", entry.id, channels, rate)
 
     return _assembled(manifest, reader_of, problems, path=path, bearing_text=bearing, files=files)
@@ -292,7 +292,7 @@ def _named_file(folder: Path, file: str, files: dict[str, Path]) -> Callable[[st
 
 def _assembled(
     manifest: Manifest,
-    reader_of: Callable[[RunEntry, float | None, Mapping[str, Channel]], RunReader],
+    reader_of: Callable[[RunEntry, float | None, Channels], RunReader],
     problems: list[Problem],
     **source: Any,
 ) -> Campaign:
@@ -317,5 +317,5 @@ def _assembled(
     return Campaign(**described, runs=tuple(runs), **source)
 
 
-def _used(channels: Mapping[str, Channel]) -> dict[str, Channel]:
+def _used(channels: Channels) -> dict[str, Channel]:
     return {name: channel for name, channel in channels.items() if channel.quantity != "ignore"}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import Channels
 
 #: Share by which a stated rate may miss that of the samples.
 RATE_MISS = 0.01
@@ -81,7 +81,7 @@ def timed_grid(length: int, clock: str, time: FloatArray, label: str, stated: fl
 
 
 def planned(
-    timings: Mapping[str, Grid], channels: Mapping[str, Channel], run_rate: float | None
+    timings: Mapping[str, Grid], channels: Channels, run_rate: float | None
 ) -> tuple[tuple[Grid, ...], dict[str, str]]:
     """What is sampled together, the run's own device first; and why a channel has no usable times.
 
@@ -123,7 +123,7 @@ def planned(
 
 def _add_stated(
     grids: dict[tuple[int, str | float], Grid],
-    channels: Mapping[str, Channel],
+    channels: Channels,
     name: str,
     length: int,
     rate: float,
@@ -144,13 +144,13 @@ def _add_stated(
     return ""
 
 
-def first_probe_first(channels: Mapping[str, Channel]) -> list[str]:
+def first_probe_first(channels: Channels) -> list[str]:
     """Names of channels, displacements first: the first of those there is belongs to the run's own device."""
     used = {name: c.quantity for name, c in channels.items() if c.quantity not in _NO_DATA}
     return sorted(used, key=lambda name: used[name] != "displacement")
 
 
-def _own_first(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> list[Grid]:
+def _own_first(grids: Iterable[Grid], channels: Channels) -> list[Grid]:
     """The grid of the first displacement channel first; without any described channel the fastest."""
     places = {name: i for i, name in enumerate(first_probe_first(channels))}
 
@@ -161,7 +161,7 @@ def _own_first(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> list[G
     return sorted(grids, key=rank)
 
 
-def by_clock(grids: Iterable[Grid], channels: Mapping[str, Channel]) -> tuple[Device, ...]:
+def by_clock(grids: Iterable[Grid], channels: Channels) -> tuple[Device, ...]:
     """Devices of a run: grids split by clock, that of the first probe first."""
     order = first_probe_first(channels)
     parts: list[tuple[str, Device]] = []

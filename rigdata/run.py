@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import Channel
+from rigdata.calibration import Channel, Channels
 from rigdata.device import Device
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import RigDataError, refuse
@@ -60,7 +60,7 @@ class Run:
     excitation_direction: float | None
     pad: int | None
     branch: str
-    channels: Mapping[str, Channel] = field(repr=False)
+    channels: Channels = field(repr=False)
     stated: frozenset[str] = field(repr=False)
     reader: RunReader = field(repr=False, compare=False)
     excitation_kind: str = "sine"

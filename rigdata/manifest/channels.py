@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from rigdata.calibration import (
     VECTOR_QUANTITIES,
     Channel,
     ChannelResponse,
+    Channels,
     parse_filter,
     parse_response_table,
     reading_gain,
@@ -141,9 +142,7 @@ def _calibration(table: Table, quantity: str, unit: str) -> dict[str, float]:
     return values
 
 
-def channels_by_run(
-    table: Table, channels: Mapping[str, Channel], runs: Sequence[str]
-) -> dict[str, Mapping[str, Channel]]:
+def channels_by_run(table: Table, channels: Channels, runs: Sequence[str]) -> dict[str, Channels]:
     """Channels of the runs that describe one otherwise; what is wrong is noted."""
     findings = table.findings
     _check_together(channels, findings)
@@ -152,8 +151,8 @@ def channels_by_run(
     for name in channels:
         for run, entry in _entries(table.subtable(name), runs, budget):
             entries.setdefault(run, []).append((name, entry))
-    described: dict[str, Mapping[str, Channel]] = {}
-    known: dict[tuple[int, ...], Mapping[str, Channel]] = {}
+    described: dict[str, Channels] = {}
+    known: dict[tuple[int, ...], Channels] = {}
     for run, changes in entries.items():
         key = tuple(id(entry) for _, entry in changes)
         if key not in known:
@@ -197,9 +196,7 @@ def _matching(entry: Table, runs: Sequence[str], budget: Iterator[int]) -> set[s
     return named
 
 
-def _changed(
-    table: Table, channels: Mapping[str, Channel], changes: Sequence[tuple[str, Table]]
-) -> Mapping[str, Channel]:
+def _changed(table: Table, channels: Channels, changes: Sequence[tuple[str, Table]]) -> Channels:
     """All channels of a run, some with other entries: the last one counts, key by key."""
     merged: dict[str, Table] = {}
     for name, entry in changes:
@@ -215,7 +212,7 @@ def _changed(
     return described
 
 
-def _check_together(channels: Mapping[str, Channel], findings: Findings) -> None:
+def _check_together(channels: Channels, findings: Findings) -> None:
     """Note clocks with two time columns or without a channel, and quantities in more than two planes."""
     used = [channel for channel in channels.values() if channel.quantity != "ignore"]
     clocks = {channel.clock for channel in used if channel.quantity != "time"}

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigdata.calibration import Channel
+from rigdata.calibration import Channels
 from rigdata.manifest.channels import channels_by_run, read_channels
 from rigdata.manifest.fields import (
     ACQUISITION,
@@ -145,7 +145,7 @@ class Description:
     description: str
     bearing_name: str
     housing_mass: float
-    channels: Mapping[str, Channel] = field(repr=False)
+    channels: Channels = field(repr=False)
     notes: tuple[Problem, ...] = field(repr=False)
     mass_uncertainty: float
     mains: float | None
@@ -162,7 +162,7 @@ class Manifest(Description):
     sample_rate: float | None
     csv: CsvSpec
     runs: tuple[RunEntry, ...] = field(repr=False)
-    described: Mapping[str, Mapping[str, Channel]] = field(repr=False)  #: by run, if other
+    described: Mapping[str, Channels] = field(repr=False)  #: by run, if other
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:

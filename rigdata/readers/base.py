@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rigdata.arrays import FloatArray
-from rigdata.calibration import DIMENSIONS, Channel
+from rigdata.calibration import DIMENSIONS, Channel, Channels
 from rigdata.device import Device, Grid, by_clock, planned
 from rigdata.manifest.manifest import CsvSpec
 from rigdata.near_names import nearest_name
@@ -57,7 +57,7 @@ class RecordFile:
     path: Path
     file: str
     run: str | None = None
-    channels: Mapping[str, Channel] = field(default_factory=dict, repr=False)
+    channels: Channels = field(default_factory=dict, repr=False)
     stated_rate: float | None = None
     spec: CsvSpec = field(default_factory=CsvSpec)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigdata.arrays import BoolArray, FloatArray
-from rigdata.calibration import OVERFLOW, Channel
+from rigdata.calibration import OVERFLOW, Channels
 from rigdata.device import RATE_MISS, rate_of_time
 from rigdata.problem import Problem
 from rigdata.readers.base import RecordFile
@@ -150,13 +150,13 @@ def seconds(column: Series) -> FloatArray:
         return column.values * TIME_FACTORS.get(time_unit(column.name, column.unit), 1.0)
 
 
-def time_columns(names: Sequence[str], channels: Mapping[str, Channel]) -> list[int]:
+def time_columns(names: Sequence[str], channels: Channels) -> list[int]:
     """Places of the time columns: those described as such, else those named like one that nobody describes."""
     described = [i for i, name in enumerate(names) if name in channels and channels[name].quantity == "time"]
     return described or [i for i, n in enumerate(names) if n not in channels and is_time(n.rpartition(".")[2])]
 
 
-def serving(names: Sequence[str], clocks: Sequence[int], channels: Mapping[str, Channel]) -> list[int | None]:
+def serving(names: Sequence[str], clocks: Sequence[int], channels: Channels) -> list[int | None]:
     """Place of every column's time column: of the clock that it states, else the nearest without one to its left."""
     letters: dict[str, int] = {}
     plain: list[int] = []
@@ -174,7 +174,7 @@ def serving(names: Sequence[str], clocks: Sequence[int], channels: Mapping[str, 
     return served
 
 
-def _letter(name: str, channels: Mapping[str, Channel]) -> str:
+def _letter(name: str, channels: Channels) -> str:
     return channels[name].clock if name in channels else ""
 
 

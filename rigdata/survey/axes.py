@@ -7,14 +7,14 @@ and mirrored where the second is clockwise from it: directions that are known te
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.readers.series import Series
-from rigdata.survey.channels import ChannelGuess, Entry
+from rigdata.survey.channels import Entry, Guesses
 
 #: Directions further off than this in the mean [deg] are not what these two sensors see: no proposal.
 _MOST_OFF = 12.0
@@ -24,11 +24,15 @@ _MIRROR = 3.0
 _MOUNTED, _NEAR = 15.0, 2.0
 
 
+#: Names of two sensors of a kind.
+Pair = tuple[str, str]
+
+
 @dataclass(frozen=True)
 class Frame:
     """Two sensors of a kind: names, where the first points [rad], and the sense in which the second follows."""
 
-    names: tuple[str, str]
+    names: Pair
     angle: float
     sense: int
     source: str
@@ -40,7 +44,7 @@ class Frame:
         return self.angle + self.sense * np.arctan2(readings[..., 1], readings[..., 0])
 
 
-def pairs(channels: Mapping[str, ChannelGuess], quantity: str) -> list[tuple[str, str]]:
+def pairs(channels: Guesses, quantity: str) -> list[Pair]:
     """Channels of a quantity and unit, two by two as they follow each other."""
     names: dict[str, list[str]] = {}
     for name, guess in channels.items():
@@ -49,7 +53,7 @@ def pairs(channels: Mapping[str, ChannelGuess], quantity: str) -> list[tuple[str
     return [pair for alike in names.values() for pair in zip(alike[::2], alike[1::2], strict=False)]
 
 
-def stated_frame(pair: tuple[str, str], channels: Mapping[str, ChannelGuess]) -> Frame | None:
+def stated_frame(pair: Pair, channels: Guesses) -> Frame | None:
     """The frame of two sensors whose axes are in the manifest, or which their names hint at."""
     first, second = (channels[name] for name in pair)
     if first.typed and second.typed:
@@ -64,7 +68,7 @@ def stated_frame(pair: tuple[str, str], channels: Mapping[str, ChannelGuess]) ->
 
 
 def fitted_frame(
-    pair: tuple[str, str], readings: FloatArray, directions: FloatArray, reason: str, most: float = _MOST_OFF
+    pair: Pair, readings: FloatArray, directions: FloatArray, reason: str, most: float = _MOST_OFF
 ) -> Frame | None:
     """Fit the frame of two sensors to readings (n, 2) of known directions (n,) [rad]; None where they contradict."""
     if len(readings) < 2:
@@ -83,7 +87,7 @@ def fitted_frame(
     return Frame(pair, angle, sense, "records", reason, residual / math.sqrt(len(readings)))
 
 
-def with_axes(channels: dict[str, ChannelGuess], frame: Frame, source: str = "") -> None:
+def with_axes(channels: Guesses, frame: Frame, source: str = "") -> None:
     """Give two channels the axes of their frame: 0 to 180 deg, and the sign as a polarity; guesses if `source` is."""
     for number, name in enumerate(frame.names):
         if channels[name].typed:

@@ -76,6 +76,12 @@ class ChannelGuess:
     sign: int = 0  #: polarity that stands in the manifest
 
 
+#: What channels may be, by name.
+Guesses = dict[str, ChannelGuess]
+#: Tables of a manifest, by channel.
+Tables = Mapping[str, Mapping[str, Any]]
+
+
 def guess_channel(name: str, unit: str) -> ChannelGuess:
     """Guess what a channel measures, by its unit first."""
     parts = _UNIT_IN_NAME.match(name.strip())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from rigdata.readers.file_reader import read_contents
 from rigdata.readers.series import TIME_FACTORS, Series, with_unique_names
 from rigdata.readers.text.head import find_head
 from rigdata.safe_path import inside
-from rigdata.survey.channels import Entry
+from rigdata.survey.channels import Entry, Tables
 
 _MOST_FILES = 5000
 #: Slower records of a whole folder are none of a turning shaft [Hz].
@@ -83,9 +82,7 @@ def read_export(path: Path, name: str | None = None, names: Sequence[str] = ()) 
     return Export(record.file, series, clocks, nameless)
 
 
-def in_seconds(
-    exports: Sequence[Export], described: Mapping[str, Mapping[str, Any]]
-) -> tuple[list[Export], dict[str, Entry]]:
+def in_seconds(exports: Sequence[Export], described: Tables) -> tuple[list[Export], dict[str, Entry]]:
     """Exports and the units of their time columns; one that the file does not state is the manifest's, or guessed.
 
     Nobody records a rig slower than the shaft turns: times that would say so are thousandths or millionths.

@@ -5,15 +5,15 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigdata.readers.series import Series
-from rigdata.survey.channels import OPEN, PAD, ChannelGuess, Entry, usable_unit
+from rigdata.survey.channels import OPEN, PAD, Entry, Guesses, usable_unit
 from rigdata.survey.exports import Export
-from rigdata.survey.spectrum import SpectralPeak, amplitude_spectrum, strongest
+from rigdata.survey.spectrum import Peaks, amplitude_spectrum, strongest
 from rigdata.units import UnitError, unit_factor
 
 #: Share of slow movement above which a record is a quasi-static test, and of one direction for load steps.
@@ -42,7 +42,7 @@ class RunGuess:
 
     export: Export = field(repr=False)
     kind: Entry
-    lines: tuple[SpectralPeak, ...] = ()
+    lines: Peaks = ()
     load: Entry = OPEN
     load_text: str = ""
     direction: Entry = OPEN
@@ -56,7 +56,7 @@ class RunGuess:
         return self.export.name
 
 
-def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
+def guess_run(export: Export, channels: Guesses) -> RunGuess:
     """Guess what a record is, as far as it tells alone."""
     forces = of_quantity(export, channels, "force")
     moves = of_quantity(export, channels, "displacement")
@@ -78,12 +78,12 @@ def guess_run(export: Export, channels: Mapping[str, ChannelGuess]) -> RunGuess:
     )
 
 
-def of_quantity(export: Export, channels: Mapping[str, ChannelGuess], quantity: str) -> list[Series]:
+def of_quantity(export: Export, channels: Guesses, quantity: str) -> list[Series]:
     """Channels of a record that measure a quantity."""
     return [s for s in export.series if channels[s.name].quantity.value == quantity]
 
 
-def _kind(stem: str, forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> Entry:
+def _kind(stem: str, forces: list[Series], moves: list[Series], lines: Peaks) -> Entry:
     """Movement beats a misleading name, but a name tells a constant load from none."""
     named = next((kind for kind, pattern in _BY_NAME if re.search(pattern, stem, re.IGNORECASE)), "")
     movement, why = _by_movement(forces, moves, lines)
@@ -115,7 +115,7 @@ def _load_of(stem: str) -> tuple[Entry, str]:
     return OPEN, ""
 
 
-def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> Entry:
+def _speed(export: Export, channels: Guesses, stem: str) -> Entry:
     """Shaft speed [Hz] by a tachometer in engineering units, else by the file's name."""
     for series in of_quantity(export, channels, "speed"):
         guess = channels[series.name]
@@ -128,14 +128,14 @@ def _speed(export: Export, channels: Mapping[str, ChannelGuess], stem: str) -> E
     return Entry(turns[0] / 60.0, "file") if turns else OPEN
 
 
-def _stated_frequency(stem: str, lines: tuple[SpectralPeak, ...]) -> Entry:
+def _stated_frequency(stem: str, lines: Peaks) -> Entry:
     """Frequency [Hz] that a file's name states and one of the record's lines confirms."""
     frequencies = [abs(f) for f in _numbers_before(stem, "Hz")]
     confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
     return Entry(confirmed[0], "file") if len(confirmed) == 1 else OPEN
 
 
-def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[SpectralPeak, ...]) -> tuple[str, str]:
+def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tuple[str, str]:
     pair = [s for s in forces if s.rate > 0][:2] or [s for s in moves if s.rate > 0][:2]
     if not pair:
         return "", ""
@@ -159,9 +159,9 @@ def _by_movement(forces: list[Series], moves: list[Series], lines: tuple[Spectra
     return ("dynamic", "the force oscillates") if lines else ("locus", "the force is constant")
 
 
-def strongest_lines(channels: Sequence[Series]) -> tuple[SpectralPeak, ...]:
+def strongest_lines(channels: Sequence[Series]) -> Peaks:
     """Lines of the channel that oscillates most, strongest first."""
-    best: tuple[SpectralPeak, ...] = ()
+    best: Peaks = ()
     for series in channels:
         frequency, amplitude = amplitude_spectrum(series.values, series.rate)
         peaks = strongest(frequency, amplitude, most=4)

@@ -23,6 +23,10 @@ class SpectralPeak:
     amplitude: float
 
 
+#: Lines of a spectrum, strongest first.
+Peaks = tuple[SpectralPeak, ...]
+
+
 @dataclass(frozen=True)
 class Look:
     """What a first look at a channel shows."""
@@ -35,7 +39,7 @@ class Look:
     high: float
     frequency: FloatArray = field(repr=False)  #: (m,) each: Hz, unit of the signal
     amplitude: FloatArray = field(repr=False)
-    lines: tuple[SpectralPeak, ...] = ()
+    lines: Peaks = ()
 
     @property
     def flat(self) -> bool:
@@ -83,7 +87,7 @@ def amplitude_spectrum(values: FloatArray, rate: float) -> tuple[FloatArray, Flo
     return np.asarray(np.fft.rfftfreq(n, 1.0 / rate), dtype=np.float64), amplitude
 
 
-def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> tuple[SpectralPeak, ...]:
+def strongest(frequency: FloatArray, amplitude: FloatArray, most: int) -> Peaks:
     """The strongest peaks well above their neighbourhood; slow drift below four bins is no line."""
     peaks: list[SpectralPeak] = []
     if len(amplitude) < 16:

@@ -14,6 +14,7 @@ from rigdata.manifest.fields import MAINS_FREQUENCIES
 from rigdata.readers.series import Series
 from rigdata.survey.axes import (
     Frame,
+    Pair,
     along,
     fitted_frame,
     folded,
@@ -23,7 +24,15 @@ from rigdata.survey.axes import (
     stated_frame,
     with_axes,
 )
-from rigdata.survey.channels import OPEN, ChannelGuess, Entry, as_described, guess_channel, quantity_of_unit
+from rigdata.survey.channels import (
+    OPEN,
+    Entry,
+    Guesses,
+    Tables,
+    as_described,
+    guess_channel,
+    quantity_of_unit,
+)
 from rigdata.survey.exports import Export, in_seconds
 from rigdata.survey.runs import NEAR, RunGuess, guess_run, of_quantity, strongest_lines
 
@@ -50,7 +59,7 @@ class Survey:
     """What was found in a folder of exports."""
 
     rates: tuple[float, ...]
-    channels: dict[str, ChannelGuess]
+    channels: Guesses
     runs: tuple[RunGuess, ...]
     clocks: dict[str, Entry] = field(default_factory=dict)  #: unit of every time column, by name
     nameless: int = 0
@@ -59,7 +68,7 @@ class Survey:
 
 def survey(
     exports: Sequence[Export],
-    described: Mapping[str, Mapping[str, Any]] | None = None,
+    described: Tables | None = None,
     pivots: Sequence[float] = (),
 ) -> Survey:
     """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
@@ -82,11 +91,9 @@ def survey(
 class _Folder:
     """Channels and runs, of which more is known with every step; `cells` is the frame of the load cells."""
 
-    def __init__(
-        self, exports: Sequence[Export], described: Mapping[str, Mapping[str, Any]], pivots: Sequence[float]
-    ) -> None:
+    def __init__(self, exports: Sequence[Export], described: Tables, pivots: Sequence[float]) -> None:
         self.pivots = np.asarray(pivots, dtype=float)
-        self.channels: dict[str, ChannelGuess] = {}
+        self.channels: Guesses = {}
         for export in exports:
             for series in export.series:
                 if series.name not in self.channels:
@@ -95,14 +102,14 @@ class _Folder:
         self.runs = [guess_run(export, self.channels) for export in exports]
         self.cells = self._frame_of_cells()
 
-    def _with(self, kinds: Sequence[str], *names: tuple[str, str]) -> Iterator[tuple[RunGuess, list[list[Series]]]]:
+    def _with(self, kinds: Sequence[str], *names: Pair) -> Iterator[tuple[RunGuess, list[list[Series]]]]:
         """Runs of some kinds that have these pairs of channels, with their records."""
         for run in self.runs:
             found = [_pair(run, pair) for pair in names]
             if run.kind.value in kinds and all(found):
                 yield run, found
 
-    def _steps(self, names: tuple[str, str]) -> dict[str, FloatArray]:
+    def _steps(self, names: Pair) -> dict[str, FloatArray]:
         """By how much two channels change from the first to the last step of every dry test, by the run's file."""
         steps = {}
         for run, (series,) in self._with(["dry_pivot"], names):
@@ -195,7 +202,7 @@ class _Folder:
             if frame is not None:
                 with_axes(self.channels, frame, cells.source)
 
-    def _of_dry_steps(self, pair: tuple[str, str], cells: Frame) -> Iterator[_Evidence]:
+    def _of_dry_steps(self, pair: Pair, cells: Frame) -> Iterator[_Evidence]:
         """How two probes move in dry tests, and where the shaft then lies on the pads."""
         forces = self._steps(cells.names)
         steps = {file: step for file, step in self._steps(pair).items() if file in forces}
@@ -208,7 +215,7 @@ class _Folder:
             apart = np.exp(1j * directions) - np.exp(1j * directions).mean()
             yield places - places.mean(axis=0), np.angle(apart), f"where {len(steps)} dry steps end"
 
-    def _of_excitation(self, pair: tuple[str, str], cells: Frame) -> _Evidence:
+    def _of_excitation(self, pair: Pair, cells: Frame) -> _Evidence:
         """How two accelerometers move: the housing gives way to the force on its cells along the excitation."""
         readings, directions = [], []
         for run, (housing, forces) in self._with(["dynamic"], pair, cells.names):
@@ -265,7 +272,7 @@ class _Folder:
         return OPEN
 
 
-def _pair(run: RunGuess, names: tuple[str, str]) -> list[Series]:
+def _pair(run: RunGuess, names: Pair) -> list[Series]:
     """The two channels of a record; empty where one is missing or both never move."""
     series = {s.name: s for s in run.export.series}
     chosen = [series[name] for name in names if name in series]
