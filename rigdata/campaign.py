@@ -9,7 +9,7 @@ import os
 import stat
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -66,9 +66,9 @@ class Campaign(Description):
     """
 
     path: Path
-    bearing_text: str = field(repr=False)
-    runs: tuple[Run, ...] = field(repr=False)
-    files: Mapping[str, Path] = field(repr=False)
+    bearing_text: str
+    runs: tuple[Run, ...]
+    files: Mapping[str, Path]
 
     def __str__(self) -> str:
         counts = Counter(run.kind for run in self.runs)

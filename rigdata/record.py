@@ -38,8 +38,8 @@ class Record:
 
     name: str
     quantity: str
-    values: FloatArray = field(repr=False)
-    time: FloatArray = field(repr=False)
+    values: FloatArray
+    time: FloatArray
     rate: float
     axis: float | None = None
 

@@ -60,9 +60,9 @@ class Run:
     excitation_direction: float | None
     pad: int | None
     branch: str
-    channels: Channels = field(repr=False)
-    stated: frozenset[str] = field(repr=False)
-    reader: RunReader = field(repr=False, compare=False)
+    channels: Channels
+    stated: frozenset[str]
+    reader: RunReader = field(compare=False)
     excitation_kind: str = "sine"
     band: tuple[float, float] | None = None
     temperature: float | None = None

@@ -6,7 +6,7 @@ import codecs
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from rigdata.calibration import Channels
@@ -145,8 +145,8 @@ class Description:
     description: str
     bearing_name: str
     housing_mass: float
-    channels: Channels = field(repr=False)
-    notes: tuple[Problem, ...] = field(repr=False)
+    channels: Channels
+    notes: tuple[Problem, ...]
     mass_uncertainty: float
     mains: float | None
     rotation: str
@@ -161,8 +161,8 @@ class Manifest(Description):
 
     sample_rate: float | None
     csv: CsvSpec
-    runs: tuple[RunEntry, ...] = field(repr=False)
-    described: Mapping[str, Channels] = field(repr=False)  #: by run, if other
+    runs: tuple[RunEntry, ...]
+    described: Mapping[str, Channels]  #: by run, if other
 
 
 def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | None = None) -> Manifest:

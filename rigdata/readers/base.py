@@ -70,11 +70,12 @@ class RecordFile:
         return Problem(severity, self.file, place, fault, remedy, self.run)
 
 
-def refuse_claim(claimed: int, size: int, file: str) -> None:
-    """Refuse a file of `size` bytes whose headers claim far more than it can hold, before any of it is read."""
+def refuse_claim(claimed: int, path: Path) -> None:
+    """Refuse a file whose headers claim far more bytes than it can hold, before any of it is read."""
+    size = path.stat().st_size
     if claimed > CLAIM_FREE + CLAIM_MULTIPLES * size:
         fault = f"claims {claimed / 1e6:.0f} MB of samples in a file of {size / 1e6:.3g} MB"
-        raise refuse(file, "", fault, "Copy it again from the logger, or split the run")
+        raise refuse(path.name, "", fault, "Copy it again from the logger, or split the run")
 
 
 @dataclass(frozen=True)

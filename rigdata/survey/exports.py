@@ -27,7 +27,7 @@ class Export:
     """One record file as it was found."""
 
     name: str
-    series: tuple[Series, ...] = field(repr=False)
+    series: tuple[Series, ...]
     clocks: Mapping[str, str] = field(default_factory=dict)  #: unit of every time column, by name; "" if not stated
     nameless: int = 0
 

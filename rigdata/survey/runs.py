@@ -6,7 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,7 +40,7 @@ _BY_NAME = (
 class RunGuess:
     """What a record may be; loads [N] with their text in the manifest, directions in degrees, frequencies in Hz."""
 
-    export: Export = field(repr=False)
+    export: Export
     kind: Entry
     lines: Peaks = ()
     load: Entry = OPEN

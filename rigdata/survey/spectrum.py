@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,8 +37,8 @@ class Look:
     deviation: float
     low: float
     high: float
-    frequency: FloatArray = field(repr=False)  #: (m,) each: Hz, unit of the signal
-    amplitude: FloatArray = field(repr=False)
+    frequency: FloatArray  #: (m,) each: Hz, unit of the signal
+    amplitude: FloatArray
     lines: Peaks = ()
 
     @property

@@ -39,9 +39,9 @@ class MotionLine:
 class Motion:
     """What shaft and housing do in one run, to be sampled at any time: a mean state, and spectral lines on it."""
 
-    time: FloatArray = field(repr=False)  #: (n,), s: of the samples
-    position: FloatArray = field(repr=False)  #: (2,) or, of a quasi-static test, (n, 2): m
-    load: FloatArray = field(repr=False)  #: the same, N
+    time: FloatArray  #: (n,), s: of the samples
+    position: FloatArray  #: (2,) or, of a quasi-static test, (n, 2): m
+    load: FloatArray  #: the same, N
     temperature: FloatArray  #: (n_pads,), degC
     facts: Mapping[str, object]
     lines: tuple[MotionLine, ...] = ()

@@ -35,8 +35,8 @@ class Glitch:
 class Readings:
     """What the recorder gets: one array (n,) per channel in the channel's own unit, and the times (n,) [s]."""
 
-    time: FloatArray = field(repr=False)
-    columns: dict[str, FloatArray] = field(repr=False)
+    time: FloatArray
+    columns: dict[str, FloatArray]
     rate: float
 
 
@@ -212,8 +212,8 @@ class SimulatedRun:
     """One record, and what is in it."""
 
     run: PlannedRun
-    readings: Readings = field(repr=False)
-    motion: Motion = field(repr=False)
+    readings: Readings
+    motion: Motion
     glitches: tuple[Glitch, ...] = ()
     source: str = ""
 

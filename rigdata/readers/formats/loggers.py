@@ -41,7 +41,7 @@ def read_tdms(path: Path) -> list[Series]:
         samples = 0
         for group in file.groups():
             samples += sum(len(channel) for channel in group.channels())
-        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
+        refuse_claim(SAMPLE * samples, path)
         for group in file.groups():
             channels = [c for c in group.channels() if np.issubdtype(c.dtype or object, np.number)]
             clock = next((c for c in channels if is_time(c.name) and len(c)), None)
@@ -144,7 +144,7 @@ def mdf_in_sandbox(path: Path) -> list[Series]:
     series = []
     with MDF(path) as file:
         samples = sum(group.channel_group.cycles_nr * len(group.channels) for group in file.groups)
-        refuse_claim(SAMPLE * samples, path.stat().st_size, path.name)
+        refuse_claim(SAMPLE * samples, path)
         for signal in file.iter_channels(skip_master=True):
             values = signal.samples
             if values.ndim == 1 and np.issubdtype(values.dtype, np.number):
@@ -171,7 +171,7 @@ def read_parquet(path: Path) -> list[Series]:
     with path.open("rb") as stream, pq.ParquetFile(stream) as table:
         schema, rows = table.schema_arrow, table.metadata.num_rows
         numeric = [c for c in schema if pa.types.is_integer(c.type) or pa.types.is_floating(c.type)]
-        refuse_claim(SAMPLE * rows * (len(numeric) + 1), path.stat().st_size, path.name)
+        refuse_claim(SAMPLE * rows * (len(numeric) + 1), path)
         for column in numeric:
             values = table.read([column.name]).column(0).cast(pa.float64()).to_numpy()
             columns[column.name] = to_temporary_file(values)

@@ -86,7 +86,7 @@ def _load(path: Path) -> dict[str, Any]:
 
         with h5py.File(path, "r", locking="best-effort") as file:
             items = list(_datasets(file, path))
-            refuse_claim(sum(claimed_bytes(item) for _, item in items), path.stat().st_size, path.name)
+            refuse_claim(sum(claimed_bytes(item) for _, item in items), path)
             values = {name: _value(item) for name, item in items}
             return {name: value for name, value in values.items() if value is not None}
     from scipy.io import loadmat
@@ -238,7 +238,7 @@ def check_mat5(path: Path) -> None:
                 packed = data[element.at : element.end]
                 length = _Bytes(zlib.decompressobj().decompress(packed, 8), order, 0, 8).numbers("I")[1]
                 claimed += SAMPLE * length  # small numbers take a byte each
-                refuse_claim(claimed, len(data), path.name)
+                refuse_claim(claimed, path)
                 plain = zlib.decompressobj().decompress(packed, length + 16)
                 element = _Bytes(plain, order, 0, len(plain)).element(_MATRIX)
             _walk_matrix(element, 0)

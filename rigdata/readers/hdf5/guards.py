@@ -154,7 +154,7 @@ def refuse_claims(handle: Any, path: Path, runs: Sequence[str], names: Sequence[
             for name in names if isinstance(group, h5py.Group) else ():
                 with contextlib.suppress(*_BROKEN):
                     claimed += claimed_bytes(resolve(group, name, ""))
-    refuse_claim(claimed, path.stat().st_size, path.name)
+    refuse_claim(claimed, path)
 
 
 def foreign_filters(dataset: Any) -> list[int]:
