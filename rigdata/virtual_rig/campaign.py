@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
-from rigdata.operating_point import OperatingPoint
 from rigdata.virtual_rig.instruments import Instruments
 from rigdata.virtual_rig.layout import CsvLayout, Hdf5Layout, Layout, layout_named, manifest_text
 from rigdata.virtual_rig.motion import answer
@@ -187,11 +186,25 @@ def _record_text(record: SimulatedRun, rig: VirtualRig, layout: CsvLayout) -> st
 def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) -> CampaignTruth:
     """Gather the truth of a rig and of its simulated runs."""
     truth, instruments = rig.truth, rig.instruments
+    points = []
+    for point in rig.plan.dynamic:
+        h, steady = truth.h(point), replace(point, excitation=0.0)
+        readings = apparent_stiffness(h, point.excitation, instruments)
+        entry = {
+            **point_facts(point, truth.centre(steady)),
+            "excitation_Hz": point.excitation_hz,
+            "K": h.real.tolist(),
+            "C": (h.imag / point.excitation).tolist(),
+            "K_apparent": readings.real.tolist(),
+            "C_apparent": (readings.imag / point.excitation).tolist(),
+            "pad_temperature_C": truth.temperatures(steady).tolist(),
+        }
+        points.append(entry)
     return CampaignTruth(
         schema="tpjb-truth/1",
         campaign=rig.campaign,
         seed=rig.seed,
-        points=[_point(rig, point) for point in rig.plan.dynamic],
+        points=points,
         locus=[point_facts(point, truth.centre(point)) for point in rig.plan.locus],
         pivot_curves=[_pivot_curve(truth, k + 1) for k in range(len(truth.pivot_angles))],
         clearance_cold_m=truth.clearance,
@@ -202,21 +215,6 @@ def campaign_truth(rig: VirtualRig, runs: Mapping[str, Mapping[str, object]]) ->
         faults=[fault.stated() for fault in rig.faults],
         runs=runs,
     )
-
-
-def _point(rig: VirtualRig, point: OperatingPoint) -> dict[str, object]:
-    h = rig.truth.h(point)
-    readings = apparent_stiffness(h, point.excitation, rig.instruments)
-    steady = replace(point, excitation=0.0)
-    return {
-        **point_facts(point, rig.truth.centre(steady)),
-        "excitation_Hz": point.excitation_hz,
-        "K": h.real.tolist(),
-        "C": (h.imag / point.excitation).tolist(),
-        "K_apparent": readings.real.tolist(),
-        "C_apparent": (readings.imag / point.excitation).tolist(),
-        "pad_temperature_C": rig.truth.temperatures(steady).tolist(),
-    }
 
 
 def _pivot_curve(truth: RigTruth, pad: int) -> dict[str, object]:
@@ -241,17 +239,12 @@ def apparent_stiffness(h: ComplexArray, frequency: float, instruments: Instrumen
     lines = [answer(frequency, force, h, instruments) for force in np.eye(2, dtype=complex)]
     readings = {}
     for quantity in ("displacement", "force", "acceleration"):
+        stated, sensed = [], []
+        for sensor in instruments.of(quantity)[:2]:
+            gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
+            stated.append(sensor.direction(stated=True))
+            sensed.append(gain * felt_direction(sensor, instruments))
         phasors = np.stack([getattr(line, quantity) for line in lines], axis=1)
-        readings[quantity] = _reading_map(instruments, quantity, frequency) @ phasors
+        readings[quantity] = np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed)) @ phasors
     oil_force = readings["force"] + instruments.housing_mass * readings["acceleration"]
     return oil_force @ np.linalg.inv(readings["displacement"])
-
-
-def _reading_map(instruments: Instruments, quantity: str, frequency: float) -> ComplexArray:
-    """Map (2, 2) from true to stated X and Y of a quantity, phasors at `frequency` [rad/s]; first pair of sensors."""
-    stated, sensed = [], []
-    for sensor in instruments.of(quantity)[:2]:
-        gain = sensor.error.gain * np.exp(-1j * frequency * sensor.error.delay)
-        stated.append(sensor.direction(stated=True))
-        sensed.append(gain * felt_direction(sensor, instruments))
-    return np.linalg.solve(np.array(stated, dtype=complex), np.array(sensed))

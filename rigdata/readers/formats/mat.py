@@ -87,8 +87,14 @@ def _load(path: Path) -> dict[str, Any]:
         with h5py.File(path, "r", locking="best-effort") as file:
             items = list(_datasets(file, path))
             refuse_claim(sum(claimed_bytes(item) for _, item in items), path)
-            values = {name: _value(item) for name, item in items}
-            return {name: value for name, value in values.items() if value is not None}
+            values: dict[str, Any] = {}  # numbers, and texts that a dataset refers to
+            for name, item in items:
+                texts = _cell_texts(item) if item.dtype == h5py.ref_dtype else []
+                if texts:
+                    values[name] = np.array(texts, dtype=object)
+                elif item.dtype.kind in "fiu" and _is_inside(item) and not _is_text(item):
+                    values[name] = np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
+            return values
     from scipy.io import loadmat
 
     check_mat5(path)
@@ -112,18 +118,6 @@ def _datasets(group: Any, path: Path, prefix: str = "", depth: int = 0) -> Itera
             yield from _datasets(item, path, f"{prefix}{name}.", depth + 1)
         else:
             yield f"{prefix}{name}", item
-
-
-def _value(item: Any) -> np.ndarray | None:
-    """Numbers of a dataset, or the texts that it refers to; None of what is neither."""
-    import h5py
-
-    if item.dtype == h5py.ref_dtype:
-        texts = _cell_texts(item)
-        return np.array(texts, dtype=object) if texts else None
-    if item.dtype.kind in "fiu" and _is_inside(item) and not _is_text(item):
-        return np.asarray(item[()], dtype=float).T  # MATLAB writes columns first
-    return None
 
 
 def _cell_texts(item: Any) -> list[str]:

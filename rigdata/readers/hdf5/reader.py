@@ -125,7 +125,12 @@ class Hdf5Reader(RunReader):
         stack = ExitStack()
         try:
             self.opened_members[_GROUP] = stack.enter_context(self._group(_LEAST_CACHE))
-            needed = self._cache_bytes()
+            needed, grid = _LEAST_CACHE, self._layout().grids[0]
+            if grid.length * SAMPLE > _LEAST_CACHE:
+                # two stored chunks of the largest of a few datasets; they are stored alike as a rule
+                with self._group() as group:
+                    largest = max(chunk_bytes(self._dataset(group, name)) for name in grid.channels[:4])
+                needed = min(2 * largest, _MOST_CACHE)
             if needed > _LEAST_CACHE:  # the cache is given when a file is opened
                 self.opened_members.clear()
                 stack.close()
@@ -134,15 +139,6 @@ class Hdf5Reader(RunReader):
         finally:  # closed without the block's own errors, which are no faults of the file
             self.opened_members.clear()
             stack.close()
-
-    def _cache_bytes(self) -> int:
-        """Two stored chunks of the largest of a few datasets; they are stored alike as a rule."""
-        own = self._layout().grids[0]
-        if own.length * SAMPLE <= _LEAST_CACHE:
-            return _LEAST_CACHE
-        with self._group() as group:
-            largest = max(chunk_bytes(self._dataset(group, name)) for name in own.channels[:4])
-        return min(max(2 * largest, _LEAST_CACHE), _MOST_CACHE)
 
     def _dataset(self, group: Any, name: str) -> Any:
         """A dataset that can be read without leaving the file, foreign code or vast memory."""
@@ -188,8 +184,9 @@ class Hdf5Reader(RunReader):
             self.cached_layout[signature] = layout
         return self.cached_layout[signature]
 
-    def _lengths(self, group: Any, members: Sequence[str]) -> dict[str, int]:
-        """Samples of every dataset that can be used."""
+    def _arranged(self, group: Any) -> _Members:
+        """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
+        members = tuple(itertools.islice(group, _MAX_MEMBERS))
         lengths: dict[str, int] = {}
         problems: list[Problem] = []
         for name in members:
@@ -201,12 +198,7 @@ class Hdf5Reader(RunReader):
             fault = "the group holds no dataset of numbers"
             empty = self.problem("error", "", fault, "Store one dataset per channel")
             raise RigDataError(problems[:_LISTED] or empty)
-        return lengths
-
-    def _arranged(self, group: Any) -> _Members:
-        """What is sampled together: by time datasets, stated rates, and the length that most channels have."""
-        members = tuple(itertools.islice(group, _MAX_MEMBERS))
-        lengths, stated = self._lengths(group, members), self._checked_rate(group.attrs)
+        stated = self._checked_rate(group.attrs)
         names = [name for name in self.channels if name in lengths]
         clocks = [i for i, name in enumerate(names) if self.channels[name].quantity == "time"]
         run_rate = stated or self.stated_rate
@@ -262,15 +254,11 @@ class Hdf5Reader(RunReader):
 
     def stored_hash(self) -> str:
         """SHA-256 of the run as it is stored: attributes, and packed bytes, which are quicker to read than samples."""
-        with self._group() as group:
-            usable = {}
-            for name in self._layout().members:
+        digest = hashlib.sha256()
+        with self._group() as group, self.path.open("rb") as file:
+            for name in sorted(self._layout().members):
                 with suppress(RigDataError):  # raised when that channel is asked for; no result can come from it
-                    usable[name] = self._dataset(group, name)
-            digest = hashlib.sha256()
-            with self.path.open("rb") as file:
-                for name in sorted(usable):
-                    _hash_dataset(digest, file, name, usable[name])
+                    _hash_dataset(digest, file, name, self._dataset(group, name))
             plain = sorted(key for key in group.attrs if is_plain(group.attrs.get_id(key), _PIECE))
             digest.update(repr([(key, repr(group.attrs[key])) for key in plain]).encode())
         return digest.hexdigest()

@@ -152,7 +152,10 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
                     if not numbers:
                         column, is_sound = _to_numbers(column, head.decimal)
                         bad |= set() if is_sound else {i}
-                    numeric[i].write(_values(column).tobytes())
+                    filled = pc.fill_null(column.cast(pa.float64()), float("nan"))
+                    # `to_numpy` would import pandas in every worker
+                    values = np.frombuffer(filled.buffers()[1], np.float64, len(filled), 8 * filled.offset)
+                    numeric[i].write(values.tobytes())
         except pa.ArrowInvalid as error:
             if numbers:
                 raise
@@ -165,15 +168,6 @@ def _parse(head: Head, places: Sequence[int], numbers: bool) -> tuple[dict[int, 
     if bad:
         _judged(head, sorted(bad), odd_lines)
     return columns, odd_lines
-
-
-def _values(column: Any) -> FloatArray:
-    """Readings of a column, NaN where there is none; `to_numpy` would import pandas in every worker."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    numbers = pc.fill_null(column.cast(pa.float64()), float("nan"))
-    return np.frombuffer(numbers.buffers()[1], np.float64, len(numbers), 8 * numbers.offset)
 
 
 def _to_numbers(column: Any, decimal: str) -> tuple[Any, bool]:

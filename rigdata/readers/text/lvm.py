@@ -80,17 +80,15 @@ class _LvmFile(io.TextIOBase):
             elif name and name != _COMMENT:
                 entries = {key: cells[number] for key, cells in header.items() if number < len(cells)}
                 number += 1
-                if entries.get("X_Dimension", "").lower() in ("time", ""):
-                    yield self._series(entries, name, values, x)
-
-    def _series(self, entries: Mapping[str, str], name: str, values: FloatArray, x: FloatArray | None) -> Series:
-        count, step, start = (self._number(entries.get(key, "")) for key in ("Samples", "Delta_X", "X0"))
-        length = int(count) if 0 < count <= len(values) else len(values)
-        time = None if x is None else x[:length]
-        if step > 0:  # X as written is rounded
-            time = equidistant(length, step, start if np.isfinite(start) else 0.0)
-        began = f"{entries.get('Date', '')} {entries.get('Time', '')}".strip()
-        return Series(name, entries.get("Y_Unit_Label", ""), values[:length], time, began)
+                if entries.get("X_Dimension", "").lower() not in ("time", ""):
+                    continue
+                count, step, start = (self._number(entries.get(key, "")) for key in ("Samples", "Delta_X", "X0"))
+                length = int(count) if 0 < count <= len(values) else len(values)
+                time = None if x is None else x[:length]
+                if step > 0:  # X as written is rounded
+                    time = equidistant(length, step, start if np.isfinite(start) else 0.0)
+                began = f"{entries.get('Date', '')} {entries.get('Time', '')}".strip()
+                yield Series(name, entries.get("Y_Unit_Label", ""), values[:length], time, began)
 
     def _number(self, cell: str) -> float:
         try:
