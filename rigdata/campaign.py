@@ -222,7 +222,18 @@ def _load_folder(folder: Path, manifest_path: Path) -> Campaign:
     files: dict[str, Path] = {manifest_path.name: manifest_path}
     manifest = parse_manifest(text, manifest_path.name, _named_file(folder, manifest_path.name, files))
     problems: list[Problem] = []
-    bearing = _bearing_text(folder, manifest, manifest_path.name, files, problems)
+    bearing, name = "", manifest.bearing_name
+    try:
+        path = inside(folder, name, manifest_path.name, "bearing")
+        if os.path.isfile(path):
+            files[name] = path
+            bearing = _read_text(path, name, _MAX_BEARING)
+        else:
+            fault = f"the bearing file {name!r} is not in the folder"
+            remedy = "Add it, or give --bearing where one is needed"
+            problems.append(Problem("warning", manifest_path.name, "bearing", fault, remedy))
+    except RigDataError as error:
+        problems.extend(error.problems)
     cache = ReadingCache()
 
     def reader_of(entry: RunEntry, rate: float | None, channels: Channels) -> RunReader:
@@ -244,19 +255,6 @@ def run_in_file(run: Run, path: Path, file: str, run_id: str) -> Run:
     else:
         reader = FileReader(path, file, run_id, old.channels, old.stated_rate)
     return replace(run, id=run_id, reader=reader)
-
-
-def _bearing_text(folder: Path, manifest: Manifest, file: str, files: dict[str, Path], problems: list[Problem]) -> str:
-    try:
-        path = inside(folder, manifest.bearing_name, file, "bearing")
-        if os.path.isfile(path):
-            files[manifest.bearing_name] = path
-            return _read_text(path, manifest.bearing_name, _MAX_BEARING)
-        message = f"the bearing file {manifest.bearing_name!r} is not in the folder"
-        problems.append(Problem("warning", file, "bearing", message, "Add it, or give --bearing where one is needed"))
-    except RigDataError as error:
-        problems.extend(error.problems)
-    return ""
 
 
 def _load_hdf5(path: Path) -> Campaign:

@@ -187,18 +187,14 @@ def _product(pieces: Iterator[re.Match[str]], text: str, dimension: str) -> Unit
             continue
         factor = _product(pieces, text, dimension) if symbol else Unit(1.0)
         if name:
-            factor = _named(name, dimension) ** int(power or 1)
+            aliases = _ALIASES | _ALIASES_BY_DIMENSION.get(dimension, {})
+            factor = _base(aliases.get(name, name)) ** int(power or 1)
+            if dimension == "speed" and name in {"Hz", "kHz"}:  # of a shaft or a vibration: cycles
+                factor *= _base("revolution") ** int(power or 1)
         product, sign, needs_name = product * factor**sign, 1, False
     if needs_name:
         raise UnitError(f"unit {text!r} ends where a unit name should be")
     return product
-
-
-def _named(name: str, dimension: str) -> Unit:
-    if dimension == "speed" and name in {"Hz", "kHz"}:  # of a shaft or a vibration: cycles
-        return _base("revolution") * _base(name)
-    aliases = _ALIASES | _ALIASES_BY_DIMENSION.get(dimension, {})
-    return _base(aliases.get(name, name))
 
 
 def unit_factor(unit: str, dimension: str) -> float:

@@ -12,7 +12,6 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from rigdata.calibration import VECTOR_QUANTITIES
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, KINDS, MARK, RUN, Field, open_paths
@@ -170,19 +169,6 @@ class _Block:
     lines: list[str]
 
 
-def _described_channels(text: str) -> dict[str, dict[str, Any]]:
-    """Tables of the channels that a manifest describes; what is `like` another has that one's calibration."""
-    try:
-        tables = tomllib.loads(text).get("channels", {})
-    except tomllib.TOMLDecodeError as error:
-        raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
-    described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
-    for name, table in described.items():
-        model = described.get(str(table.get("like", "")), {})
-        described[name] = {key: model[key] for key in _OF_MODEL if key in model} | table
-    return described
-
-
 def column_names(text: str) -> tuple[str, ...]:
     """Names that a manifest gives to the columns of files that have none."""
     try:
@@ -198,7 +184,14 @@ def updated_manifest(text: str, exports: Sequence[Export], pivots: Sequence[floa
     A line is a guess while it bears the mark of one and the value that `tpjb init` had given it; all others stay. A
     manifest is never left with errors that it had not: then new records are added and nothing else.
     """
-    described = _described_channels(text)
+    try:
+        tables = tomllib.loads(text).get("channels", {})
+    except tomllib.TOMLDecodeError as error:
+        raise refuse("campaign.toml", "", f"not valid TOML: {error}", "Repair it first") from error
+    described = {str(name): table for name, table in tables.items() if isinstance(table, dict)}
+    for name, table in described.items():  # what is like another has that one's calibration
+        model = described.get(str(table.get("like", "")), {})
+        described[name] = {key: model[key] for key in _OF_MODEL if key in model} | table
     former = _tables(survey(exports, pivots=pivots))
     for block in _blocks(text):
         for line in former.get(block.key, ()):

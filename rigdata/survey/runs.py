@@ -65,6 +65,9 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
     pad = re.search(rf"(?:^p|{PAD})[-_ #]?(\d{{1,2}})(?!\d)", stem, re.IGNORECASE)
     load, text = _load_of(stem)
     angles = _numbers_before(stem, r"deg(?:ree)?s?|°|grad")
+    # a frequency that the name states counts where one of the record's lines confirms it
+    stated = [abs(f) for f in _numbers_before(stem, "Hz")]
+    confirmed = [f for f in stated if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
     return RunGuess(
         export=export,
         kind=_kind(stem, forces, moves, lines),
@@ -74,7 +77,7 @@ def guess_run(export: Export, channels: Guesses) -> RunGuess:
         direction=Entry(angles[0], "file") if angles else OPEN,
         pad=Entry(int(pad[1]), "file") if pad and int(pad[1]) else OPEN,
         speed=_speed(export, channels, stem),
-        excitation=_stated_frequency(stem, lines),
+        excitation=Entry(confirmed[0], "file") if len(confirmed) == 1 else OPEN,
     )
 
 
@@ -126,13 +129,6 @@ def _speed(export: Export, channels: Guesses, stem: str) -> Entry:
             return Entry(mean, "records", f"{mean:.4g} Hz by {series.name}")
     turns = _numbers_before(stem, r"rpm|u[-_]?min|1[-_]min")
     return Entry(turns[0] / 60.0, "file") if turns else OPEN
-
-
-def _stated_frequency(stem: str, lines: Peaks) -> Entry:
-    """Frequency [Hz] that a file's name states and one of the record's lines confirms."""
-    frequencies = [abs(f) for f in _numbers_before(stem, "Hz")]
-    confirmed = [f for f in frequencies if any(abs(line.frequency - f) <= NEAR * f for line in lines)]
-    return Entry(confirmed[0], "file") if len(confirmed) == 1 else OPEN
 
 
 def _by_movement(forces: list[Series], moves: list[Series], lines: Peaks) -> tuple[str, str]:

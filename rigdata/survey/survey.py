@@ -74,7 +74,6 @@ def survey(
     """Guess channels and runs; `described` are tables of a manifest, `pivots` the angles of the pads [rad]."""
     exports, clocks = in_seconds(exports, described or {})
     folder = _Folder(exports, described or {}, pivots)
-    folder.find_loads()
     speed = folder.common_line()
     folder.runs = [_with_lines(run, speed) for run in folder.runs]
     folder.find_other_axes()
@@ -101,6 +100,9 @@ class _Folder:
                     self.channels[series.name] = as_described(guess, described.get(series.name, {}))
         self.runs = [guess_run(export, self.channels) for export in exports]
         self.cells = self._frame_of_cells()
+        if self.cells is not None:
+            with_axes(self.channels, self.cells)
+            self.runs = [self._loaded(run, self.cells) for run in self.runs]
 
     def _with(self, kinds: Sequence[str], *names: Pair) -> Iterator[tuple[RunGuess, list[list[Series]]]]:
         """Runs of some kinds that have these pairs of channels, with their records."""
@@ -149,12 +151,6 @@ class _Folder:
     def _nearest_pad(self, angles: FloatArray | float) -> Any:
         """Indices of the pads nearest to directions [rad]."""
         return np.argmax(np.cos(np.subtract.outer(angles, self.pivots)), axis=-1)
-
-    def find_loads(self) -> None:
-        """Give the load cells their axes, and the runs direction, load and pad as the cells tell them."""
-        if self.cells is not None:
-            with_axes(self.channels, self.cells)
-            self.runs = [self._loaded(run, self.cells) for run in self.runs]
 
     def _loaded(self, run: RunGuess, cells: Frame) -> RunGuess:
         series, is_dry = _pair(run, cells.names), run.kind.value == "dry_pivot"

@@ -55,7 +55,11 @@ def write_campaign(
         raise VirtualRigError(f"{target.parent} is not a folder; make it first")
     if os.path.lexists(target):
         raise VirtualRigError(f"{target} exists; choose another name, or delete it first")
-    _check_faults(rig, chosen)
+    shown = {type(chosen).__name__, "times" if chosen.time_name else ""}
+    for fault in rig.faults:
+        missing = {"CsvLayout", "Hdf5Layout", "times"}.intersection(fault.needs) - shown
+        if missing:
+            raise VirtualRigError(f"fault {fault.kind!r} needs {missing.pop()}, which this layout does not have")
     laws: dict[str, Any] = {name: cache(getattr(rig.truth, name)) for name in ("stiffness", "position", "temperature")}
     rig = replace(rig, truth=replace(rig.truth, **laws))  # each is asked only once per point
     header = {"id": rig.campaign, "bearing": rig.truth.bearing_name, "description": rig.description}
@@ -89,15 +93,6 @@ def _written_records(rig: VirtualRig, facts: dict[str, dict[str, object]], progr
             yield record
         if progress is not None:
             progress(done, len(records), run)
-
-
-def _check_faults(rig: VirtualRig, layout: Layout) -> None:
-    """Refuse faults that this layout cannot show: a campaign must hold what was asked for."""
-    shown = {type(layout).__name__, "times" if layout.time_name else ""}
-    for fault in rig.faults:
-        missing = {"CsvLayout", "Hdf5Layout", "times"}.intersection(fault.needs) - shown
-        if missing:
-            raise VirtualRigError(f"fault {fault.kind!r} needs {missing.pop()}, which this layout does not have")
 
 
 def _stored(record: SimulatedRun, rig: VirtualRig, layout: Layout) -> _Columns:
