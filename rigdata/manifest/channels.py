@@ -77,18 +77,17 @@ def _complete(entry: Table, name: str, tables: dict[str, Table], read: dict[str,
 
 def read_channel(name: str, table: Table) -> Channel | None:
     """One channel; None where anything is wrong, which is then noted."""
-    heading = f"[channels.{name[:40]}]"
     if not name.strip() or len(name) > 200 or not name.isprintable() or _PATH_STEPS & set(name.split("/")):
-        table.only(CHANNEL, heading)
+        table.only(CHANNEL)
         table.findings.error(table.path, f"channel name {shown(name)} cannot be used", "Use letters and digits")
         return None
     quantity = table.value(_FIELD["quantity"])
     if quantity is None or quantity == "ignore":
-        table.only(CHANNEL, heading)
+        table.only(CHANNEL)
         return Channel(name, "ignore") if quantity else None
     directed = quantity in VECTOR_QUANTITIES or quantity == "command"
     errors = table.findings.errors
-    values = table.read(CHANNEL, heading, ["axis"] * directed + ["unit"] * (quantity in DIMENSIONS))
+    values = table.read(CHANNEL, ["axis"] * directed + ["unit"] * (quantity in DIMENSIONS))
     values |= {"unit": values["unit"] or "", "gain": 1.0, "zero": 0.0}
     if quantity in DIMENSIONS:
         values |= _calibration(table, quantity, values["unit"])
@@ -171,7 +170,7 @@ def _entries(channel: Table, runs: Sequence[str], budget: Iterator[int]) -> list
     pairs: list[tuple[str, Table]] = []
     for index, data in enumerate(entries):
         entry = Table(data, (*channel.path, "for", index), channel.findings)
-        entry.only(_ENTRY, f"[[channels.{channel.path[-1]}.for]]")
+        entry.only(_ENTRY)
         named = _matching(entry, runs, budget)
         pairs += [(run, entry) for run in runs if run in named]
     return pairs

@@ -106,12 +106,7 @@ TOP = (
     Field("description", "text", "free text", '"after overhaul"', default=""),
     Field("date", "text", "when it was measured", '"2026-03-12"', default=""),
     Field("by", "text", "laboratory and person", '"TU Chemnitz, K. Sato"', default=""),
-    Field("shaft", "table", "", ""),
-    Field("housing", "table", "", ""),
-    Field("acquisition", "table", "", ""),
-    Field("csv", "table", "", ""),
-    Field("channels", "table", "", ""),
-    Field("runs", "table", "", ""),
+    *(Field(key, "table", "", "") for key in ("shaft", "housing", "acquisition", "csv", "channels", "runs")),
 )
 SHAFT = (Field("rotation", "choice", "sense of turning", '"clockwise"', default=ROTATIONS[0], choices=ROTATIONS),)
 HOUSING = (
@@ -289,17 +284,17 @@ class Table:
         """Note an error of `key`."""
         self.findings.error(self.origins.get(key, (*self.path, key)), what, cure)
 
-    def read(self, fields: tuple[Field, ...], heading: str, needed: Collection[str] = ()) -> dict[str, Any]:
+    def read(self, fields: tuple[Field, ...], needed: Collection[str] = ()) -> dict[str, Any]:
         """The value of every field, SI; keys that are no field are noted."""
-        self.only(fields, heading)
+        self.only(fields)
         return {field.key: self.value(field, field.key in needed) for field in fields}
 
-    def only(self, fields: tuple[Field, ...], heading: str) -> None:
+    def only(self, fields: tuple[Field, ...]) -> None:
         """Note every key that is no field."""
         choices = [field.key for field in fields]
         for key in self.data:
             if key not in choices:
-                self.error(key, f"unknown key {shown(key)} in {heading}", nearest(key, choices))
+                self.error(key, f"unknown key {shown(key)}", nearest(key, choices))
 
     def value(self, field: Field, needed: bool = False) -> Any:
         """The value of one field, SI."""
@@ -309,9 +304,11 @@ class Table:
             if is_needed:
                 self.error(key, f"{key} is missing", f"Add {key}, such as {key} = {field.example}")
             return field.default
-        with self.noted(key, field.advice(value)):
+        try:
             return field.read(value)
-        return field.default
+        except UnitError as error:
+            self.error(key, f"{key}: {error}", field.advice(value))
+            return field.default
 
     @contextmanager
     def noted(self, key: str, remedy: str) -> Iterator[None]:

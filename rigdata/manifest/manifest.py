@@ -93,7 +93,7 @@ def _read_run(table: Table, index: int) -> RunEntry | None:
     needed = _NEEDED.get(str(table.data.get("kind")), ())
     if table.data.get("excitation", "sine") != "sine":
         needed = tuple(key.replace("excitation_frequency", "excitation_band") for key in needed)
-    values = table.read(RUN, "[[runs]]", needed)
+    values = table.read(RUN, needed)
     name, kind = values["id"], values["kind"]
     if name is not None and not _ID.fullmatch(name):
         table.error("id", f"run id {shown(name)} cannot be used", "Use letters, digits, '-', '_' and '.'")
@@ -171,14 +171,14 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
     findings = Findings(file, key_lines(text), files)
     findings.note_open(open_paths(data))
     top = Table(data, (), findings)
-    header = top.read(TOP, "the manifest")
+    header = top.read(TOP)
     tables = top.subtable("channels")
     channels = read_channels(tables)
     runs = _read_runs(top)
     described = channels_by_run(tables, channels, [run.id for run in runs])
     excited = any(run.kind in {"dynamic", "baseline"} for run in runs)
-    housing = top.subtable("housing").read(HOUSING, "[housing]", ["mass"] if excited else [])
-    acquisition = top.subtable("acquisition").read(ACQUISITION, "[acquisition]")
+    housing = top.subtable("housing").read(HOUSING, ["mass"] if excited else [])
+    acquisition = top.subtable("acquisition").read(ACQUISITION)
     manifest = Manifest(
         **{key: header[key] for key in ("id", "description", "date", "by")},
         bearing_name=header["bearing"],
@@ -190,7 +190,7 @@ def parse_manifest(text: str, file: str = "campaign.toml", files: TextFile | Non
         notes=tuple(p for p in findings.problems if p.severity != "error"),
         mass_uncertainty=housing["mass_uncertainty"],
         mains=acquisition["mains"],
-        rotation=top.subtable("shaft").read(SHAFT, "[shaft]")["rotation"],
+        rotation=top.subtable("shaft").read(SHAFT)["rotation"],
         mount=housing["mount"],
         described=described,
     )
@@ -218,7 +218,7 @@ def _load_toml(text: str, file: str) -> dict[str, Any]:
 
 
 def _read_csv(table: Table) -> CsvSpec:
-    values = table.read(CSV, "[csv]")
+    values = table.read(CSV)
     if values["delimiter"] in {"\\t", "tab", "TAB"}:
         values["delimiter"] = "\t"
     delimiter, decimal = values["delimiter"], values["decimal"]
