@@ -79,7 +79,7 @@ class Field:
             if self.kind not in ("whole", "sign"):
                 number = parse_quantity(value, self.kind)
             is_good = isinstance(number, int | float) and not isinstance(number, bool) and self.holds(number)
-            if self.kind in ("whole", "sign"):
+            if self.kind == "whole":
                 is_good = is_good and isinstance(value, int)
             fault, value = "cannot be", number
         if not is_good:
