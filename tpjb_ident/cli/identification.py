@@ -144,8 +144,8 @@ def show_identification(c: Command, result: Identification) -> None:
         if name in c.frames:
             title = f"models over {over}, 95 % intervals; raw H: none, use frf.csv or the coefficients"
             c.show_frame(title, c.frames[name], _MODELS, f"{name}.csv")
-    for remark in result.remarks():
-        c.print(f"note: {remark}")
+    for k, remark in enumerate(result.remarks()):
+        c.print(f"note: {remark}" if k < len(result.conditions) else f"flag: {remark}")
 
 
 def _show_coefficients(c: Command, title: str, frame: pd.DataFrame) -> None:
