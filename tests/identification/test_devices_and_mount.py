@@ -10,11 +10,11 @@ import pytest
 from tests.estimate.block_cases import Case, made, solved
 from tests.seeds import first_quick, seeds
 from tpjb_ident.estimate.sensors import found_mount
-from tpjb_ident.identification.campaign_blocks import with_start
 from tpjb_ident.identification.campaign_solution import learnt_rig
-from tpjb_ident.identification.unstated_clocks import with_found_devices
+from tpjb_ident.identification.clocks import with_found_devices
 
 CASE = Case(hertz=(30.0, 60.0, 90.0))
+START = 1e-4
 
 
 @pytest.mark.parametrize("seed", seeds(3))
@@ -43,20 +43,20 @@ def devices(sensors):
 @pytest.mark.parametrize("ppm", [100.0, -300.0])
 def test_a_clock_that_nobody_stated_is_found(ppm):
     rig, blocks, _ = made(replace(CASE, rates={"force": 1e-6 * ppm, "acceleration": 1e-6 * ppm}))
-    found = devices(with_found_devices(rig.sensors, blocks))
+    found = devices(with_found_devices(rig.sensors, blocks, START)[0])
     assert found == {"displacement": "", "force": "cells", "acceleration": "cells"}
     alone, of_cells, _ = made(replace(CASE, rates={"force": 1e-6 * ppm}))
-    found = devices(with_found_devices(alone.sensors, of_cells))
+    found = devices(with_found_devices(alone.sensors, of_cells, START)[0])
     assert found == {"displacement": "", "force": "cells", "acceleration": ""}
     three, of_each, _ = made(replace(CASE, rates={"force": 1e-6 * ppm, "acceleration": -1e-6 * ppm}))
-    found = devices(with_found_devices(three.sensors, of_each))
+    found = devices(with_found_devices(three.sensors, of_each, START)[0])
     assert found == {"displacement": "", "force": "cells", "acceleration": "accelerometers"}
 
 
 @pytest.mark.parametrize("seed", seeds(4))
 def test_one_clock_is_one(seed):
     rig, blocks, _ = made(CASE, seed)
-    assert with_found_devices(rig.sensors, blocks) == rig.sensors
+    assert with_found_devices(rig.sensors, blocks, START) == (rig.sensors, {})
 
 
 @pytest.mark.parametrize("seed", seeds(4))
@@ -68,20 +68,20 @@ def test_a_beat_of_one_device_is_no_clock(seed):
     cells = rig.of("force")
     beat = 0.02 * 2 * np.pi * 0.4 * np.exp(2j * np.pi * rng.random((len(blocks), 1)))
     slope[:, cells] += 0.3 * beat * blocks.z[:, cells]
-    assert with_found_devices(rig.sensors, replace(blocks, slope=slope)) == rig.sensors
+    assert with_found_devices(rig.sensors, replace(blocks, slope=slope), START) == (rig.sensors, {})
 
 
 def test_stated_clocks_are_as_stated():
     rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"displacement": {"device": "a"}}))
-    assert with_found_devices(rig.sensors, blocks) == rig.sensors
+    assert with_found_devices(rig.sensors, blocks, START) == (rig.sensors, {})
 
 
-def test_further_devices_start_late_by_what_nobody_states():
-    rig, _, _ = made(replace(CASE, stated={"displacement": {"device": "a"}, "force": {"device": "b"}}))
-    late = {s.name: s.delay_uncertainty for s in with_start(rig.sensors, 1e-4)}
-    assert (late["D1"], late["F1"], late["A1"]) == (0.0, 1e-4, 1e-4)
-    told = replace(rig.sensors[2], delay_uncertainty=3e-3)
-    assert with_start((*rig.sensors[:2], told), 1e-4)[2].delay_uncertainty == 3e-3
+def test_a_device_that_is_found_starts_late_by_what_nobody_states():
+    rig, blocks, _ = made(replace(CASE, rates={"force": 1e-4}, stated={"acceleration": {"delay_uncertainty": 3e-3}}))
+    sensors, rates = with_found_devices(rig.sensors, blocks, START)
+    late = {s.name: s.delay_uncertainty for s in sensors}
+    assert (late["D1"], late["F1"], late["A1"]) == (0.0, START, 3e-3)
+    assert rates["cells"] == pytest.approx(1e-4, abs=1e-5)
 
 
 @pytest.mark.parametrize(

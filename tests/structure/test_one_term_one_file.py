@@ -25,6 +25,7 @@ ROOMS = ("tpjb_ident/estimate/", "tpjb_ident/identification/", "tpjb_ident/phaso
 CLASSES = {
     "tpjb_ident/check/rig_fit.py": {"Axis", "Corner", "Delay", "Gain", "Housing", "Tilt"},
     "tpjb_ident/identification/campaign_solution.py": {"Clock"},
+    "tpjb_ident/identification/clocks.py": {"Clock"},
     "tpjb_ident/identification/band_solution.py": {"Clock", "Distortion", "RunGain"},
 }
 #: What differs from run to run is of the random part; what amplitudes leave unknown is said of the point.

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.bands.responses import end_columns, place_in_line
+from tpjb_ident.bands.responses import beside, end_columns, place_in_line
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance
 
-#: Condition number of the motions from which they are along one line.
-_ONE_LINE = 1e8
+#: Condition number of the motions' power from which they are along one line.
+_ONE_LINE = 1e12
 
 
 @dataclass(frozen=True)
@@ -35,27 +35,27 @@ class ClassicLine:
 
 def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends: bool) -> ClassicLine:
     """H1, H2, Hv and coherence over all rows of a line: periods, or bins of its groups."""
-    parts = [_flat(spectra, bins, ends) for bins in groups]
-    rows, taken = np.concatenate([part for part, _ in parts]), sum(columns for _, columns in parts)
-    n, (D, F) = len(rows), np.split(rows, 2, axis=1)
-    scale = np.sqrt(np.mean(np.abs(rows) ** 2, axis=0))
-    freedom = n - taken - 2
-    if freedom < 1 or not (scale > 0).all() or not np.linalg.cond(D / scale[:2]) < _ONE_LINE:
+    S, n, freedom = np.zeros((4, 4), complex), 0, -2
+    for bins in groups:
+        rows, taken = _rows(spectra, bins, ends)
+        S += rows.T @ rows.conj()
+        n, freedom = n + len(rows), freedom + len(rows) - taken
+    size = np.sqrt(np.diag(S).real)
+    if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
         return ClassicLine({}, np.full((8, 8), np.nan), 1.0, np.full(2, np.nan), n)
-    inverse = np.linalg.pinv(D)
-    h1 = (inverse @ F).T
-    remaining = F - D @ h1.T
-    noise = remaining.T @ remaining.conj() / freedom
-    covariance = complex_to_real_covariance(np.kron(noise, inverse @ inverse.conj().T))
-    power = np.sum(np.abs(F) ** 2, axis=0) / max(n - taken, 1)
-    coherence = np.clip(1 - np.diag(noise).real / power, 0.0, 1.0)
-    signal = np.linalg.svd(rows / scale, full_matrices=False)[2][:2] * scale
-    h = {"h1": h1, "h2": np.linalg.solve(F.conj().T @ D, F.conj().T @ F).T}
-    h["hv"] = np.linalg.solve(signal[:, :2], signal[:, 2:]).T
-    return ClassicLine(h, covariance, 2.0 * freedom, coherence, n)
+    inverse = np.linalg.inv(S[:2, :2])
+    h1, h2 = S[2:, :2] @ inverse, S[2:, 2:] @ np.linalg.inv(S[:2, 2:])
+    signal = np.linalg.eigh(S / np.outer(size, size))[1][:, 2:] * size[:, None]
+    noise = (S[2:, 2:] - h1 @ S[:2, 2:]) / freedom
+    coherence = np.clip(1 - (freedom + 2) * np.diag(noise).real / size[2:] ** 2, 0.0, 1.0)
+    covariance = complex_to_real_covariance(np.asarray(np.kron(noise, inverse.conj())))
+    h = {"h1": h1, "h2": h2, "hv": signal[2:] @ np.linalg.inv(signal[:2])}
+    return ClassicLine(
+        {name: np.asarray(value, complex) for name, value in h.items()}, covariance, 2.0 * freedom, coherence, n
+    )
 
 
-def _flat(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:
+def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[ComplexArray, int]:
     """Displacement and force of all runs' rows (n, 4) without slope and leakage, and how many columns that took."""
     rows = np.concatenate([np.concatenate([s.D[:, bins], s.F[:, bins]], axis=2).reshape(-1, 4) for s in spectra])
     if spectra[0].period is not None:
@@ -64,4 +64,4 @@ def _flat(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[Co
     sloped = rows[:, :2] * np.tile(place, len(spectra))[:, None]
     leaked = end_columns(len(spectra), place)[:, : None if ends else 0]
     basis = np.linalg.qr(np.concatenate([sloped, leaked], axis=1))[0]
-    return np.asarray(rows - basis @ (basis.conj().T @ rows)), basis.shape[1]
+    return beside(rows, basis), basis.shape[1]

@@ -14,12 +14,17 @@ from scipy.signal import zoom_fft
 from rigdata.arrays import BoolArray, FloatArray
 from tpjb_ident.bands.samples import Samples
 from tpjb_ident.phasors.found_lines import vertex
+from tpjb_ident.phasors.line_fit import even_design
 from tpjb_ident.phasors.lines import MAINS_DRIFT, SPEED_DRIFT, Line, LineSettings, strong_lines
 
 #: Highest harmonics of shaft and mains that are looked for.
 _SHAFT_HARMONICS, _MAINS_HARMONICS = 8, 5
 #: Highest power of time in a line's amplitude.
 _CREEP = 3
+#: Power of a line, over that of noise of the record's size, from which its frequency is believed.
+_SHOWN = 20.0
+#: Part of a line's power that the excitation's period must leave: one that it holds stays where it is.
+_NOTHING = 1e-6
 #: Bins next to a line that are left out, in whole-record bins.
 LEFT_OUT = 4.0
 #: The same of a period, in its own bins: lines between its bins are told from it by all its repeats.
@@ -43,19 +48,14 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
 
 def _shown(samples: Samples, nominal: float, wander: float) -> float:
     """Frequency of the highest peak near `nominal` [Hz], where one stands clear of what is around it."""
-    n, rate = samples.length, samples.rate
-    window = np.hanning(n)
-    step = 0.25 * rate / n
+    rows, window = replace(samples, command=None).signals(), np.hanning(samples.length)
+    step = 0.25 * samples.rate / samples.length
     reach = int(wander / step) + 1
     ends = [nominal - reach * step, nominal + reach * step]
-    power = np.zeros(2 * reach + 1)
-    for q in ("displacement", "force"):
-        rows = samples.rows[samples.places(q)]
-        rows = rows - rows.mean(axis=1, keepdims=True)
-        each = np.sum(np.abs(zoom_fft(rows * window, ends, len(power), fs=rate, endpoint=True)) ** 2, axis=0)
-        power += each / max(float(np.sum(rows**2)) * float(np.sum(window**2)), 1e-300)
+    spectra = zoom_fft(rows * window, ends, 2 * reach + 1, fs=samples.rate, endpoint=True)
+    power = np.sum(np.abs(spectra) ** 2, axis=0) / np.sum(window**2) / (0.5 * rows.size)
     k = int(np.argmax(power))
-    if not 0 < k < 2 * reach or power[k] < 20.0:
+    if not 0 < k < 2 * reach or power[k] < _SHOWN:
         return nominal
     return float(ends[0] + step * (k + vertex(power[k - 1 : k + 2])))
 
@@ -65,35 +65,19 @@ def without_disturbances(samples: Samples, lines: tuple[Line, ...], period: int 
     stack = samples.rows - samples.rows.mean(axis=1, keepdims=True)
     if not lines:
         return replace(samples, rows=stack)
-    scale = np.sqrt(np.mean(stack**2, axis=1, keepdims=True))
-    scale[scale == 0] = 1.0
-    columns = _columns(samples, lines)
-    basis = columns if period is None else _without_periodic(columns, period)
-    target = stack / scale if period is None else _without_periodic(stack / scale, period)
-    gram = basis @ basis.T
-    values, vectors = np.linalg.eigh(gram)
-    # a line that the excitation's own period holds cannot be told from it: it is left where it is
-    significant = values > 1e-6 * max(float(np.max(np.sum(columns**2, axis=1))), 1e-300)
-    inverse = (vectors[:, significant] / values[significant]) @ vectors[:, significant].T
-    cleaned = stack - scale * (((target @ basis.T) @ inverse) @ columns)
-    return replace(samples, rows=cleaned)
-
-
-def _columns(samples: Samples, lines: tuple[Line, ...]) -> FloatArray:
-    """Cosine and sine of every line times powers of time, (n_columns, n)."""
     n = samples.length
-    t = np.arange(n) / samples.rate
-    legendre = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), _CREEP).T
-    rows = []
-    for line in lines:
-        angle = 2 * np.pi * line.frequency * t
-        if line.order and samples.angle is not None:
-            angle = line.order * samples.angle[:n]
-        rows += [legendre * np.cos(angle), legendre * np.sin(angle)]
-    return np.concatenate(rows)
+    waves = even_design(n, samples.rate, np.array([line.frequency for line in lines]))[:, : 2 * len(lines)]
+    creep = np.polynomial.legendre.legvander(np.linspace(-1, 1, n), _CREEP)
+    columns = (creep[:, :, None] * waves[:, None, :]).reshape(n, -1).T
+    basis, target = (_without_periodic(rows, period) for rows in (columns, stack))
+    gram = basis @ basis.T + _NOTHING * n * np.eye(len(basis))
+    return replace(samples, rows=stack - np.linalg.solve(gram, basis @ target.T).T @ columns)
 
 
-def _without_periodic(rows: FloatArray, period: int) -> FloatArray:
+def _without_periodic(rows: FloatArray, period: int | None) -> FloatArray:
+    """What changes (k, n) from period to period."""
+    if period is None:
+        return rows
     folded = rows.reshape(len(rows), -1, period)
     return np.asarray((folded - folded.mean(axis=1, keepdims=True)).reshape(len(rows), -1))
 

@@ -140,6 +140,6 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     slip = 2 * np.pi * top / samples.rate * abs(period - q) * count
     if slip <= _MAX_SLIP:
         count = samples.length // q
-        return samples.each(samples.rate, lambda rows: rows[:, : count * q])
+        return samples.each(lambda rows: rows[:, : count * q])
     at = np.asarray(np.arange(count * q) * (period / q), dtype=float)
-    return samples.each(samples.rate * q / period, lambda rows: interpolated(rows, at))
+    return samples.each(lambda rows: interpolated(rows, at), samples.rate * q / period)

@@ -41,6 +41,9 @@ class LineResponse:
     count: float  #: that covariance is the noise of a row over this
     residual: ComplexArray  #: (m, m): sum of what is left, times its own conjugate
     freedom: float  #: complex degrees of freedom of the residual
+    slope: ComplexArray  #: (k, m), 1/s: change of the responses over time
+    slope_size: FloatArray  #: (k,), 1/s^2: its covariance is the noise of a row times this
+    repeats: float  #: rows that tell it
 
 
 def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, ends: bool) -> LineResponse:
@@ -49,17 +52,24 @@ def line_response(runs: Sequence[RunSpectra], bins: IntArray, instrument: str, e
     Runs are taken together where there is no instrument of their own: each moves the shaft along one line, and what it
     shows across that is noise.
     """
-    z = np.concatenate([run.phasors.z[:, bins] for run in runs])
     if instrument == "periods":
-        rows = z[:, 0]
-        mean = rows.mean(axis=0)
-        remaining = rows - mean
-        return LineResponse(mean[None], float(len(rows)), _outer(remaining), float(len(rows) - 1))
-    u = np.concatenate([_source(run, instrument)[:, bins] for run in runs])
+        return _over_periods(runs[0].phasors.z[:, bins[0]], runs[0].phasors.start)
+    z = np.concatenate([run.phasors.z[0, bins] for run in runs])
+    sources = [_sources(run, instrument) for run in runs]
+    u, by_time = (np.concatenate([part[bins] for part in parts]) for parts in zip(*sources))
     place = place_in_line(runs[0].frequencies[bins])
-    sloped = (u * place[None, :, None]).reshape(-1, u.shape[2])
+    sloped = np.tile(place, len(runs))[:, None] * u
     columns = np.concatenate([sloped, end_columns(len(runs), place)[:, : None if ends else 0]], axis=1)
-    return _regressed(z.reshape(-1, z.shape[2]), u.reshape(-1, u.shape[2]), columns)
+    return _regressed(z, u, by_time, columns)
+
+
+def _over_periods(rows: ComplexArray, start: FloatArray) -> LineResponse:
+    """Mean of the periods' phasors (n, m) and how they move; `start` (n,) [s]."""
+    n, mean = len(rows), rows.mean(axis=0)
+    time = start - start.mean()
+    remaining, spread = rows - mean, max(float(time @ time), 1e-300)
+    slope = time @ remaining / spread
+    return LineResponse(mean[None], float(n), _outer(remaining), n - 1.0, slope[None], np.array([1 / spread]), float(n))
 
 
 def place_in_line(frequencies: FloatArray) -> FloatArray:
@@ -73,18 +83,23 @@ def end_columns(runs: int, place: FloatArray) -> ComplexArray:
     return np.asarray(np.kron(np.eye(runs), np.vander(place, 2, increasing=True)), dtype=complex)
 
 
-def _source(spectra: RunSpectra, instrument: str) -> ComplexArray:
+def _sources(run: RunSpectra, instrument: str) -> tuple[ComplexArray, ComplexArray]:
+    """What drives the run (n_bins, k), and its product with time [s] over the record."""
+    assert run.by_time is not None
+    parts = run, run.by_time
     if instrument == "command":
-        return driven_command(spectra)
-    return spectra.D if instrument == "displacement" else spectra.F
+        along = _driven(run)
+        first, by_time = (part.command[0] @ along for part in parts if part.command is not None)
+    else:
+        first, by_time = (part.D[0] if instrument == "displacement" else part.F[0] for part in parts)
+    return first, by_time
 
 
-def driven_command(spectra: RunSpectra) -> ComplexArray:
-    """The command along the directions in which it acts (n_windows, n_bins, k): what rests would be noise alone."""
-    assert spectra.command is not None
-    flat = spectra.command.reshape(-1, 2)
-    power, along = np.linalg.eigh((flat.T @ flat.conj()).real)
-    return np.asarray(spectra.command @ along[:, power > _AT_REST * power[-1]])
+def _driven(run: RunSpectra) -> FloatArray:
+    """Directions (2, k) in which the command acts: what rests would be noise alone."""
+    assert run.command is not None
+    power, along = np.linalg.eigh((run.command[0].T @ run.command[0].conj()).real)
+    return np.asarray(along[:, power > _AT_REST * power[-1]])
 
 
 def tones(runs: Sequence[RunSpectra]) -> int:
@@ -110,17 +125,27 @@ def _likeness(wave: ComplexArray, other: ComplexArray) -> float:
     return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
 
 
-def _regressed(z: ComplexArray, u: ComplexArray, nuisance: ComplexArray) -> LineResponse:
-    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak (b, j)."""
+def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, nuisance: ComplexArray) -> LineResponse:
+    """Responses of rows (b, m) to sources (b, k), apart from their slope and from what the ends leak (b, j).
+
+    `by_time` (b, k): the sources' product with time; the part of the rows that goes with it is what moves.
+    """
     basis = np.linalg.qr(nuisance)[0]
-    flat = u - basis @ (basis.conj().T @ u)
-    q, triangle = np.linalg.qr(flat)
+    q, triangle = np.linalg.qr(beside(u, basis))
     told = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
-    q = q[:, told]
-    response = q.conj().T @ z
-    remaining = z - basis @ (basis.conj().T @ z) - q @ response
-    freedom = float(len(z) - basis.shape[1] - q.shape[1])
-    return LineResponse(response, 1.0, _outer(remaining), max(freedom, 0.0))
+    q, triangle, by_time = q[:, told], triangle[np.ix_(told, told)], by_time[:, told]
+    taken = np.concatenate([basis, q], axis=1)
+    remaining = beside(z, taken)
+    moving, moved = np.linalg.qr(beside(by_time, taken))
+    share = triangle @ np.linalg.pinv(moved)
+    freedom, size = float(len(z) - taken.shape[1]), np.sum(np.abs(share) ** 2, axis=1)
+    slope = share @ (moving.conj().T @ remaining)
+    return LineResponse(q.conj().T @ z, 1.0, _outer(remaining), max(freedom, 0.0), slope, size, freedom)
+
+
+def beside(rows: ComplexArray, basis: ComplexArray) -> ComplexArray:
+    """Rows (b, m) without their part in orthonormal columns (b, j)."""
+    return np.asarray(rows - basis @ (basis.conj().T @ rows))
 
 
 def _outer(rows: ComplexArray) -> ComplexArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,7 +11,6 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.problem import refuse
 from rigdata.run import Run
-from tpjb_ident.bands.clock_rate import ClockRate, clock_rates, vector_rows, with_one_clock
 from tpjb_ident.bands.disturbing_lines import (
     LEFT_OUT,
     LEFT_OUT_OF_PERIOD,
@@ -20,7 +20,7 @@ from tpjb_ident.bands.disturbing_lines import (
 )
 from tpjb_ident.bands.period import find_period, resampled
 from tpjb_ident.bands.samples import Samples, read_samples
-from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.conditions import merged
 from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
@@ -28,9 +28,7 @@ from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Share of the power that a period may leave where none is stated.
 _LEFT = 0.5
-#: Kinds that may repeat themselves; those that never do are not asked.
-_MAY_REPEAT = ("multisine", "random", "sweep")
-#: Kinds whose records may begin and end in motion; a hammer waits for rest.
+#: Kinds that may repeat themselves, and whose records may begin and end in motion; a hammer waits for rest.
 OPEN_ENDS = ("multisine", "random", "sweep")
 
 
@@ -51,10 +49,10 @@ class RunSpectra:
     mean_load: FloatArray  #: (2,), N
     position: FloatArray  #: (2,), m
     temperatures: dict[int, float]
-    clocks: frozenset[str] = frozenset()  #: quantities that were recorded on a clock of their own
     rms: float = 0.0  #: m: of the motion over the band
     peak: float = 0.0  #: m: largest motion
     one_sided: float = 0.0  #: 1 where what drives goes to one side only, 0 where to both alike
+    by_time: RunSpectra | None = field(default=None, repr=False)  #: of the record times the time from its middle [s]
 
     @property
     def frequencies(self) -> FloatArray:
@@ -85,59 +83,57 @@ class SpectraSettings:
     seconds: float | None
     mains: float
     delays: dict[str, float]
-    clocks: dict[str, ClockRate] = field(default_factory=dict)
-
-
-def run_clocks(run: Run, settings: SpectraSettings) -> dict[str, ClockRate]:
-    """What one run shows of the rates of its clocks."""
-    with run.opened():
-        samples = read_samples(run, settings.seconds)
-    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
-    return clock_rates(samples, settings.band, lines)
+    fast: Mapping[str, float] = field(default_factory=dict)  #: rates of the channels' clocks, relative
 
 
 def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
     """Read one run and transform it."""
     with run.opened():
         slower = filled_channels(run)
-        samples = read_samples(run, settings.seconds)
+        samples = read_samples(run, settings.seconds, settings.fast)
         temperatures = mean_temperatures(run)
     if settings.band[1] >= 0.45 * samples.rate:
         text = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
         raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
-    means = {q: vector_rows(samples, q).mean(axis=1) for q in ("force", "displacement")}
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
-    samples, clocks = with_one_clock(samples, settings.clocks), settings.clocks
     period = _period(run, samples, settings.band, lines)
-    if period is None:
-        clean, length = without_disturbances(samples, lines), samples.length
-    else:
-        cut = resampled(samples, period, settings.band[1])
-        length = round(period)
-        clean = without_disturbances(cut, lines, length)
-    phasors = compensated(_transformed(run, clean, length, housing_mass, settings), run, slower, settings.delays)
-    phasors = replace(
-        phasors, conditions=merged(samples.conditions, slower_condition(slower), _clock_conditions(clocks))
-    )
-    command = None if clean.command is None else _bins(clean.command, length, _places(clean.rate, length, settings))
-    width = LEFT_OUT if period is None else LEFT_OUT_OF_PERIOD
-    return RunSpectra(
-        phasors,
+    length, cut, width = samples.length, samples, LEFT_OUT
+    if period is not None:
+        length, cut, width = round(period), resampled(samples, period, settings.band[1]), LEFT_OUT_OF_PERIOD
+    clean = without_disturbances(cut, lines, None if period is None else length)
+    places = _places(clean.rate, length, settings)
+
+    def transformed(record: Samples) -> tuple[RunPhasors, ComplexArray | None]:
+        phasors = _phasors(run, record, _bins(record.rows, length, places), places, housing_mass)
+        command = None if record.command is None else _bins(record.command, length, places)
+        return compensated(phasors, run, slower, settings.delays), command
+
+    phasors, command = transformed(clean)
+    spectra = RunSpectra(
+        replace(phasors, conditions=merged(samples.conditions, slower_condition(slower))),
         command,
         bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
         lines,
         None if period is None else length / clean.rate,
-        means["force"],
-        means["displacement"],
+        samples.vector("force").mean(axis=1),
+        samples.vector("displacement").mean(axis=1),
         temperatures,
-        frozenset(clocks),
         *_motion(clean),
     )
+    if period is not None:
+        return spectra
+    phasors, command = transformed(clean.each(lambda rows: rows * _from_middle(clean)))
+    return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
+
+
+def _from_middle(samples: Samples) -> FloatArray:
+    """Time from the middle of the record, (n,) [s]."""
+    return np.asarray((np.arange(samples.length) - 0.5 * (samples.length - 1)) / samples.rate)
 
 
 def _motion(samples: Samples) -> tuple[float, float, float]:
     """Rms and peak of the motion [m], and how far the drive goes to one side."""
-    motion = vector_rows(samples, "displacement")
+    motion = samples.vector("displacement")
     size = np.linalg.norm(motion, axis=0)
     drive = motion if samples.command is None else samples.command
     along = np.linalg.eigh(drive @ drive.T)[1][:, -1] @ drive
@@ -145,16 +141,8 @@ def _motion(samples: Samples) -> tuple[float, float, float]:
     return float(np.sqrt(np.mean(size**2))), float(size.max()), one_sided
 
 
-def _clock_conditions(clocks: dict[str, ClockRate]) -> tuple[Condition, ...]:
-    """What to say of clocks that differ."""
-    if not clocks:
-        return ()
-    told = ", ".join(f"{q} {1e6 * c.rate:+.1f} ppm (standard error {1e6 * c.error:.1f})" for q, c in clocks.items())
-    return (Condition("clocks-differ", f"against the probes' clock: {told}; put right from the start of each record"),)
-
-
 def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
-    if run.excitation_kind not in _MAY_REPEAT:
+    if run.excitation_kind not in OPEN_ENDS:
         return None
     stated = run.excitation_kind == "multisine"
     period = find_period(samples, band, lines, 1.0 if stated else _LEFT)
@@ -180,26 +168,23 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
     return np.asarray(spectra.transpose(1, 2, 0))
 
 
-def _transformed(run: Run, samples: Samples, length: int, housing_mass: float, settings: SpectraSettings) -> RunPhasors:
-    """Phasors as recorded."""
-    places = _places(samples.rate, length, settings)
-    frequency = np.fft.rfftfreq(length, 1 / samples.rate)[places]
-    z = _bins(samples.rows, length, places)
-    windows = samples.length // length
-    lines = LineSet(tuple(Line("excitation", float(f)) for f in frequency), (), (), run.point.shaft_speed_hz)
-    nothing = np.zeros((windows, z.shape[2]))
+def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, housing_mass: float) -> RunPhasors:
+    """Phasors as recorded, `z` (n_windows, n_bins, m)."""
+    seconds = samples.length / len(z) / samples.rate
+    lines = LineSet(tuple(Line("excitation", float(k) / seconds) for k in places), (), (), run.point.shaft_speed_hz)
+    none = np.zeros((len(z), z.shape[2]))
     return RunPhasors(
         run.id,
         run.point,
         run.excitation_direction,
         lines,
-        np.arange(windows) * length / samples.rate,
-        length / samples.rate,
+        seconds * np.arange(float(len(z))),
+        seconds,
         samples.channels,
         z,
-        nothing,
-        nothing,
-        nothing,
+        none,
+        none,
+        none,
         housing_mass,
-        np.full(windows, np.nan),
+        np.full(len(z), np.nan),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from rigdata.arrays import FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
+from rigdata.vector import inverse_directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
@@ -20,10 +21,8 @@ from tpjb_ident.phasors.run_data import QUANTITIES
 _MAX_LOST = 0.01
 #: and from which share on it is said.
 _TOLD_LOST = 1e-4
-#: Time stamps may stray this share of a sample from the even grid, beyond what their last digit rounds.
-_MAX_JITTER = 0.05
-#: Finest step of rounded time stamps that is looked for [s].
-_FINEST = 1e-7
+#: Time stamps may stray this part of a sample from the even grid: more is a gap, and no rounding.
+_MAX_JITTER = 0.6
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
 _TAPS, _KAISER = 24, 9.0
 
@@ -36,7 +35,6 @@ class Samples:
     channels: tuple[Channel, ...]  #: probes, cells, accelerometers, in this order
     rows: FloatArray  #: (m, n)
     command: FloatArray | None  #: (2, n): along X and Y, in units of its own
-    angle: FloatArray | None  #: (n,), rad: of the shaft, by its tachometer or keyphasor
     conditions: tuple[Condition, ...] = ()
 
     @property
@@ -47,6 +45,11 @@ class Samples:
     def places(self, quantity: str) -> list[int]:
         """Rows of a quantity's channels."""
         return [j for j, channel in enumerate(self.channels) if channel.quantity == quantity]
+
+    def vector(self, quantity: str) -> FloatArray:
+        """X and Y of a quantity, (2, n)."""
+        places = self.places(quantity)
+        return inverse_directions(tuple(float(self.channels[j].axis or 0.0) for j in places)) @ self.rows[places]
 
     def signals(self) -> FloatArray:
         """Rows (k, n) about their means, each quantity of unit power: an idle channel weighs nothing beside others.
@@ -60,26 +63,21 @@ class Samples:
         sizes = [float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0 for rows in centred]
         return np.concatenate([rows / size for rows, size in zip(centred, sizes) if size > 0])
 
-    def each(self, rate: float, change: Callable[[FloatArray], FloatArray]) -> Samples:
-        """The record on another grid; `change` takes rows (k, n)."""
-        rows = change(self.rows)
+    def each(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
+        """The record with all rows (k, n) changed alike, command too; at another rate where one is given."""
         command = None if self.command is None else change(self.command)
-        angle = None
-        if self.angle is not None:
-            at = np.arange(rows.shape[1]) * self.rate / rate
-            angle = np.interp(at, np.arange(len(self.angle)), self.angle)
-        return replace(self, rate=rate, rows=rows, command=command, angle=angle)
+        return replace(self, rate=rate or self.rate, rows=change(self.rows), command=command)
 
 
-def read_samples(run: Run, seconds: float | None = None) -> Samples:
-    """Read a run from its beginning."""
+def read_samples(run: Run, seconds: float | None = None, fast: Mapping[str, float] | None = None) -> Samples:
+    """Read a run from its beginning; `fast`: channels by whose clock time runs faster than the first's, relative."""
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
     readers = device_readers(run)
     _refuse_unlike(run, readers)
     parts = [reader.read(0, n) for reader in readers]
     if parts[0].time is not None:
-        _even(run, parts[0].time, rate)
+        _refuse_uneven(run, parts[0].time, rate)
     recorded = [pair for reader, part in zip(readers, parts) for pair in zip(reader.channels, part.rows)]
     recorded.sort(key=lambda pair: QUANTITIES.index(pair[0].quantity))
     channels, rows, lost = [], [], 0.0
@@ -87,14 +85,11 @@ def read_samples(run: Run, seconds: float | None = None) -> Samples:
         missing = float((~np.isfinite(values)).mean())
         if missing > _MAX_LOST and is_spare(channel, [c for c, _ in recorded]):
             continue
-        bridged, share = _bridged(run, channel, values)
         channels.append(channel)
-        rows.append(bridged)
-        lost = max(lost, share)
-    conditions = (
-        (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),) if lost > _TOLD_LOST else ()
-    )
-    return Samples(rate, tuple(channels), np.array(rows), _command(run, n), _angle(run, n, rate), conditions)
+        rows.append(_by_first_clock(_bridged(run, channel, values), (fast or {}).get(channel.name, 0.0)))
+        lost = max(lost, missing)
+    told = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
+    return Samples(rate, tuple(channels), np.array(rows), _command(run, n), told if lost > _TOLD_LOST else ())
 
 
 def _refuse_unlike(run: Run, readers: tuple[DeviceReader, ...]) -> None:
@@ -107,68 +102,44 @@ def _refuse_unlike(run: Run, readers: tuple[DeviceReader, ...]) -> None:
             raise refuse(run.file, "channels", text, "Record them at one rate, or excite by sines", run.id)
 
 
-def _even(run: Run, time: FloatArray, rate: float) -> None:
-    finite = np.isfinite(time)
-    if not finite.any():
-        return
-    place = np.flatnonzero(finite)
-    off = (time[finite] - time[finite][0]) * rate - (place - place[0])
-    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
-    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[finite]):
+def _refuse_uneven(run: Run, time: FloatArray, rate: float) -> None:
+    """Refuse time stamps with gaps."""
+    place = np.flatnonzero(np.isfinite(time))
+    off = time[place] * rate - place
+    if len(place) > 2 and np.abs(off - np.polyval(np.polyfit(place, off, 1), place)).max() > _MAX_JITTER:
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
 
 
-def _rounding(time: FloatArray) -> float:
-    """Step [s] to which time stamps are rounded, a power of ten; zero where none is seen."""
-    step = 0.1
-    while step > _FINEST:
-        if np.abs(time / step - np.round(time / step)).max() < 1e-4:
-            return step
-        step /= 10
-    return 0.0
-
-
-def _bridged(run: Run, channel: Channel, values: FloatArray) -> tuple[FloatArray, float]:
-    """A channel (n,) with what is missing bridged by straight lines, and the share that was missing."""
+def _bridged(run: Run, channel: Channel, values: FloatArray) -> FloatArray:
+    """A channel (n,) with what is missing bridged by straight lines."""
     missing = ~np.isfinite(values)
-    share = float(missing.mean())
-    if share > _MAX_LOST:
-        text = f"{share:.1%} of its samples are missing"
+    if missing.mean() > _MAX_LOST:
+        text = f"{missing.mean():.1%} of its samples are missing"
         raise refuse(run.file, f"channel {channel.name}", text, "Repeat the run", run.id)
-    if not share:
-        return values, 0.0
     at = np.arange(len(values))
-    return np.interp(at, at[~missing], values[~missing]), share
+    return np.interp(at, at[~missing], values[~missing]) if missing.any() else values
+
+
+def _by_first_clock(values: FloatArray, rate: float) -> FloatArray:
+    """A channel (n,) of a clock that is fast by `rate` as if the first clock had sampled it."""
+    if not rate:
+        return values
+    mean, at = values.mean(), np.arange(float(len(values)))
+    return interpolated((values - mean)[None], at * (1 + rate))[0] + mean
 
 
 def _command(run: Run, n: int) -> FloatArray | None:
     """Command along X and Y: every channel along its axis, a single one along the run's excitation where stated."""
     channels = [c for c in run.channels.values() if c.quantity == "command"]
-    if not channels:
-        return None
     total = np.zeros((2, n))
     for channel in channels:
-        values, _ = _bridged(run, channel, np.asarray(run.record(channel.name, 0, n).values))
+        values = _bridged(run, channel, np.asarray(run.record(channel.name, 0, n).values))
         angle = float(channel.axis or 0.0)
         if len(channels) == 1 and run.excitation_direction is not None:
             angle = run.excitation_direction
         total += np.outer([np.cos(angle), np.sin(angle)], values - values.mean())
-    return total if np.abs(total).max() > 0 else None
-
-
-def _angle(run: Run, n: int, rate: float) -> FloatArray | None:
-    """Angle of the shaft over time from its measured speed [rad]; None where nothing believable measures it."""
-    record = run.speed(0, n)
-    if record is None or not np.isfinite(record.values).any():
-        return None
-    gap = ~np.isfinite(record.values)
-    at = np.arange(len(gap))
-    values = np.interp(at, at[~gap], record.values[~gap])
-    nominal = run.point.shaft_speed
-    if not nominal > 0 or abs(float(np.median(values)) - nominal) > 0.05 * nominal:
-        return None
-    return np.asarray(np.cumsum(values) / rate)
+    return total if total.any() else None
 
 
 def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:

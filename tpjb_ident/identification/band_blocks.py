@@ -140,18 +140,19 @@ def _run_rows(
     responses = [line_response(runs, bins, instrument, ends) for bins in groups]
     noises, freedoms = pooled_noise(responses)
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
+    time = 0.5 * len(spectra.phasors.start) * spectra.phasors.length
     rows: list[tuple[int, dict[str, object]]] = []
     for place, (response, noise, freedom) in enumerate(zip(responses, noises, freedoms)):
-        covariance = np.zeros((m, m), complex)
-        covariance[np.ix_(present, present)] = (noise / response.count + np.diag(least**2))[np.ix_(order, order)]
-        covariance /= np.outer(gain, gain)
-        z = np.zeros((len(response.z), m), complex)
-        z[:, present] = response.z[:, order]
-        z = z / gain
-        stands = stands_out(z, covariance, freedom, present)
-        for values in z:
-            row = {"z": values, "present": present, "noise": covariance, "dof": freedom, "stands": stands}
-            rows.append((place, row))
+        single = np.zeros((m, m), complex)
+        single[np.ix_(present, present)] = (noise + response.count * np.diag(least**2))[np.ix_(order, order)]
+        single /= np.outer(gain, gain)
+        covariance = np.asarray(single / response.count, complex)
+        z, slope = np.zeros((2, len(response.z), m), complex)
+        z[:, present], slope[:, present] = response.z[:, order], response.slope[:, order]
+        row = {"present": present, "noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
+        row["stands"] = stands_out(np.asarray(z / gain), covariance, freedom, present)
+        for values, change, size in zip(z / gain, slope / gain, response.slope_size):
+            rows.append((place, row | {"z": values, "slope": change, "slope_noise": single * size}))
     return rows
 
 

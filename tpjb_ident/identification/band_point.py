@@ -6,7 +6,7 @@ No bin belongs to two lines, so lines err apart from each other.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,14 +15,11 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.bands.clock_rate import common_rates
-from tpjb_ident.bands.run_spectra import RunSpectra, SpectraSettings, run_clocks, run_spectra
+from tpjb_ident.bands.run_spectra import RunSpectra, SpectraSettings, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.excluded_runs import ExcludedRun
 
-#: Kinds that excite every frequency again and again: what a sweep does once tells nothing of clocks.
-_TELL_CLOCKS = ("multisine", "random", "impact")
 #: Lines over a band where a record resolves more, and bins that a line takes at least.
 _LINES, _BINS = 60, 18
 #: Bins that one response is fitted to, about: over so few it is a straight line, and enough are left for the noise.
@@ -73,19 +70,22 @@ class BandPoint:
     @property
     def method(self) -> str:
         """What tells noise from motion: the periods, the command, or nothing."""
-        if self.spectra[0].period is not None and len(self.spectra) > 1:
+        if self.spectra[0].period is not None:
             return "periods"
         return "iv" if all(s.command is not None for s in self.spectra) else "hv"
 
 
 def read_point(
-    group: BandGroup, housing_mass: float, settings: PhasorSettings
+    group: BandGroup, housing_mass: float, settings: PhasorSettings, fast: Mapping[str, float]
 ) -> tuple[BandPoint | None, list[ExcludedRun]]:
-    """Transform the runs of a group, and name those that cannot be used; None where there is no other."""
+    """Transform the runs of a group, and name those that cannot be used; None where there is no other.
+
+    `fast`: rates of the channels' clocks by name, relative.
+    """
     spectra: list[RunSpectra] = []
     remaining = []
     seconds = min(run.length / run.sample_rate for run in group.runs)
-    chosen = _with_clocks(group, SpectraSettings(group.band, seconds, settings.lines.mains, settings.delays))
+    chosen = SpectraSettings(group.band, seconds, settings.lines.mains, settings.delays, fast)
     for run in group.runs:
         try:
             spectra.append(run_spectra(run, housing_mass, chosen))
@@ -94,18 +94,6 @@ def read_point(
     if not spectra:
         return None, remaining
     return BandPoint(group, spectra, line_plan(_alike(spectra))), remaining
-
-
-def _with_clocks(group: BandGroup, settings: SpectraSettings) -> SpectraSettings:
-    """The settings with the differences between clocks that the group's runs show together."""
-    clocks = []
-    for run in group.runs if group.kind in _TELL_CLOCKS else ():
-        try:
-            clocks.append(run_clocks(run, settings))
-        except RigDataError:  # its own transform says so
-            continue
-    reach = 2 * np.pi * group.band[1] * (settings.seconds or 0.0)
-    return replace(settings, clocks=common_rates(clocks, reach))
 
 
 def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:

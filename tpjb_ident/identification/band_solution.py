@@ -7,7 +7,7 @@ that is nearest to the band's lines: it need not hold over the band, only bend h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -62,15 +62,17 @@ class BandSolution:
     run_scatter: float  #: of the runs' gains
 
 
-def solve_bands(rig: Rig, data: BandBlocks, correct: bool, told: BoolArray) -> BandSolution:
-    """Solve all bands; `told` (L,): lines whose excitation stands clear of the noise."""
+def solve_bands(
+    rig: Rig, data: BandBlocks, correct: bool, told: BoolArray, taken_off: Mapping[str, float]
+) -> BandSolution:
+    """Solve all bands; `told` (L,): lines whose excitation stands clear of the noise, `taken_off`: rates of clocks."""
     crude, condition = _crude(rig, data)
     regular = data.driven & (condition < _ONE_LINE)
     usable, used = regular & told, regular
     curve = _curve(data, used, crude, usable)
     bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
     start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)
-    task = _Task(rig, data, (), correct, None)
+    task = _Task(rig, data, (), correct, taken_off, None)
     solution, task, size = _lines(task, start, used)
     h = np.full((len(data.band), 2, 2), np.nan + 0j)
     # at the first point of every line
@@ -105,6 +107,7 @@ class _Task:
     data: BandBlocks
     terms: tuple[Term, ...]
     correct: bool
+    taken_off: Mapping[str, float]  #: rates of devices' clocks, put right before
     kept: Solution | None  #: whose scatter, weights and shared parameters stay
 
     def solved(self, start: ComplexArray, shape: Shape, begun: Solution | None = None) -> Solution:
@@ -119,8 +122,8 @@ class _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
         film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line], self.data.uneven)
-        terms = campaign_terms(rig, blocks, self.correct, [RunGain(rig, blocks, deviation), film])
-        return replace(self, terms=tuple(term for term in terms if not isinstance(term, Clock)))
+        made = [RunGain(rig, blocks, deviation), film, Clock(rig, blocks, self.taken_off)]
+        return replace(self, terms=tuple(campaign_terms(rig, blocks, self.correct, made)))
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:

@@ -9,7 +9,9 @@ import numpy as np
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
 from tpjb_ident.bands.classic import ClassicLine
 from tpjb_ident.conditions import Condition, merged
+from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.shape import MODELS, real_numbers
+from tpjb_ident.estimate.solve import Solution
 from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
@@ -20,8 +22,9 @@ from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequenc
 from tpjb_ident.results.harmonics import FilmChange, change_conditions
 from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import feeds_motion
+from tpjb_ident.runs.excluded_runs import ExcludedRun
 from tpjb_ident.runs.point_data import pad_means
-from tpjb_ident.runs.static_load import LoadMiss
+from tpjb_ident.runs.static_load import LoadMiss, StaticLoads
 
 
 @dataclass(frozen=True)
@@ -29,14 +32,31 @@ class SolvedBands:
     """All bands with their solve; where there is no instrument, one with all noise on the force, one with all on D."""
 
     points: tuple[BandPoint, ...]
+    loads: StaticLoads
     data: BandBlocks
     classic: tuple[ClassicLine, ...]  #: by line
     solutions: tuple[BandSolution, ...]
+    excluded: tuple[ExcludedRun, ...] = ()
 
     @property
     def first(self) -> BandSolution:
         """The solve that counts, or the lower of two."""
         return self.solutions[0]
+
+    @property
+    def rig(self) -> Rig:
+        """As the solve that counts knows it."""
+        return self.first.rig
+
+    @property
+    def blocks(self) -> Blocks:
+        """Of the solve that counts."""
+        return self.data.blocks
+
+    @property
+    def solution(self) -> Solution:
+        """Of the lines."""
+        return self.first.lines
 
     def usable(self, b: int) -> IntArray:
         """Lines of a band with an answer."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.conditions import Condition
-from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Sensor, stacked
+from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, stacked
 from tpjb_ident.estimate.noise import unbiased_noise
 from tpjb_ident.estimate.sensors import axes_of, sensors_of
 from tpjb_ident.identification.point_means import PointMeans
@@ -38,14 +37,6 @@ def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[i
     means = {run: float(np.mean(list(temperatures.values()))) for run, temperatures in measured if temperatures}
     stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
     return means | stated
-
-
-def with_start(sensors: Sequence[Sensor], start: float) -> tuple[Sensor, ...]:
-    """The sensors; devices beside the first start recording within `start` [s] of it where no delay is stated."""
-    first = sensors[0].device
-    return tuple(
-        replace(s, delay_uncertainty=start) if s.device != first and not s.delay_uncertainty else s for s in sensors
-    )
 
 
 def campaign_blocks(

@@ -9,18 +9,18 @@ import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.campaign import Campaign
-from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, film_force, vector
+from tpjb_ident.estimate.blocks import Blocks, Rig, RigStiffness, Sensor, film_force, vector
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
 from tpjb_ident.estimate.solve import Solution, Solver
-from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures, with_start
+from tpjb_ident.identification.campaign_blocks import campaign_blocks, run_temperatures
+from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.point_means import MeansTask, PointMeans, point_means, sensor_axes
-from tpjb_ident.identification.unstated_clocks import with_found_devices
 from tpjb_ident.results.harmonics import FilmChange, film_change
 from tpjb_ident.runs.finished_runs import RunDigest
 from tpjb_ident.runs.point_data import PointData
 from tpjb_ident.runs.static_load import StaticLoads, static_loads
 from tpjb_ident.runtime.executors import Workers, map_ordered
-from tpjb_ident.terms.clock import START, Clock
+from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.mains import (
     MAINS_ON_LINE,
     MainsFit,
@@ -32,8 +32,6 @@ from tpjb_ident.terms.mains import (
 )
 from tpjb_ident.terms.registry import campaign_terms, learnt_rig
 
-#: Passes over the windows in which the clocks' rates are found.
-_CLOCK_PASSES = 2
 #: Scatter of the force from run to run with which mains is fitted, at least.
 _LEAST_SCATTER = 1e-3
 
@@ -64,6 +62,19 @@ class CampaignSolution:
         return h
 
 
+@dataclass(frozen=True)
+class _Pass:
+    """The records averaged and solved once."""
+
+    task: MeansTask
+    means: tuple[PointMeans, ...]
+    film: tuple[FilmChange, ...]
+    blocks: Blocks
+    rig: Rig
+    start: ComplexArray
+    solution: Solution
+
+
 def solve_campaign(
     campaign: Campaign,
     points: Sequence[PointData],
@@ -75,44 +86,38 @@ def solve_campaign(
     """Means of all points, clocks, one solve; where mains is on a line, its angles and the solve once more."""
     sensors = sensors_of(campaign)
     temperatures = run_temperatures(campaign, [(digest.run, digest.temperatures) for digest in digests])
-    task = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
+    common = MeansTask(sensors, sensor_axes(sensors, campaign), temperatures=temperatures)
     loads = static_loads(campaign, points)
-    offsets: dict[str, float] = {}
 
-    def solver(rig: Rig, blocks: Blocks, start: ComplexArray) -> Solver:
-        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, offsets)])
+    def solver(rig: Rig, blocks: Blocks, start: ComplexArray, rates: Mapping[str, float]) -> Solver:
+        terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, rates)])
         return Solver(rig, blocks, terms, start, correct)
 
-    for count in range(_CLOCK_PASSES + 1):
+    def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> _Pass:
+        task = replace(common, sensors=sensors, rates=rates)
         means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
-        if count == 0:
-            rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
-            devices = with_found_devices(sensors, blocks)
-            # devices that the manifest states are taken at their times; one that was found started when nobody knows
-            sensors = sensors if devices == sensors else with_start(devices, START / rate)
         rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
         start = _starts(rig, points, means)
-        solution = solver(rig, blocks, start).run()
-        if len({sensor.device for sensor in sensors}) == 1 or count == _CLOCK_PASSES:
-            break
-        rates = Clock(rig, blocks).rates(solution.fitted[Clock.name].value)
-        offsets = {device: offsets.get(device, 0.0) + rate for device, rate in rates.items()}
-        task = replace(task, sensors=sensors, rates=offsets)
+        return _Pass(task, means, film, blocks, rig, start, solver(rig, blocks, start, rates).run())
+
+    rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
+    last = solved_with_clocks(sensors, rate, solved)
+    task, means, blocks, rig, start, solution = last.task, last.means, last.blocks, last.rig, last.start, last.solution
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
-        rig, solution = learnt, solver(learnt, blocks, start).begun(solution).run()
+        rig, solution = learnt, solver(learnt, blocks, start, task.rates).begun(solution).run()
     pickup, fits = _mains(points, digests, rig, blocks, solution) if correct else (None, {})
     shift = np.zeros_like(blocks.z)
     if fits:
         shift = _mains_readings(rig, blocks, fits)
-        solution = solver(rig, replace(blocks, z=blocks.z - shift), start).run()
+        solution = solver(rig, replace(blocks, z=blocks.z - shift), start, task.rates).run()
     force = force_pickup([digest.mains_force for digest in digests])
     in_cells = _in_cells(points, rig, blocks, force)
     size = float(np.linalg.norm(force))
-    return CampaignSolution(rig, task, blocks, means, loads, film, solution, pickup, fits, in_cells, size, shift)
+    return CampaignSolution(rig, task, blocks, means, loads, last.film, solution, pickup, fits, in_cells, size, shift)
 
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,14 +20,14 @@ from tpjb_ident.identification.band_conditions import band_conditions, run_condi
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
 from tpjb_ident.identification.band_solution import BandSolution, solve_bands
 from tpjb_ident.identification.band_tables import SolvedBands, band_result
-from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated, with_start
+from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
+from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
-from tpjb_ident.runs.static_load import StaticLoads, static_loads
-from tpjb_ident.terms.clock import START
+from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.terms.registry import cell_stiffness
 
 Progress = Callable[[str, int, int], None]
@@ -47,18 +47,24 @@ def identify_bands(
         progress(run.id, done, len(runs))
         seen.append(observe(run))
     checked = campaign_verdicts(campaign, seen)
-    remaining = [
+    unusable = [
         ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
     ]
-    points: list[BandPoint] = []
-    for group in band_groups(tuple(run for run in runs if run.id not in checked.unusable)):
-        point, bad = read_point(group, campaign.housing_mass, settings.phasors)
-        remaining += bad
-        points += [] if point is None else [point]
-    if not points:
-        raise remaining[0].error
-    loads = static_loads(campaign, points)
-    solved = _solved(campaign, points, loads, settings, bare)
+    groups = band_groups(tuple(run for run in runs if run.id not in checked.unusable))
+
+    def solve(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> SolvedBands:
+        fast = {sensor.name: rates[sensor.device] for sensor in sensors if sensor.device in rates}
+        points, bad = [], list(unusable)
+        for group in groups:
+            point, without = read_point(group, campaign.housing_mass, settings.phasors, fast)
+            points += [] if point is None else [point]
+            bad += without
+        if not points:
+            raise bad[0].error
+        return replace(_solved(campaign, points, sensors, rates, settings, bare), excluded=tuple(bad))
+
+    solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
+    points, remaining, loads = solved.points, solved.excluded, solved.loads
     results = []
     for b, point in enumerate(points):
         conditions = merged(
@@ -81,13 +87,14 @@ def identify_bands(
 
 def _solved(
     campaign: Campaign,
-    points: list[BandPoint],
-    loads: StaticLoads,
+    points: Sequence[BandPoint],
+    sensors: tuple[Sensor, ...],
+    rates: Mapping[str, float],
     settings: IdentifySettings,
     bare: RigStiffness,
 ) -> SolvedBands:
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
-    sensors = _sensors(campaign, points)
+    loads = static_loads(campaign, points)
     classic = []
     for point in points:
         ends = point.group.kind in OPEN_ENDS
@@ -102,10 +109,10 @@ def _solved(
         own = band_blocks(points, sensors, loads.misses, temperatures, instruments)
         own = own.with_film(points, settings.clearance) if settings.clearance else own
         rig = campaign_rig(campaign, sensors, own.blocks, loads.common, bare)
-        solutions.append(solve_bands(rig, own, settings.correct, _told(points, own, classic)))
+        solutions.append(solve_bands(rig, own, settings.correct, _told(points, own, classic), rates))
         data = data or own
     assert data is not None
-    return SolvedBands(tuple(points), data, tuple(classic), tuple(solutions))
+    return SolvedBands(tuple(points), loads, data, tuple(classic), tuple(solutions))
 
 
 def _told(points: Sequence[BandPoint], data: BandBlocks, classic: Sequence[ClassicLine]) -> np.ndarray:
@@ -113,12 +120,3 @@ def _told(points: Sequence[BandPoint], data: BandBlocks, classic: Sequence[Class
     quiet = np.array([points[b].method == "hv" for b in data.band], dtype=bool)
     coherence = np.array([float(np.min(line.coherence)) for line in classic])
     return np.where(quiet, np.nan_to_num(coherence) > _LEAST_COHERENCE, data.strength > STRONG)
-
-
-def _sensors(campaign: Campaign, points: Sequence[BandPoint]) -> tuple[Sensor, ...]:
-    """The campaign's sensors; quantities whose clocks were put right started within a sample of the probes."""
-    spectra = [s for point in points for s in point.spectra]
-    apart = frozenset().union(*(s.clocks for s in spectra))
-    rate = min(run.sample_rate for point in points for run in point.group.runs)
-    devices = [replace(s, device="cells") if s.quantity in apart else s for s in sensors_of(campaign)]
-    return with_start(devices, START / rate) if apart else tuple(devices)

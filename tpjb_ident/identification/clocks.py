@@ -1,20 +1,24 @@
-"""Whether quantities were recorded by devices of their own, where the manifest states no clock.
+"""Clocks of further devices, found as a solve of the records goes on: whether there are any, and how fast they run.
 
 Cells on a clock that is off by e turn against the probes by 2 pi f e per second, alike in all runs and at all lines in
 proportion to their frequency. A beat or a wander of one device does neither. So a clock is supposed only where one
-rate explains the slopes of all runs; where the manifest states clocks, they are as stated.
+rate explains the slopes of all runs; where the manifest states clocks, they are as stated. Over a band its responses
+turn as the windows of sines do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 from scipy.special import chdtrc
 
 from rigdata.arrays import ComplexArray, FloatArray
-from tpjb_ident.estimate.blocks import Blocks, Sensor
+from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
+from tpjb_ident.estimate.solve import Solution
+from tpjb_ident.terms.clock import START, Clock
 
 #: Standard errors beyond which a rate is one, and phase [rad] over a record from which it matters.
 _CLEAR, _NOTABLE = 6.0, 2e-3
@@ -22,24 +26,72 @@ _CLEAR, _NOTABLE = 6.0, 2e-3
 _ONE_RATE = 1e-3
 #: Rounds of the robust mean over the runs.
 _ROUNDS = 10
+#: Passes over the records in which the clocks' rates are found, at most, and phase [rad] over a record that the solve
+#: puts right by itself.
+_CLOCK_PASSES, _TURNED = 2, 1e-2
 
 
-def with_found_devices(sensors: Sequence[Sensor], blocks: Blocks) -> tuple[Sensor, ...]:
-    """The sensors, cells and accelerometers with devices of their own where their phases show them."""
-    if any(sensor.device for sensor in sensors):
-        return tuple(sensors)
-    force = _rate(sensors, blocks, "force")
+class Solved(Protocol):
+    """What a solve of the records gives."""
+
+    @property
+    def rig(self) -> Rig:
+        """Its sensors, by their devices."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """What the records say."""
+
+    @property
+    def solution(self) -> Solution:
+        """What the terms became."""
+
+
+Answer = TypeVar("Answer", bound=Solved)
+
+
+def solved_with_clocks(
+    sensors: tuple[Sensor, ...], rate: float, solve: Callable[[tuple[Sensor, ...], Mapping[str, float]], Answer]
+) -> Answer:
+    """Solve, find the devices, and solve again with the rates of their clocks put right in the records.
+
+    `solve` takes sensors and the rates found by device; `rate` [Hz] of the records. Devices that the manifest states
+    are taken at their times; one that was found started within a sample of the first.
+    """
+    answer = solve(sensors, {})
+    sensors, rates = with_found_devices(sensors, answer.blocks, START / rate)
+    if rates:
+        answer = solve(sensors, rates)
+    for _ in range(_CLOCK_PASSES if len({sensor.device for sensor in sensors}) > 1 else 0):
+        more = Clock(answer.rig, answer.blocks).rates(answer.solution.fitted[Clock.name].value)
+        turn = max(map(abs, more.values())) * float((2 * answer.blocks.time * answer.blocks.omega).max())
+        if turn < _TURNED:
+            break
+        rates = {device: rates.get(device, 0.0) + change for device, change in more.items()}
+        answer = solve(sensors, rates)
+    return answer
+
+
+def with_found_devices(
+    sensors: tuple[Sensor, ...], blocks: Blocks, start: float
+) -> tuple[tuple[Sensor, ...], dict[str, float]]:
+    """The sensors, cells and accelerometers with devices of their own where their phases show them, and their rates.
+
+    They started within `start` [s] of the first, one deviation.
+    """
+    force = None if any(sensor.device for sensor in sensors) else _rate(sensors, blocks, "force")
     if force is None or not force.clear:
-        return tuple(sensors)
+        return sensors, {}
     acceleration = _rate(sensors, blocks, "acceleration")
     # too weak to tell: as a rule accelerometers are recorded with the cells
-    device = "cells"
+    devices, rates = {"force": "cells", "acceleration": "cells"}, {"cells": force.rate}
     if acceleration is not None and abs(acceleration.rate - force.rate) > _CLEAR * np.hypot(
         acceleration.error, force.error
     ):
-        device = "accelerometers" if acceleration.clear else ""
-    names = {"force": "cells", "acceleration": device}
-    return tuple(replace(sensor, device=names.get(sensor.quantity, "")) for sensor in sensors)
+        devices["acceleration"] = "accelerometers" if acceleration.clear else ""
+        rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
+    apart = [replace(s, device=devices.get(s.quantity, "")) for s in sensors]
+    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.device else s for s in apart), rates
 
 
 @dataclass(frozen=True)
