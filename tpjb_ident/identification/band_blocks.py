@@ -11,7 +11,7 @@ from rigdata.arrays import BoolArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
-from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra
+from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor, stacked, vector
 from tpjb_ident.estimate.sensors import alive, axes_of
 from tpjb_ident.identification.band_point import BandPoint
@@ -20,15 +20,17 @@ from tpjb_ident.identification.point_means import warm_gain
 from tpjb_ident.runs.static_load import LoadMiss
 from tpjb_ident.terms.distortion import band_change, line_scatter
 
-#: F ratio from which an excitation tells the displacements from their noise.
+#: F ratio from which an excitation tells the displacements from their noise,
 STRONG = 10.0
+#: and coherence of the force with the displacements where nothing else tells signal from noise.
+_LEAST_COHERENCE = 0.5
 #: Noise that responses have at least, of the run's largest: one without an instrument may have none.
 _LEAST = 1e-8
 
 
 @dataclass(frozen=True)
 class BandBlocks:
-    """Blocks of all bands, and what belongs together."""
+    """Blocks of all bands, and what belongs together: P groups of bins, L lines, B bands."""
 
     blocks: Blocks = field(repr=False)
     omega: FloatArray  #: (P,), rad/s: of every point
@@ -36,79 +38,74 @@ class BandBlocks:
     band: IntArray  #: (L,): band of every line
     line_omega: FloatArray  #: (L,), rad/s
     driven: BoolArray  #: (L,): whether an excitation stands above the noise
-    strength: FloatArray  #: (L,): F ratio of the weaker direction of motion
-    bent: FloatArray = field(default_factory=lambda: np.zeros(0))  #: (B,): share by which the motion may change H
-    uneven: FloatArray | None = None  #: (B,): relative scatter of the lines' film force, in one phase set
-
-    def with_film(self, points: Sequence[BandPoint], clearance: float) -> BandBlocks:
-        """With what a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
-        bent, scatter = np.zeros(len(points)), np.zeros(len(points))
-        for b, point in enumerate(points):
-            rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
-            one_sided = max(s.one_sided for s in point.spectra)
-            # two tones make nothing of one another that falls on them
-            pair = point.method == "periods" and tones(point.spectra) < 3
-            bent[b] = band_change("pair" if pair else point.group.kind, rms, peak, one_sided)
-            if point.method == "periods" and not pair and one_phase_set(point.spectra):
-                # alike in all runs: more than the two that h needs do not average it away
-                scatter[b] = line_scatter(rms) * np.sqrt(max(len(point.spectra), 2) / 2)
-        return replace(self, bent=bent, uneven=scatter)
+    clear: BoolArray  #: (L,): whether it does so by far in both directions
+    bent: FloatArray  #: (B,): share by which the motion may change H
+    uneven: FloatArray  #: (B,): relative scatter of the lines' film force, in one phase set
 
 
 def band_blocks(
     points: Sequence[BandPoint],
-    sensors: Sequence[Sensor],
+    sensors: tuple[Sensor, ...],
     misses: Sequence[LoadMiss],
     temperatures: Mapping[str, float],
-    instruments: Sequence[str],
+    clearance: float | None,
+    turn: int = 0,
 ) -> BandBlocks:
-    """Responses of all runs; `instruments` by band."""
+    """Responses of all runs; without an instrument of the runs, to the one or the other by `turn`."""
+    plans = [point.plan for point in points]
+    groups = np.cumsum([0, *(len(plan.bins) for plan in plans)])
+    lines = np.cumsum([0, *(len(plan.frequencies) for plan in plans)])
     rows: list[dict[str, object]] = []
     known: list[list[Hashable]] = [[] for _ in sensors]
-    lines: list[int] = []
-    bands: list[int] = []
-    runs: list[str] = []
-    omega: list[float] = []
-    line_omega: list[float] = []
     operating: list[OperatingPoint] = []
-    for b, (point, miss, instrument) in enumerate(zip(points, misses, instruments)):
-        first = len(omega)
-        groups = [(k, bins) for k, parts in enumerate(point.plan.groups) for bins in parts]
-        for k, bins in groups:
-            f = float(point.spectra[0].frequencies[bins].mean())
-            omega.append(2 * np.pi * f)
-            operating.append(replace(point.point, excitation=2 * np.pi * round(f, 2)))
-            lines.append(len(line_omega) + k)
-        line_omega += [2 * np.pi * float(f) for f in point.plan.frequencies]
-        bands += [b] * len(point.plan.groups)
-        for members in _members(point):
+    runs: list[str] = []
+    for b, (point, miss) in enumerate(zip(points, misses)):
+        operating += [replace(point.point, excitation=2 * np.pi * round(f, 2)) for f in point.plan.middles.tolist()]
+        for members in point.members:
             spectra = [point.spectra[r] for r in members]
-            warmth = [temperatures.get(s.phasors.run, np.nan) for s in spectra]
+            names = [s.phasors.run for s in spectra]
+            warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
             row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
-            row |= {"run": len(runs), "temperature": warmth[0], "miss": miss.of(members)}
-            for place, response in _run_rows(point, spectra, channels, warmth[0], instrument):
-                rows.append(response | row | {"point": first + place, "omega": omega[first + place]})
-            runs.append(", ".join(s.phasors.run for s in spectra))
+            row |= {"run": len(runs), "temperature": warmth, "miss": miss.of(members)}
+            for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
+                at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
+                rows += [one | row | at for one in response]
+            runs.append(", ".join(names))
     blocks = stacked(operating, runs, len(sensors), rows)
-    of_point = np.array(lines, dtype=np.intp)
-    driven = np.zeros(len(line_omega), dtype=bool)
-    np.logical_or.at(driven, of_point[blocks.point], np.array([row["stands"] for row in rows], dtype=bool))
+    line = np.concatenate([plan.line + first for plan, first in zip(plans, lines)])
+    driven = np.zeros(lines[-1], dtype=bool)
+    np.logical_or.at(driven, line[blocks.point], np.array([row["stands"] for row in rows], dtype=bool))
+    coherent = np.concatenate([[c.coherence.min() for c in point.classic] for point in points])
+    strong = _strengths(Rig(sensors, 1.0), blocks, line[blocks.point], len(driven)) > STRONG
+    band = np.repeat(np.arange(len(points)), np.diff(lines))
+    quiet = np.array([point.method == "hv" for point in points])[band]
+    bent, uneven = np.array([_film(point, clearance) for point in points]).T
     return BandBlocks(
-        blocks.part(np.flatnonzero(driven[of_point[blocks.point]])),
-        np.array(omega),
-        of_point,
-        np.array(bands, dtype=np.intp),
-        np.array(line_omega),
+        blocks.part(np.flatnonzero(driven[line[blocks.point]])),
+        2 * np.pi * np.concatenate([plan.middles for plan in plans]),
+        line,
+        band,
+        2 * np.pi * np.concatenate([plan.frequencies for plan in plans]),
         driven,
-        _strengths(sensors, blocks, of_point[blocks.point], len(line_omega)),
+        np.where(quiet, np.nan_to_num(coherent) > _LEAST_COHERENCE, strong),
+        bent,
+        uneven,
     )
 
 
-def _members(point: BandPoint) -> list[list[int]]:
-    """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
-    runs = range(len(point.spectra))
-    return [list(runs)] if point.method == "hv" else [[r] for r in runs]
+def _film(point: BandPoint, clearance: float | None) -> tuple[float, float]:
+    """What a film that is not linear may do to H and, in one phase set of a multi-sine, to single lines."""
+    if not clearance:
+        return 0.0, 0.0
+    rms, peak = (max(getattr(s, name) for s in point.spectra) / clearance for name in ("rms", "peak"))
+    one_sided = max(s.one_sided for s in point.spectra)
+    periodic = point.method == "periods"
+    # two tones make nothing of one another that falls on them
+    pair = periodic and tones(point.spectra) < 3
+    # alike in all runs: more than the two that h needs do not average it away
+    repeats = np.sqrt(max(len(point.spectra), 2) / 2) if periodic and not pair and one_phase_set(point.spectra) else 0.0
+    return band_change("pair" if pair else point.group.kind, rms, peak, one_sided), line_scatter(rms) * repeats
 
 
 def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel | None]:
@@ -121,28 +118,20 @@ def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel |
 
 
 def _run_rows(
-    point: BandPoint,
-    runs: Sequence[RunSpectra],
-    channels: Sequence[Channel | None],
-    temperature: float,
-    instrument: str,
-) -> list[tuple[int, dict[str, object]]]:
-    """Place of its group and columns of every response of one run."""
+    point: BandPoint, runs: Sequence[RunSpectra], channels: Sequence[Channel | None], temperature: float, turn: int
+) -> list[list[dict[str, object]]]:
+    """Columns of the responses of one run, group by group."""
     m = len(channels)
-    spectra = runs[0]
-    names = [channel.name for channel in spectra.phasors.channels]
+    names = [channel.name for channel in runs[0].phasors.channels]
     order = [names.index(channel.name) for channel in channels if channel is not None]
     present = np.array([channel is not None for channel in channels])
     warm = None if np.isnan(temperature) else temperature
     gain = np.array([1.0 if c is None else warm_gain(c, warm) for c in channels])
-    ends = point.group.kind in OPEN_ENDS
-    groups = [bins for parts in point.plan.groups for bins in parts]
-    responses = [line_response(runs, bins, instrument, ends) for bins in groups]
-    noises, freedoms = pooled_noise(responses)
+    responses = [line_response(runs, bins, point.instruments[turn], point.open) for bins in point.plan.bins]
     least = _LEAST * np.max([np.abs(r.z).max(axis=0) for r in responses if len(r.z)], axis=0)
-    time = 0.5 * len(spectra.phasors.start) * spectra.phasors.length
-    rows: list[tuple[int, dict[str, object]]] = []
-    for place, (response, noise, freedom) in enumerate(zip(responses, noises, freedoms)):
+    time = 0.5 * len(runs[0].phasors.start) * runs[0].phasors.length
+    groups = []
+    for response, noise, freedom in zip(responses, *pooled_noise(responses)):
         single = np.zeros((m, m), complex)
         single[np.ix_(present, present)] = (noise + response.count * np.diag(least**2))[np.ix_(order, order)]
         single /= np.outer(gain, gain)
@@ -151,22 +140,19 @@ def _run_rows(
         z[:, present], slope[:, present] = response.z[:, order], response.slope[:, order]
         row = {"present": present, "noise": covariance, "dof": freedom, "time": time, "windows": response.repeats}
         row["stands"] = stands_out(np.asarray(z / gain), covariance, freedom, present)
-        for values, change, size in zip(z / gain, slope / gain, response.slope_size):
-            rows.append((place, row | {"z": values, "slope": change, "slope_noise": single * size}))
-    return rows
+        moving = zip(z / gain, slope / gain, response.slope_size)
+        groups.append([row | {"z": a, "slope": change, "slope_noise": single * size} for a, change, size in moving])
+    return groups
 
 
-def _strengths(sensors: Sequence[Sensor], blocks: Blocks, line: IntArray, lines: int) -> FloatArray:
+def _strengths(rig: Rig, blocks: Blocks, line: IntArray, lines: int) -> FloatArray:
     """F ratio of every line's weaker direction of motion over its noise, (L,); `line` (n,) of the blocks."""
-    probes = Rig(tuple(sensors), 1.0).of("displacement")
-    motion = np.nan_to_num(vector(Rig(tuple(sensors), 1.0), blocks, "displacement"))
+    probes = rig.of("displacement")
+    plane = np.linalg.pinv(blocks.along[:, probes] * blocks.present[:, probes, None])
+    noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
+    size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
+    white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
     strength = np.zeros(lines)
-    white = np.zeros((len(blocks), 2), complex)
-    for b in range(len(blocks)):
-        seen = probes[blocks.present[b, probes]]
-        plane = np.linalg.pinv(blocks.along[b, seen])
-        noise = plane @ blocks.noise[b][np.ix_(seen, seen)] @ plane.T
-        white[b] = motion[b] / np.sqrt(max(float(np.trace(noise).real) / 2, 1e-300))
     for k in range(lines):
         rows = white[line == k]
         if len(rows) > 1:

@@ -68,7 +68,8 @@ def _disturbances(point: BandPoint) -> list[Condition]:
 def _instrument(point: BandPoint, solved: SolvedBands, usable: np.ndarray) -> list[Condition]:
     if point.method != "hv" or not len(usable):
         return []
-    low = float(np.median([solved.classic[k].coherence.min() for k in usable]))
+    first = int(np.searchsorted(solved.data.band, solved.data.band[usable[0]]))
+    low = float(np.median([point.classic[k - first].coherence.min() for k in usable]))
     text = f"no command channel, and nothing repeats: the intervals reach from H1 to H2 (coherence {low:.3f})"
     flags = [Condition("no-instrument", text)]
     if low < _LOW_COHERENCE:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
-from tpjb_ident.bands.run_spectra import RunSpectra, SpectraSettings, run_spectra
+from tpjb_ident.bands.classic import ClassicLine, classic_line
+from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.excluded_runs import ExcludedRun
@@ -42,9 +44,11 @@ class BandGroup:
 
 @dataclass(frozen=True)
 class LinePlan:
-    """Groups of bins that belong to each line: one bin of a period, or some neighbouring bins of a whole record."""
+    """Groups of bins, and the line of each: one bin of a period, or some neighbouring bins of a whole record."""
 
-    groups: tuple[tuple[IntArray, ...], ...]
+    bins: tuple[IntArray, ...]
+    line: IntArray  #: (n_groups,)
+    middles: FloatArray  #: (n_groups,), Hz
     frequencies: FloatArray  #: (n_lines,), Hz
     resolution: float  #: Hz: width of a line
 
@@ -63,6 +67,11 @@ class BandPoint:
         return self.group.point
 
     @property
+    def runs(self) -> tuple[str, ...]:
+        """Names."""
+        return tuple(s.phasors.run for s in self.spectra)
+
+    @property
     def mean_loads(self) -> FloatArray:
         """Mean cell force of every run, (n_runs, 2) [N]."""
         return np.array([s.mean_load for s in self.spectra])
@@ -73,6 +82,31 @@ class BandPoint:
         if self.spectra[0].period is not None:
             return "periods"
         return "iv" if all(s.command is not None for s in self.spectra) else "hv"
+
+    @property
+    def instruments(self) -> tuple[str, str]:
+        """What is taken for the source of motion: without an instrument first one, then the other of these."""
+        return {"periods": ("periods", "periods"), "iv": ("command", "command")}.get(
+            self.method, ("displacement", "force")
+        )
+
+    @property
+    def members(self) -> list[list[int]]:
+        """Runs that are taken together: each by itself, all of them where nothing tells noise from motion."""
+        places = list(range(len(self.spectra)))
+        return [places] if self.method == "hv" else [[place] for place in places]
+
+    @property
+    def open(self) -> bool:
+        """Whether the records may begin and end in motion."""
+        return self.group.kind in OPEN_ENDS
+
+    @cached_property
+    def classic(self) -> list[ClassicLine]:
+        """Every line by the methods of analysers."""
+        lines = range(len(self.plan.frequencies))
+        groups = [[self.plan.bins[g] for g in np.flatnonzero(self.plan.line == k)] for k in lines]
+        return [classic_line(self.spectra, bins, self.open) for bins in groups]
 
 
 def read_point(
@@ -137,7 +171,8 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
     period = spectra[0].period
     if period is not None:
         chosen = np.flatnonzero(free)
-        return LinePlan(tuple((np.array([k]),) for k in chosen), frequencies[chosen], 1 / period)
+        single, at = np.split(chosen, len(chosen)), frequencies[chosen]
+        return LinePlan(tuple(single), np.arange(len(chosen)), at, at, 1 / period)
     n = len(frequencies)
     width = max(_BINS, math.ceil(n / _LINES))
     count = n // width
@@ -150,6 +185,9 @@ def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
         )
     lines = [part[free[part]] for part in np.array_split(np.arange(n), count)]
     lines = [part for part in lines if len(part) >= _LEAST_BINS]
-    groups = tuple(tuple(np.array_split(part, max(round(len(part) / _GROUP), 1))) for part in lines)
-    middles = np.array([0.5 * (frequencies[part[0]] + frequencies[part[-1]]) for part in lines])
-    return LinePlan(groups, middles, width * float(frequencies[1] - frequencies[0]))
+    groups = [np.array_split(part, max(round(len(part) / _GROUP), 1)) for part in lines]
+    bins = tuple(group for parts in groups for group in parts)
+    line = np.repeat(np.arange(len(groups)), [len(parts) for parts in groups])
+    ends = np.array([frequencies[part[[0, -1]]] for part in lines]).reshape(-1, 2)
+    middles = np.array([frequencies[group].mean() for group in bins])
+    return LinePlan(bins, line, middles, ends.mean(axis=1), width * float(frequencies[1] - frequencies[0]))

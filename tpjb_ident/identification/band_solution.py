@@ -62,13 +62,11 @@ class BandSolution:
     run_scatter: float  #: of the runs' gains
 
 
-def solve_bands(
-    rig: Rig, data: BandBlocks, correct: bool, told: BoolArray, taken_off: Mapping[str, float]
-) -> BandSolution:
-    """Solve all bands; `told` (L,): lines whose excitation stands clear of the noise, `taken_off`: rates of clocks."""
+def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[str, float]) -> BandSolution:
+    """Solve all bands; `taken_off`: rates of clocks."""
     crude, condition = _crude(rig, data)
     regular = data.driven & (condition < _ONE_LINE)
-    usable, used = regular & told, regular
+    usable, used = regular & data.clear, regular
     curve = _curve(data, used, crude, usable)
     bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
     start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.bands.classic import ClassicLine
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.conditions import Condition, merged
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.shape import MODELS, real_numbers
@@ -16,7 +15,7 @@ from tpjb_ident.estimators.stiffness import DynamicStiffness
 from tpjb_ident.identification.band_blocks import BandBlocks
 from tpjb_ident.identification.band_point import BandPoint
 from tpjb_ident.identification.band_solution import BandSolution
-from tpjb_ident.identification.shared_changes import sources_of, total
+from tpjb_ident.identification.shared_changes import shared_changes, sources_of, total
 from tpjb_ident.results.band_result import BandLine, BandResult
 from tpjb_ident.results.frequency_model import FrequencyModel, fit_over_frequency, supported
 from tpjb_ident.results.harmonics import FilmChange, change_conditions
@@ -24,7 +23,10 @@ from tpjb_ident.results.point_result import PointResult, mean_position
 from tpjb_ident.results.quality import feeds_motion
 from tpjb_ident.runs.excluded_runs import ExcludedRun
 from tpjb_ident.runs.point_data import pad_means
-from tpjb_ident.runs.static_load import LoadMiss, StaticLoads
+from tpjb_ident.runs.static_load import StaticLoads
+
+#: Source of what the solves without an instrument are apart.
+_BRACKET = "no instrument"
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,6 @@ class SolvedBands:
     points: tuple[BandPoint, ...]
     loads: StaticLoads
     data: BandBlocks
-    classic: tuple[ClassicLine, ...]  #: by line
     solutions: tuple[BandSolution, ...]
     excluded: tuple[ExcludedRun, ...] = ()
 
@@ -67,103 +68,109 @@ class SolvedBands:
         """Parts of a band that become points."""
         return [q for q, part in enumerate(self.first.parts) if part.band == b] if len(self.usable(b)) else []
 
-    def between(self, h: list[ComplexArray]) -> tuple[ComplexArray, FloatArray]:
-        """The middle of the solves' H (2, 2), and half of what they are apart (8,) as a standard deviation.
+    def chosen(self, lines: IntArray) -> BoolArray:
+        """Blocks of some lines, (n,)."""
+        return np.isin(self.data.line[self.blocks.point], lines)
 
-        That of a rectangle is half its width by the root of three.
+    def noise_dof(self, lines: IntArray) -> float:
+        """Real degrees of freedom of the noise at some lines."""
+        chosen = self.chosen(lines)
+        return 2 * float(np.median(self.blocks.dof[chosen])) if chosen.any() else 1.0
+
+    def estimate(
+        self, solution: Solution, group: int, lines: IntArray, h: ComplexArray, method: str
+    ) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
+        """H of some lines, a group of a solve, by all solves `h` (s, 2, 2), and its covariances by source.
+
+        Where solves differ it is in their middle, and half of what they are apart a rectangle's half width.
         """
         half = 0.5 * (h[-1] - h[0])
-        return h[0] + half, real_numbers(half) / np.sqrt(3)
+        random, shared = sources_of(solution, group)
+        if half.any():
+            shared[_BRACKET] = np.diag(real_numbers(half) ** 2 / 3)
+        dof = solution.freedom(group, self.chosen(lines), self.noise_dof(lines))
+        omega, condition = float(self.data.line_omega[lines].mean()), float(np.median(self.first.condition[lines]))
+        est = DynamicStiffness(h[0] + half, omega, total(random.values()), dof, method, np.ones((1, 2)))
+        return replace(est, condition=condition, systematic=total(shared.values())), random | shared
 
 
-def band_result(
-    solved: SolvedBands, b: int, miss: LoadMiss, told: tuple[Condition, ...], clearance: float | None
-) -> BandResult:
-    """Lines, models and points of one band."""
-    point = solved.points[b]
-    lines = tuple(_line(solved, point, int(k)) for k in solved.usable(b))
-    models = _models(solved, b) if len(lines) else {}
-    chosen = supported(models) if models else "raw H"
-    ids = tuple(s.phasors.run for s in point.spectra)
-    period, width = point.spectra[0].period, point.plan.resolution
-    result = BandResult(point.point, point.group.kind, lines, models, chosen, told, ids, period, width)
-    return replace(result, points=tuple(_point(solved, q, result, miss, clearance) for q in solved.parts(b)))
-
-
-def _noise_dof(solved: SolvedBands, chosen: np.ndarray) -> float:
-    """Real degrees of freedom of the noise of some blocks."""
-    return 2 * float(np.median(solved.data.blocks.dof[chosen])) if chosen.any() else 1.0
+def band_results(
+    solved: SolvedBands, quality: list[tuple[Condition, ...]], clearance: float | None
+) -> tuple[tuple[BandResult, ...], FloatArray, tuple[str, ...]]:
+    """Lines, models and points of all bands, what the points share (q, 8 P) [N/m], and the names of that."""
+    bands = range(len(solved.points))
+    lines = [tuple(_line(solved, solved.points[b], int(k)) for k in solved.usable(b)) for b in bands]
+    parts = [solved.parts(b) for b in bands]
+    points = [tuple(_point(solved, q, lines[b], quality[b], clearance) for q in parts[b]) for b in bands]
+    apart = real_numbers(solved.solutions[-1].part_h - solved.first.part_h) / np.sqrt(12)
+    results = []
+    for b, data in enumerate(solved.points):
+        changes = np.concatenate([solved.first.part.factors, apart[None]])[:, parts[b]]
+        models = _models(solved, b, points[b], changes) if points[b] else {}
+        chosen = supported(models) if models else "raw H"
+        period, width = data.spectra[0].period, data.plan.resolution
+        known = lines[b], models, chosen, quality[b], data.runs, period, width, points[b]
+        results.append(BandResult(data.point, data.group.kind, *known))
+    every = [q for members in parts for q in members]
+    more = {_BRACKET: apart[every]} if apart.any() else {}
+    return (tuple(results), *shared_changes(solved.first.part, every, more))
 
 
 def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     """One line by the method that counts, and by the others."""
-    omega = float(solved.data.line_omega[k])
-    classic, solution = solved.classic[k], solved.first.lines
-    h, bracket = solved.between([s.h[k] for s in solved.solutions])
-    of_line = solved.data.line[solved.data.blocks.point]
-    dof = solution.freedom(k, of_line == k, _noise_dof(solved, of_line == k))
-    systematic = total(share[k] for share in solution.shares.values())
-    own = systematic + np.diag(bracket**2)
-    none, condition = np.empty((0, 2)), float(solved.first.condition[k])
-    best = DynamicStiffness(h, omega, solution.records[k], dof, point.method, none, condition=condition, systematic=own)
+    h = np.array([s.h[k] for s in solved.solutions])
+    best, budget = solved.estimate(solved.solution, k, np.array([k]), h, point.method)
+    classic = point.classic[k - int(np.searchsorted(solved.data.band, solved.data.band[k]))]
+    others = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
+    if _BRACKET in budget:
+        others |= {"h1": h[0], "h2": h[-1]}
+    free, shared = np.full(8, classic.freedom), total(sources_of(solved.solution, k)[1].values())
     table = {point.method: best}
-    rig = solved.first.rig.bare.at(np.array([omega]))[0]
-    others = {name: value - rig for name, value in classic.h.items()}
-    if len(solved.solutions) > 1 and bracket.any():
-        others |= {"h1": solved.solutions[0].h[k], "h2": solved.solutions[1].h[k]}
     for name, value in others.items():
-        free = np.full(8, classic.freedom)
-        other = DynamicStiffness(value, omega, classic.covariance, free, name, none, systematic=systematic)
+        other = DynamicStiffness(value, best.omega, classic.covariance, free, name, best.weights, systematic=shared)
         table.setdefault(name, other)
-    return BandLine(omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
+    return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 
-def _models(solved: SolvedBands, b: int) -> dict[str, FrequencyModel]:
-    """Models over one band, by its parts: all of them have their runs in common, and all that these share."""
-    part, data = solved.first.part, solved.data
-    lines = solved.first.used & (data.band == b)
-    members, of_part = solved.parts(b), _part_of_block(solved)
-    estimates, changes = [], []
-    for q in members:
-        h, bracket = solved.between([s.part_h[q] for s in solved.solutions])
-        change = np.concatenate([part.factors[:, q], bracket[None]])
-        omega, dof = solved.first.parts[q].omega, np.full(8, _noise_dof(solved, of_part == q))
-        shared = change.T @ change
-        none = np.empty((0, 2))
-        estimates.append(DynamicStiffness(h, omega, part.records[q], dof, "", none, systematic=shared))
-        changes.append(change)
-    together = np.sqrt(len(changes[0])) * np.concatenate(changes, axis=1)
-    band = data.line_omega[lines].min() / (2 * np.pi), data.line_omega[lines].max() / (2 * np.pi)
+def _models(
+    solved: SolvedBands, b: int, points: tuple[PointResult, ...], changes: FloatArray
+) -> dict[str, FrequencyModel]:
+    """Models over one band, by its parts: all of them have their runs in common, and all that these share.
+
+    `changes` (q, parts, 8): one deviation of every source.
+    """
+    used = solved.data.line_omega[solved.first.used & (solved.data.band == b)] / (2 * np.pi)
+    estimates = []
+    for q, p in zip(solved.parts(b), points):
+        records, dof = p.budget["random"], np.full(8, solved.noise_dof(solved.first.parts[q].lines))
+        shared = total(p.budget.values()) - records
+        estimates.append(replace(p.stiffness, covariance=records, dof=dof, systematic=shared))
+    together = np.sqrt(len(changes)) * changes.reshape(len(changes), -1)
     models = {}
     for name, matrices in MODELS.items():
-        if lines.sum() < 2 * matrices:
+        if len(used) < 2 * matrices:
             continue
         model = fit_over_frequency(estimates, name, together)
-        model = replace(model, band=band, n_frequencies=int(lines.sum()))
+        model = replace(model, band=(float(used.min()), float(used.max())), n_frequencies=len(used))
         if solved.points[b].method == "hv":  # without an instrument, the bias of either solve looks like a misfit
             model = replace(model, chi_square=np.nan, probability=np.nan, misfit=np.nan)
         models[name] = model
     return models
 
 
-def _part_of_block(solved: SolvedBands) -> IntArray:
-    """Part that every block belongs to (n,); -1 of those in none."""
-    of_line = np.full(len(solved.data.band), -1, dtype=np.intp)
-    for q, part in enumerate(solved.first.parts):
-        of_line[part.lines] = q
-    return of_line[solved.data.line[solved.data.blocks.point]]
-
-
-def _point(solved: SolvedBands, q: int, result: BandResult, miss: LoadMiss, clearance: float | None) -> PointResult:
+def _point(
+    solved: SolvedBands, q: int, lines: tuple[BandLine, ...], quality: tuple[Condition, ...], clearance: float | None
+) -> PointResult:
     """One part of a band as a point: its lines alone tell its h; K-C-M only says how h changes within it."""
     part = solved.first.parts[q]
     point = solved.points[part.band]
-    est, budget = _estimate(solved, point, q, result)
-    low, high = (solved.data.line_omega[part.lines[k]] / (2 * np.pi) for k in (0, -1))
-    inside = [line for line in result.lines if low - 1e-9 <= line.frequency <= high + 1e-9]
+    h = np.array([s.part_h[q] for s in solved.solutions])
+    est, budget = solved.estimate(solved.first.part, q, part.lines, h, f"band-{point.method}")
+    low, high = solved.data.line_omega[part.lines[[0, -1]]] / (2 * np.pi)
+    inside = [line for line in lines if low - 1e-9 <= line.frequency <= high + 1e-9]
     position, position_se = mean_position(np.array([s.position for s in point.spectra]))
     amplitude = max(s.amplitude for s in point.spectra)
-    share = float(solved.data.bent[part.band]) if len(solved.data.bent) else 0.0
+    share = float(solved.data.bent[part.band])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)
     return PointResult(
         point=replace(point.point, excitation=2 * np.pi * round(part.omega / (2 * np.pi), 3)),
@@ -178,30 +185,11 @@ def _point(solved: SolvedBands, q: int, result: BandResult, miss: LoadMiss, clea
         outlier_fraction=0.0,
         coherence=float(np.median([line.coherence.min() for line in inside])) if inside else float("nan"),
         amplitude=amplitude,
-        quality=merged(result.quality, feeds_motion(est), bent),
+        quality=merged(quality, feeds_motion(est), bent),
         rejected=(),
-        runs=result.runs,
-        load_miss=miss,
+        runs=point.runs,
+        load_miss=solved.loads.misses[part.band],
         inertia_corrected=point.spectra[0].phasors.acceleration is not None,
         clearance=clearance,
         budget=budget,
     )
-
-
-def _estimate(
-    solved: SolvedBands, point: BandPoint, q: int, result: BandResult
-) -> tuple[DynamicStiffness, dict[str, FloatArray]]:
-    """The part's h with all its uncertainties, and these by source."""
-    part, solution = solved.first.parts[q], solved.first.part
-    h, bracket = solved.between([s.part_h[q] for s in solved.solutions])
-    own, shared = sources_of(solution, q)
-    if bracket.any():
-        shared["no instrument"] = np.diag(bracket**2)
-    of_part = _part_of_block(solved) == q
-    dof = solution.freedom(q, of_part, _noise_dof(solved, of_part))
-    condition = float(np.median([line.stiffness.condition for line in result.lines])) if result.lines else np.nan
-    name, weights, systematic = f"band-{point.method}", np.ones((1, 2)), total(shared.values())
-    est = DynamicStiffness(
-        h, part.omega, total(own.values()), dof, name, weights, condition=condition, systematic=systematic
-    )
-    return est, own | shared

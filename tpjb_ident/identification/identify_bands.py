@@ -5,25 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from rigdata.campaign import Campaign
 from rigdata.problem import RigDataError
-from tpjb_ident.bands.classic import ClassicLine, classic_line
-from tpjb_ident.bands.run_spectra import OPEN_ENDS, is_broadband
+from tpjb_ident.bands.run_spectra import is_broadband
 from tpjb_ident.check.observation import observe
 from tpjb_ident.conditions import merged
 from tpjb_ident.estimate.blocks import RigStiffness, Sensor
 from tpjb_ident.estimate.sensors import campaign_rig, sensors_of
-from tpjb_ident.identification.band_blocks import STRONG, BandBlocks, band_blocks
+from tpjb_ident.identification.band_blocks import band_blocks
 from tpjb_ident.identification.band_conditions import band_conditions, run_conditions
 from tpjb_ident.identification.band_point import BandPoint, band_groups, read_point
-from tpjb_ident.identification.band_solution import BandSolution, solve_bands
-from tpjb_ident.identification.band_tables import SolvedBands, band_result
+from tpjb_ident.identification.band_solution import solve_bands
+from tpjb_ident.identification.band_tables import SolvedBands, band_results
 from tpjb_ident.identification.campaign_blocks import run_temperatures, unstated
 from tpjb_ident.identification.clocks import solved_with_clocks
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.identification.shared_changes import shared_changes
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
@@ -31,10 +27,6 @@ from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.terms.registry import cell_stiffness
 
 Progress = Callable[[str, int, int], None]
-#: What each method takes for the source of motion; without an instrument first one, then the other of these.
-_INSTRUMENTS = {"periods": ("periods", "periods"), "iv": ("command", "command"), "hv": ("displacement", "force")}
-#: Coherence of the force with the displacements that a line needs where nothing else tells signal from noise.
-_LEAST_COHERENCE = 0.5
 
 
 def identify_bands(
@@ -64,25 +56,19 @@ def identify_bands(
         return replace(_solved(campaign, points, sensors, rates, settings, bare), excluded=tuple(bad))
 
     solved = solved_with_clocks(sensors_of(campaign), min(run.sample_rate for run in runs), solve)
-    points, remaining, loads = solved.points, solved.excluded, solved.loads
-    results = []
+    points, bad = solved.points, solved.excluded
+    quality = []
     for b, point in enumerate(points):
-        conditions = merged(
-            loads.conditions(b),
-            check_conditions(checked, [s.phasors.run for s in point.spectra]),
-            without_runs(point.point, remaining, any_excitation=True),
-            run_conditions(point, solved.first),
-            band_conditions(point, solved, b),
-        )
-        results.append(band_result(solved, b, loads.misses[b], conditions, settings.clearance))
-    lost = lost_points([point.point for point in points], remaining, any_excitation=True, kind="run over a band")
-    named = named_runs(remaining, len(runs)) + lost + unstated(campaign)
+        known = solved.loads.conditions(b), check_conditions(checked, point.runs)
+        without = without_runs(point.point, bad, any_excitation=True)
+        of_band = run_conditions(point, solved.first), band_conditions(point, solved, b)
+        quality.append(merged(*known, without, *of_band))
+    results, changes, names = band_results(solved, quality, settings.clearance)
+    lost = lost_points([point.point for point in points], bad, any_excitation=True, kind="run over a band")
+    named = named_runs(bad, len(runs)) + lost + unstated(campaign)
     found = tuple(point for band in results for point in band.points)
-    parts = [q for b in range(len(points)) for q in solved.parts(b)]
-    changes, names = shared_changes(solved.first.part, parts)
-    return Identification(
-        campaign.id, settings.method, found, changes, named, tuple(results), names, cell_stiffness(solved.first.part)
-    )
+    springs = cell_stiffness(solved.first.part)
+    return Identification(campaign.id, settings.method, found, changes, named, results, names, springs)
 
 
 def _solved(
@@ -95,28 +81,10 @@ def _solved(
 ) -> SolvedBands:
     """All bands solved, twice where there is no instrument: all noise the force's, then all the displacement's."""
     loads = static_loads(campaign, points)
-    classic = []
-    for point in points:
-        ends = point.group.kind in OPEN_ENDS
-        classic += [classic_line(point.spectra, groups, ends) for groups in point.plan.groups]
-    measured = [(s.phasors.run, s.temperatures) for point in points for s in point.spectra]
-    temperatures = run_temperatures(campaign, measured)
-    passes = 2 if any(point.method == "hv" for point in points) else 1
-    solutions: list[BandSolution] = []
-    data: BandBlocks | None = None
-    for turn in range(passes):
-        instruments = [_INSTRUMENTS[point.method][turn] for point in points]
-        own = band_blocks(points, sensors, loads.misses, temperatures, instruments)
-        own = own.with_film(points, settings.clearance) if settings.clearance else own
-        rig = campaign_rig(campaign, sensors, own.blocks, loads.common, bare)
-        solutions.append(solve_bands(rig, own, settings.correct, _told(points, own, classic), rates))
-        data = data or own
-    assert data is not None
-    return SolvedBands(tuple(points), loads, data, tuple(classic), tuple(solutions))
-
-
-def _told(points: Sequence[BandPoint], data: BandBlocks, classic: Sequence[ClassicLine]) -> np.ndarray:
-    """Lines whose excitation stands clear of the noise, (L,)."""
-    quiet = np.array([points[b].method == "hv" for b in data.band], dtype=bool)
-    coherence = np.array([float(np.min(line.coherence)) for line in classic])
-    return np.where(quiet, np.nan_to_num(coherence) > _LEAST_COHERENCE, data.strength > STRONG)
+    temperatures = run_temperatures(campaign, [(s.phasors.run, s.temperatures) for p in points for s in p.spectra])
+    data, solutions = [], []
+    for turn in range(2 if any(point.method == "hv" for point in points) else 1):
+        data.append(band_blocks(points, sensors, loads.misses, temperatures, settings.clearance, turn))
+        rig = campaign_rig(campaign, sensors, data[-1].blocks, loads.common, bare)
+        solutions.append(solve_bands(rig, data[-1], settings.correct, rates))
+    return SolvedBands(tuple(points), loads, data[0], tuple(solutions))

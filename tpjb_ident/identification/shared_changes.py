@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -25,15 +25,19 @@ def total(covariances: Iterable[FloatArray]) -> FloatArray:
     return np.sum([np.zeros((8, 8)), *covariances], axis=0)
 
 
-def shared_changes(solution: Solution, points: Sequence[int]) -> tuple[FloatArray, tuple[str, ...]]:
+def shared_changes(
+    solution: Solution, points: Sequence[int], more: Mapping[str, FloatArray] | None = None
+) -> tuple[FloatArray, tuple[str, ...]]:
     """Changes (q, 8 P) of some points by all terms but points' own, and those that scatter from run to run.
 
     They are scaled so that the mean of the rows' products is their covariance [N/m]; with the names of the sources.
+    `more`: one deviation (P, 8) of further sources by name.
     """
     shared = [(term, parameter) for term in solution.terms if not term.points for parameter in term.parameters]
     rows = [k for k, (term, _) in enumerate(shared) if term.name not in RUN_TERMS]
-    names = tuple(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows)
-    if not rows:
+    further = more or {}
+    names = (*(f"{shared[k][0].name}: {shared[k][1].name}" for k in rows), *further)
+    if not names:
         return np.zeros((1, 8 * len(points))), names
-    factors = solution.factors[np.ix_(rows, points)].reshape(len(rows), -1)
-    return np.asarray(factors * np.sqrt(len(rows))), names
+    factors = np.concatenate([solution.factors[np.ix_(rows, points)], *(f[None] for f in further.values())])
+    return np.asarray(factors.reshape(len(names), -1) * np.sqrt(len(names))), names
