@@ -44,7 +44,7 @@ def spectra(D, F, command=None, period=None) -> RunSpectra:
     phasors = RunPhasors(
         "r", point, None, lines, np.zeros(windows), 10.0, CHANNELS, z, none, none, none, 0.0, np.zeros(windows)
     )
-    run = RunSpectra(phasors, command, np.zeros(n, bool), (), period, np.zeros(2), np.zeros(2), {})
+    run = RunSpectra(phasors, command, np.zeros(n, bool), (), period, {})
     place = np.arange(n)[:, None] % 7 - 3.0
     command = None if command is None else command * place
     return replace(run, by_time=replace(run, phasors=replace(phasors, z=z * place), command=command))

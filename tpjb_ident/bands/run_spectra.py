@@ -23,7 +23,7 @@ from tpjb_ident.bands.samples import Samples, read_samples
 from tpjb_ident.conditions import merged
 from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
 from tpjb_ident.phasors.lines import Line, LineSet
-from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.phasors.run_data import PhasorSettings, RunPhasors
 from tpjb_ident.runs.point_data import mean_temperatures
 
 #: Share of the power that a period may leave where none is stated.
@@ -46,8 +46,6 @@ class RunSpectra:
     taken: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
     disturbances: tuple[Line, ...]
     period: float | None
-    mean_load: FloatArray  #: (2,), N
-    position: FloatArray  #: (2,), m
     temperatures: dict[int, float]
     rms: float = 0.0  #: m: of the motion over the band
     peak: float = 0.0  #: m: largest motion
@@ -75,38 +73,34 @@ class RunSpectra:
         return float(np.sqrt(np.sum(np.mean(np.abs(self.D) ** 2, axis=0))))
 
 
-@dataclass(frozen=True)
-class SpectraSettings:
-    """How runs become spectra."""
-
-    band: tuple[float, float]
-    seconds: float | None
-    mains: float
-    delays: dict[str, float]
-    fast: Mapping[str, float] = field(default_factory=dict)  #: rates of the channels' clocks, relative
-
-
-def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> RunSpectra:
-    """Read one run and transform it."""
+def run_spectra(
+    run: Run,
+    housing_mass: float,
+    band: tuple[float, float],
+    seconds: float,
+    settings: PhasorSettings,
+    fast: Mapping[str, float],
+) -> RunSpectra:
+    """Transform the first `seconds` of a run over a band [Hz]; `fast`: rates of the channels' clocks, relative."""
     with run.opened():
         slower = filled_channels(run)
-        samples = read_samples(run, settings.seconds, settings.fast)
+        samples = read_samples(run, seconds, fast)
         temperatures = mean_temperatures(run)
-    if settings.band[1] >= 0.45 * samples.rate:
-        text = f"the band reaches {settings.band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
+    if band[1] >= 0.45 * samples.rate:
+        text = f"the band reaches {band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
         raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
-    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.mains, settings.band[1])
-    period = _period(run, samples, settings.band, lines)
+    lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
+    period = _period(run, samples, band, lines)
     length, cut, width = samples.length, samples, LEFT_OUT
     if period is not None:
-        length, cut, width = round(period), resampled(samples, period, settings.band[1]), LEFT_OUT_OF_PERIOD
+        length, cut, width = round(period), resampled(samples, period, band[1]), LEFT_OUT_OF_PERIOD
     clean = without_disturbances(cut, lines, None if period is None else length)
-    places = _places(clean.rate, length, settings)
+    places = _places(clean.rate, length, band)
 
     def transformed(record: Samples) -> tuple[RunPhasors, ComplexArray | None]:
-        phasors = _phasors(run, record, _bins(record.rows, length, places), places, housing_mass)
+        phasors = _phasors(run, record, _bins(record.rows, length, places), places, samples.rows.mean(axis=1))
         command = None if record.command is None else _bins(record.command, length, places)
-        return compensated(phasors, run, slower, settings.delays), command
+        return compensated(replace(phasors, housing_mass=housing_mass), run, slower, settings.delays), command
 
     phasors, command = transformed(clean)
     spectra = RunSpectra(
@@ -115,8 +109,6 @@ def run_spectra(run: Run, housing_mass: float, settings: SpectraSettings) -> Run
         bins_taken(phasors.lines.frequencies, lines, length / clean.rate, width),
         lines,
         None if period is None else length / clean.rate,
-        samples.vector("force").mean(axis=1),
-        samples.vector("displacement").mean(axis=1),
         temperatures,
         *_motion(clean),
     )
@@ -153,10 +145,10 @@ def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[
     return period
 
 
-def _places(rate: float, length: int, settings: SpectraSettings) -> IntArray:
+def _places(rate: float, length: int, band: tuple[float, float]) -> IntArray:
     """Numbers of the bins of the band."""
     frequency = np.fft.rfftfreq(length, 1 / rate)
-    low, high = settings.band
+    low, high = band
     edge = 0.02 * rate / length  # clocks of runs differ by some ppm
     return np.flatnonzero((frequency >= low - edge) & (frequency <= high + edge) & (frequency > 0))
 
@@ -168,8 +160,8 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
     return np.asarray(spectra.transpose(1, 2, 0))
 
 
-def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, housing_mass: float) -> RunPhasors:
-    """Phasors as recorded, `z` (n_windows, n_bins, m)."""
+def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean: FloatArray) -> RunPhasors:
+    """Phasors as recorded, `z` (n_windows, n_bins, m), about the readings' `mean` (m,)."""
     seconds = samples.length / len(z) / samples.rate
     lines = LineSet(tuple(Line("excitation", float(k) / seconds) for k in places), (), (), run.point.shaft_speed_hz)
     none = np.zeros((len(z), z.shape[2]))
@@ -182,9 +174,9 @@ def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, hous
         seconds,
         samples.channels,
         z,
+        np.tile(mean, (len(z), 1)),
         none,
         none,
-        none,
-        housing_mass,
+        0.0,
         np.full(len(z), np.nan),
     )

@@ -17,7 +17,7 @@ from rigdata.operating_point import OperatingPoint
 from rigdata.problem import Problem, RigDataError
 from rigdata.run import Run
 from tpjb_ident.bands.classic import ClassicLine, classic_line
-from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, SpectraSettings, run_spectra
+from tpjb_ident.bands.run_spectra import OPEN_ENDS, RunSpectra, run_spectra
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.run_data import PhasorSettings
 from tpjb_ident.runs.excluded_runs import ExcludedRun
@@ -74,7 +74,12 @@ class BandPoint:
     @property
     def mean_loads(self) -> FloatArray:
         """Mean cell force of every run, (n_runs, 2) [N]."""
-        return np.array([s.mean_load for s in self.spectra])
+        return np.array([s.phasors.cell_force.mean[0] for s in self.spectra])
+
+    @property
+    def mean_positions(self) -> FloatArray:
+        """Mean displacement of every run, (n_runs, 2) [m]."""
+        return np.array([s.phasors.displacement.mean[0] for s in self.spectra])
 
     @property
     def method(self) -> str:
@@ -119,10 +124,9 @@ def read_point(
     spectra: list[RunSpectra] = []
     remaining = []
     seconds = min(run.length / run.sample_rate for run in group.runs)
-    chosen = SpectraSettings(group.band, seconds, settings.lines.mains, settings.delays, fast)
     for run in group.runs:
         try:
-            spectra.append(run_spectra(run, housing_mass, chosen))
+            spectra.append(run_spectra(run, housing_mass, group.band, seconds, settings, fast))
         except RigDataError as error:
             remaining.append(ExcludedRun(run.id, run.point, error))
     if not spectra:

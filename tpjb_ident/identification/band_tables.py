@@ -168,7 +168,7 @@ def _point(
     est, budget = solved.estimate(solved.first.part, q, part.lines, h, f"band-{point.method}")
     low, high = solved.data.line_omega[part.lines[[0, -1]]] / (2 * np.pi)
     inside = [line for line in lines if low - 1e-9 <= line.frequency <= high + 1e-9]
-    position, position_se = mean_position(np.array([s.position for s in point.spectra]))
+    position, position_se = mean_position(point.mean_positions)
     amplitude = max(s.amplitude for s in point.spectra)
     share = float(solved.data.bent[part.band])
     bent = change_conditions(FilmChange(share), share, est, amplitude, clearance)

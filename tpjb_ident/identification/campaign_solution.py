@@ -46,12 +46,13 @@ class CampaignSolution:
     means: tuple[PointMeans, ...] = field(repr=False)
     loads: StaticLoads = field(repr=False)
     film: tuple[FilmChange, ...]
+    start: ComplexArray = field(repr=False)  #: (P, 2, 2), N/m
     solution: Solution = field(repr=False)
-    pickup: Pickup | None
-    mains: dict[int, MainsFit] = field(repr=False)  #: by point
-    in_cells: dict[int, FloatArray] = field(repr=False)  #: by point, (8, 8): mains in the cells
-    cell_pickup: float  #: N: mains in the cells
     mains_shift: ComplexArray = field(repr=False)  #: (n, m), SI: pick-up taken off the blocks' readings
+    pickup: Pickup | None = None
+    mains: dict[int, MainsFit] = field(default_factory=dict, repr=False)  #: by point
+    in_cells: dict[int, FloatArray] = field(default_factory=dict, repr=False)  #: by point, (8, 8): mains in the cells
+    cell_pickup: float = 0.0  #: N: mains in the cells
 
     @property
     def h(self) -> ComplexArray:
@@ -60,19 +61,6 @@ class CampaignSolution:
         for p, fit in self.mains.items():
             h[p] = h[p] + fit.change
         return h
-
-
-@dataclass(frozen=True)
-class _Pass:
-    """The records averaged and solved once."""
-
-    task: MeansTask
-    means: tuple[PointMeans, ...]
-    film: tuple[FilmChange, ...]
-    blocks: Blocks
-    rig: Rig
-    start: ComplexArray
-    solution: Solution
 
 
 def solve_campaign(
@@ -93,7 +81,7 @@ def solve_campaign(
         terms = campaign_terms(rig, blocks, correct, [Clock(rig, blocks, rates)])
         return Solver(rig, blocks, terms, start, correct)
 
-    def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> _Pass:
+    def solved(sensors: tuple[Sensor, ...], rates: Mapping[str, float]) -> CampaignSolution:
         task = replace(common, sensors=sensors, rates=rates)
         means = tuple(map_ordered(workers, point_means, [(data,) for data in points], task))
         film = tuple(_film(data, point) for data, point in zip(points, means))
@@ -101,23 +89,24 @@ def solve_campaign(
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
         rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
         start = _starts(rig, points, means)
-        return _Pass(task, means, film, blocks, rig, start, solver(rig, blocks, start, rates).run())
+        solution = solver(rig, blocks, start, rates).run()
+        return CampaignSolution(rig, task, blocks, means, loads, film, start, solution, np.zeros_like(blocks.z))
 
     rate = min((digest.sample_rate for digest in digests if digest.sample_rate > 0), default=np.inf)
     last = solved_with_clocks(sensors, rate, solved)
-    task, means, blocks, rig, start, solution = last.task, last.means, last.blocks, last.rig, last.start, last.solution
-    learnt = learnt_rig(rig, solution)
-    if learnt is not rig:
-        rig, solution = learnt, solver(learnt, blocks, start, task.rates).begun(solution).run()
-    pickup, fits = _mains(points, digests, rig, blocks, solution) if correct else (None, {})
-    shift = np.zeros_like(blocks.z)
+    blocks, start, rates = last.blocks, last.start, last.task.rates
+    learnt = learnt_rig(last.rig, last.solution)
+    if learnt is not last.rig:
+        again = solver(learnt, blocks, start, rates).begun(last.solution).run()
+        last = replace(last, rig=learnt, solution=again)
+    pickup, fits = _mains(points, digests, last.rig, blocks, last.solution) if correct else (None, {})
     if fits:
-        shift = _mains_readings(rig, blocks, fits)
-        solution = solver(rig, replace(blocks, z=blocks.z - shift), start, task.rates).run()
+        shift = _mains_readings(last.rig, blocks, fits)
+        again = solver(last.rig, replace(blocks, z=blocks.z - shift), start, rates).run()
+        last = replace(last, solution=again, mains_shift=shift, pickup=pickup, mains=fits)
     force = force_pickup([digest.mains_force for digest in digests])
-    in_cells = _in_cells(points, rig, blocks, force)
-    size = float(np.linalg.norm(force))
-    return CampaignSolution(rig, task, blocks, means, loads, last.film, solution, pickup, fits, in_cells, size, shift)
+    in_cells = _in_cells(points, last.rig, blocks, force)
+    return replace(last, in_cells=in_cells, cell_pickup=float(np.linalg.norm(force)))
 
 
 def _film(data: PointData, point: PointMeans) -> FilmChange:
