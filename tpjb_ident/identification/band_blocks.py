@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rigdata.calibration import Channel
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.bands.responses import line_response, one_phase_set, pooled_noise, stands_out, tones
@@ -152,9 +152,11 @@ def _strengths(rig: Rig, blocks: Blocks, line: IntArray, lines: int) -> FloatArr
     noise = plane @ blocks.noise[:, probes][:, :, probes] @ plane.transpose(0, 2, 1)
     size = np.sqrt(np.maximum(np.einsum("nii->n", noise).real / 2, 1e-300))
     white = np.nan_to_num(vector(rig, blocks, "displacement")) / size[:, None]
-    strength = np.zeros(lines)
-    for k in range(lines):
-        rows = white[line == k]
-        if len(rows) > 1:
-            strength[k] = float(np.linalg.svd(rows, compute_uv=False)[-1] ** 2) / 2
-    return strength
+    return np.asarray(np.linalg.eigvalsh(line_products(line, white, white, lines))[:, 0] / 2)
+
+
+def line_products(line: IntArray, first: ComplexArray, second: ComplexArray, lines: int) -> ComplexArray:
+    """Sums of first times conjugate second (n, 2) by line, (L, 2, 2); `line` (n,)."""
+    table = np.zeros((lines, 2, 2), complex)
+    np.add.at(table, line, first[:, :, None] * second.conj()[:, None, :])
+    return table

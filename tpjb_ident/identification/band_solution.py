@@ -20,7 +20,7 @@ from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
 from tpjb_ident.estimate.term import Term
-from tpjb_ident.identification.band_blocks import BandBlocks
+from tpjb_ident.identification.band_blocks import BandBlocks, line_products
 from tpjb_ident.terms.clock import Clock
 from tpjb_ident.terms.distortion import Distortion
 from tpjb_ident.terms.registry import campaign_terms, learnt_rig
@@ -153,36 +153,28 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
     And one for every run whose point has more than the two runs that h needs, else zero.
     """
     blocks = data.blocks
-    runs = len(blocks.runs)
-    own, spare = np.zeros(runs), np.zeros(runs)
     families: dict[tuple[object, ...], set[float]] = {}
     for point in blocks.points:
         families.setdefault(point.static_key[1:], set()).add(point.static_load)
-    band = data.band[data.line[blocks.point]]
-    for r in np.unique(blocks.run):
-        b = int(np.flatnonzero(blocks.run == r)[0])
-        point = blocks.points[blocks.point[b]]
-        loads = families[point.static_key[1:]]
-        if not correct or len(loads) < 2:
-            own[r] = UNKNOWN_EXPONENT * abs(blocks.miss[b].real)
-        spare[r] = float(len(np.unique(blocks.run[band == band[b]])) > 2)
+    alone = np.array([not correct or len(families[point.static_key[1:]]) < 2 for point in blocks.points], dtype=float)
+    own, spare = np.zeros((2, len(blocks.runs)))
+    own[blocks.run] = UNKNOWN_EXPONENT * np.abs(blocks.miss.real) * alone[blocks.point]
+    runs, first = np.unique(blocks.run, return_index=True)
+    band = data.band[data.line[blocks.point[first]]]
+    spare[runs] = np.bincount(band)[band] > 2
     return own, spare
 
 
 def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
-    blocks = data.blocks
-    D, F = vector(rig, blocks, "displacement"), film_force(rig, blocks)
-    lines = len(data.band)
-    h, condition = np.full((lines, 2, 2), np.nan + 0j), np.full(lines, np.inf)
-    line = data.line[blocks.point]
-    for k in np.unique(line):
-        mine = (line == k) & np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
-        if mine.sum() < 2:
-            continue
-        condition[k] = np.linalg.cond(D[mine])
-        if condition[k] < _ONE_LINE:
-            h[k] = np.linalg.lstsq(D[mine], F[mine], rcond=None)[0].T
+    D, F = vector(rig, data.blocks, "displacement"), film_force(rig, data.blocks)
+    told = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
+    line, lines = data.line[data.blocks.point[told]], len(data.band)
+    DD, FD = (line_products(line, rows[told], D[told], lines) for rows in (D, F))
+    condition = np.sqrt(np.linalg.cond(DD))
+    h = np.full((lines, 2, 2), np.nan + 0j)
+    regular = condition < _ONE_LINE
+    h[regular] = FD[regular] @ np.linalg.inv(DD[regular])
     return h - rig.bare.at(data.line_omega), condition
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
-from rigdata.vector import directions
+from rigdata.vector import directions, plane_vector
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import QUANTITIES, Sensor
 from tpjb_ident.estimate.motion import motion_in
@@ -54,6 +54,10 @@ class MeansTask:
     rates: Mapping[str, float] = field(default_factory=dict)  #: of the devices' clocks, relative
     temperatures: Mapping[str, float] = field(default_factory=dict)  #: of the runs, at the probes [K]
 
+    def of(self, quantity: str) -> list[int]:
+        """Places of the sensors of a quantity."""
+        return [j for j, sensor in enumerate(self.sensors) if sensor.quantity == quantity]
+
 
 def point_means(task: MeansTask, data: PointData) -> PointMeans:
     """Robust start and means of one point."""
@@ -79,11 +83,11 @@ def point_means(task: MeansTask, data: PointData) -> PointMeans:
 
 def _film(task: MeansTask, mass: float) -> FloatArray:
     """Displacements and oil forces as the sensors see them, of their readings, (m, m)."""
-    of = {q: [j for j, sensor in enumerate(task.sensors) if sensor.quantity == q] for q in QUANTITIES}
     film = np.diag([float(sensor.quantity != "acceleration") for sensor in task.sensors])
-    if len(of["acceleration"]) > 1:
-        inertia = mass * task.along[of["force"]] @ np.linalg.pinv(task.along[of["acceleration"]])
-        film[np.ix_(of["force"], of["acceleration"])] = inertia
+    cells, accelerometers = task.of("force"), task.of("acceleration")
+    if len(accelerometers) > 1:
+        inertia = mass * task.along[cells] @ np.linalg.pinv(task.along[accelerometers])
+        film[np.ix_(cells, accelerometers)] = inertia
     return film
 
 
@@ -119,7 +123,7 @@ def _shaft(data: PointData, means: WindowMeans | None, task: MeansTask) -> tuple
     s = np.array([run.shaft_phase[i] if len(run.shaft_phase) else np.nan for run, i in zip(data.runs, data.lines)])
     motion = np.full((len(data.runs), 2), np.nan + 0j)
     if means is not None and len(means.mean) == len(s):
-        rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "displacement"]
+        rows = task.of("displacement")
         motion = means.mean[:, rows] @ np.linalg.pinv(task.along[rows]).T
     reason = not_told(order, s, motion)
     if reason:
@@ -180,27 +184,12 @@ def warm_gain(channel: Channel, temperature: float | None) -> float:
 
 def vectors(z: ComplexArray, data: PointData, task: MeansTask) -> tuple[ComplexArray, ComplexArray]:
     """Displacement and oil force of channels' phasors (n, m), (n, 2) each, from the sensors that have one."""
-    plane = {}
-    for quantity in QUANTITIES:
-        rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == quantity]
-        if len(rows) > 1:
-            plane[quantity] = _plane(z[:, rows], task.along[rows])
+    plane = {q: plane_vector(task.along[task.of(q)], z[:, task.of(q)]) for q in QUANTITIES if len(task.of(q)) > 1}
     force = plane["force"]
     if "acceleration" in plane:
         inertia = data.mass * plane["acceleration"]
         force = force + np.where(np.isfinite(inertia), inertia, 0.0)
     return plane["displacement"], force
-
-
-def _plane(z: ComplexArray, along: FloatArray) -> ComplexArray:
-    """X and Y (n, 2) of sensors' phasors (n, k) along their axes (k, 2); NaN where fewer than two are there."""
-    result = np.full((len(z), 2), np.nan + 0j)
-    finite = np.isfinite(z)
-    for pattern in np.unique(finite, axis=0):
-        rows = (finite == pattern).all(axis=1)
-        if np.linalg.matrix_rank(along[pattern], tol=1e-6) == 2:
-            result[rows] = z[np.ix_(rows, pattern)] @ np.linalg.pinv(along[pattern]).T
-    return result
 
 
 def window_times(data: PointData) -> FloatArray:
@@ -248,7 +237,7 @@ def _load_errors(data: PointData) -> FloatArray:
 
 def _attenuation(means: WindowMeans, task: MeansTask) -> FloatArray:
     """Noise over total power of the displacements, (2,)."""
-    rows = [j for j, sensor in enumerate(task.sensors) if sensor.quantity == "displacement"]
+    rows = task.of("displacement")
     plane = np.linalg.pinv(task.along[rows])
     noise = plane @ means.noise[np.ix_(rows, rows)] @ plane.T
     return attenuation(means.mean[:, rows] @ plane.T, means.count, noise)
