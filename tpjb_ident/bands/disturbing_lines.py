@@ -48,12 +48,17 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
 
 def _shown(samples: Samples, nominal: float, wander: float) -> float:
     """Frequency of the highest peak near `nominal` [Hz], where one stands clear of what is around it."""
-    rows, window = replace(samples, command=None).signals(), np.hanning(samples.length)
-    step = 0.25 * samples.rate / samples.length
+    n, window = samples.length, np.hanning(samples.length)
+    step = 0.25 * samples.rate / n
     reach = int(wander / step) + 1
     ends = [nominal - reach * step, nominal + reach * step]
-    spectra = zoom_fft(rows * window, ends, 2 * reach + 1, fs=samples.rate, endpoint=True)
-    power = np.sum(np.abs(spectra) ** 2, axis=0) / np.sum(window**2) / (0.5 * rows.size)
+    power = np.zeros(2 * reach + 1)
+    for quantity in ("displacement", "force"):
+        rows = samples.rows[samples.places(quantity)]
+        rows = rows - rows.mean(axis=1, keepdims=True)
+        spectra = zoom_fft(rows * window, ends, len(power), fs=samples.rate, endpoint=True)
+        size = max(float(np.sum(rows**2)) * float(np.sum(window**2)), 1e-300)
+        power += np.sum(np.abs(spectra) ** 2, axis=0) / size
     k = int(np.argmax(power))
     if not 0 < k < 2 * reach or power[k] < _SHOWN:
         return nominal
