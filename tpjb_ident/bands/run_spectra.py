@@ -162,8 +162,9 @@ def _bins(rows: FloatArray, length: int, places: IntArray) -> ComplexArray:
 
 def _phasors(run: Run, samples: Samples, z: ComplexArray, places: IntArray, mean: FloatArray) -> RunPhasors:
     """Phasors as recorded, `z` (n_windows, n_bins, m), about the readings' `mean` (m,)."""
-    seconds = samples.length / len(z) / samples.rate
-    lines = LineSet(tuple(Line("excitation", float(k) / seconds) for k in places), (), (), run.point.shaft_speed_hz)
+    length = samples.length // len(z)
+    seconds, frequencies = length / samples.rate, np.fft.rfftfreq(length, 1 / samples.rate)[places]
+    lines = LineSet(tuple(Line("excitation", float(f)) for f in frequencies), (), (), run.point.shaft_speed_hz)
     none = np.zeros((len(z), z.shape[2]))
     return RunPhasors(
         run.id,
