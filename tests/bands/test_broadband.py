@@ -11,8 +11,10 @@ import pytest
 
 from rigdata import load_campaign
 from rigdata.operating_point import OperatingPoint
+from rigdata.problem import RigDataError
 from tests.command_line import tpjb
 from tests.phasors.phasor_cases import vector_channels
+from tests.rigs import closed_form as cf
 from tests.rigs.band_campaign import write_band_campaign
 from tests.rigs.band_rig import BandRig, band_plans, stiffness
 from tests.studies.band_coverage import true_parameters
@@ -25,6 +27,7 @@ from tpjb_ident.conditions import untrusted
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.phasors.lines import Line, LineSet
 from tpjb_ident.phasors.run_data import RunPhasors
+from tpjb_ident.results.band_result import frf_frame, models_frame
 from tpjb_ident.terms.distortion import band_change
 
 H = np.array([[1.6e8 + 6e7j, 1.5e7 + 2e6j], [-1.2e7 - 3e6j, 2.4e8 + 9e7j]])
@@ -457,3 +460,37 @@ def test_tones_are_the_lines_that_are_driven():
 )  # fmt: skip
 def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_sided, share):
     assert band_change(kind, rms, peak, one_sided) == pytest.approx(share)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["random", "multisine"])
+@pytest.mark.parametrize(
+    ("names", "entries"),
+    [
+        ("L1", {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}),
+        ("X1B", {"fault": lambda v, r, i: v + 12 * v.std() * (r.random(len(v)) < 0.01)}),
+    ],
+    ids=["cells of a slower device", "single bad readings"],
+)
+def test_a_band_takes_slower_devices_and_single_bad_readings(tmp_path, kind, names, entries):
+    rig = cf.Rig(excitation=kind, seconds=6.0, directions=(20.0, 110.0), repeats=2)
+    path = cf.write_rig(tmp_path, rig, cf.with_entries(cf.channels_of(rig), names, **entries))
+    (result,) = identify(load_campaign(path)).bands
+    h = rig.film.h(result.frequencies, 5000.0).reshape(-1, 4)
+    off = result.h.reshape(-1, 4) - h
+    inside = np.abs(np.hstack([off.real, off.imag])) < result.half_width()
+    assert inside.mean() > 0.9
+    assert np.abs(off[:, [0, 3]] / h[:, [0, 3]]).max() < 0.12
+
+
+def test_blows_need_devices_of_one_rate(tmp_path):
+    """What a blow holds beyond the band folds back into it where a device is slow."""
+    rig = cf.Rig(excitation="impact", seconds=2.0, directions=(20.0, 110.0))
+    slow = cf.with_entries(cf.channels_of(rig), "L1", rate=320.0, extra=('sample_rate = "320 Hz"',))
+    with pytest.raises(RigDataError, match="blows need one rate"):
+        identify(load_campaign(cf.write_rig(tmp_path, rig, slow)))
+
+
+def test_tables_of_a_band_without_lines_have_their_columns():
+    assert len(frf_frame([]).columns) > 40
+    assert {"kxx_N_per_m", "supported"} <= set(models_frame([]).columns)

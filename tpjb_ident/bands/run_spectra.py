@@ -84,11 +84,8 @@ def run_spectra(
     """Transform the first `seconds` of a run over a band [Hz]; `fast`: rates of the channels' clocks, relative."""
     with run.opened():
         slower = filled_channels(run)
-        samples = read_samples(run, seconds, fast)
+        samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
-    if band[1] >= 0.45 * samples.rate:
-        text = f"the band reaches {band[1]:g} Hz, more than 0.45 of the sample rate of {samples.rate:g} Hz"
-        raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
     period = _period(run, samples, band, lines)
     length, cut, width = samples.length, samples, LEFT_OUT

@@ -1,4 +1,8 @@
-"""Samples of one broadband run, whole, channel by channel: its transform needs all of them on an even grid."""
+"""Samples of one broadband run, whole, channel by channel: its transform needs all of them on an even grid.
+
+A device of another rate is read at the times of the first one; single readings that their neighbours contradict are
+bridged, as missing ones are.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +11,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigdata.arrays import FloatArray
+from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
 from rigdata.vector import inverse_directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
+from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
 from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
 from tpjb_ident.phasors.run_data import QUANTITIES
 
-#: Share of a channel's samples that may be missing and bridged by straight lines,
+#: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
 _MAX_LOST = 0.01
 #: and from which share on it is said.
 _TOLD_LOST = 1e-4
 #: Time stamps may stray this part of a sample from the even grid: more is a gap, and no rounding.
 _MAX_JITTER = 0.6
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
-_TAPS, _KAISER = 24, 9.0
+_TAPS, _KAISER, _REACH = 24, 9.0, 0.4
+#: Relative difference of rates up to which devices are alike but for their clocks.
+_ALIKE = 1e-3
+#: A reading by the cubic through the two on either side of it.
+_CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6
+#: Passes in which single bad readings are looked for: some stand behind others.
+_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -69,37 +80,61 @@ class Samples:
         return replace(self, rate=rate or self.rate, rows=change(self.rows), command=command)
 
 
-def read_samples(run: Run, seconds: float | None = None, fast: Mapping[str, float] | None = None) -> Samples:
-    """Read a run from its beginning; `fast`: channels by whose clock time runs faster than the first's, relative."""
+def read_samples(
+    run: Run, seconds: float | None = None, fast: Mapping[str, float] | None = None, highest: float = 0.0
+) -> Samples:
+    """Read a run from its beginning.
+
+    `fast`: channels by whose clock time runs faster than the first's, relative; `highest`: frequency [Hz] that every
+    device must show.
+    """
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
-    readers = device_readers(run)
-    _refuse_unlike(run, readers)
-    parts = [reader.read(0, n) for reader in readers]
-    if parts[0].time is not None:
-        _refuse_uneven(run, parts[0].time, rate)
-    recorded = [pair for reader, part in zip(readers, parts) for pair in zip(reader.channels, part.rows)]
-    recorded.sort(key=lambda pair: QUANTITIES.index(pair[0].quantity))
+    recorded, inside = _on_one_grid(run, n, highest)
     channels, rows, lost = [], [], 0.0
-    for channel, values in recorded:
-        missing = float((~np.isfinite(values)).mean())
-        if missing > _MAX_LOST and is_spare(channel, [c for c, _ in recorded]):
+    for channel, values, at in recorded:
+        values = values if run.excitation_kind == "impact" else without_glitches(values)  # a blow is sudden itself
+        if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
             continue
         channels.append(channel)
-        rows.append(_by_first_clock(_bridged(run, channel, values), (fast or {}).get(channel.name, 0.0)))
-        lost = max(lost, missing)
+        rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
+        lost = max(lost, float((~np.isfinite(values)).mean()))
+    command = _command(run, n)
+    command = None if command is None else command[:, inside]
     told = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
-    return Samples(rate, tuple(channels), np.array(rows), _command(run, n), told if lost > _TOLD_LOST else ())
+    return Samples(rate, tuple(channels), np.array(rows)[:, inside], command, told if lost > _TOLD_LOST else ())
 
 
-def _refuse_unlike(run: Run, readers: tuple[DeviceReader, ...]) -> None:
-    """Refuse devices of several rates or lengths: over a band, all channels share a transform."""
-    first = readers[0]
-    for reader in readers[1:]:
-        if reader.length != first.length or abs(reader.rate / first.rate - 1) > 1e-3:
-            listed = f"{first.rate:.6g} Hz and {reader.rate:.6g} Hz"
-            text = f"are sampled at {listed}; over a band all channels need one rate"
-            raise refuse(run.file, "channels", text, "Record them at one rate, or excite by sines", run.id)
+def _on_one_grid(run: Run, n: int, highest: float) -> tuple[list[tuple[Channel, FloatArray, FloatArray]], BoolArray]:
+    """Channels with their readings and the places [samples] of the first one's times, and where all have some (n,)."""
+    readers = device_readers(run)
+    recorded, inside, start = [], np.ones(n, dtype=bool), 0.0
+    for reader in readers:
+        if highest >= _REACH * reader.rate:
+            text = f"are sampled at {reader.rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
+            place = f"channels {', '.join(c.name for c in reader.channels)}"
+            raise refuse(run.file, place, text, "Sample faster, or excite lower frequencies", run.id)
+        part = reader.read(0, min(reader.length, int(np.ceil(n / run.sample_rate * reader.rate))))
+        begin = 0.0
+        if part.time is not None:
+            _refuse_uneven(run, part.time, reader.rate)
+            begin = float(part.time[0])
+        start = begin if reader is readers[0] else start
+        at = np.arange(float(n))
+        if reader.length != readers[0].length or abs(reader.rate / readers[0].rate - 1) > _ALIKE:
+            _refuse_blows(run, reader)
+            at = (at / run.sample_rate + start - begin) * reader.rate
+            inside &= (at >= _TAPS) & (at <= part.rows.shape[1] - 1 - _TAPS)
+        recorded += [(channel, values, at) for channel, values in zip(reader.channels, part.rows)]
+    recorded.sort(key=lambda record: QUANTITIES.index(record[0].quantity))
+    return recorded, inside
+
+
+def _refuse_blows(run: Run, reader: DeviceReader) -> None:
+    """Refuse blows on a device of its own rate: they hold frequencies beyond the band, which fold back into it."""
+    if run.excitation_kind == "impact":
+        text = f"is sampled at {reader.rate:.6g} Hz, the first one at {run.sample_rate:.6g} Hz; blows need one rate"
+        raise refuse(run.file, f"device of channel {reader.channels[0].name}", text, "Record all at one rate", run.id)
 
 
 def _refuse_uneven(run: Run, time: FloatArray, rate: float) -> None:
@@ -111,22 +146,48 @@ def _refuse_uneven(run: Run, time: FloatArray, rate: float) -> None:
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
 
 
-def _bridged(run: Run, channel: Channel, values: FloatArray) -> FloatArray:
-    """A channel (n,) with what is missing bridged by straight lines."""
+def without_glitches(values: FloatArray) -> FloatArray:
+    """Readings (n,) without single ones that the two on either side contradict, where these agree without it."""
+    values = np.array(values, dtype=float)
+    beside = np.array([-2, -1, 1, 2])[:, None]
+    for _ in range(_PASSES):
+        off = values - np.convolve(values, _CUBIC, "same")
+        limit = BAD_LIMIT * robust_deviation(off[np.isfinite(off)])
+        at = 4 + np.flatnonzero(np.abs(off[4:-4]) > limit)
+        remaining = off[at + beside] + _CUBIC[2 + beside] * off[at]
+        single = at[np.abs(remaining).max(axis=0) < limit]
+        if not len(single):
+            break
+        values[single] -= off[single]
+    return values
+
+
+def _lost(values: FloatArray) -> float:
+    """Share of missing readings that stand beside others."""
     missing = ~np.isfinite(values)
-    if missing.mean() > _MAX_LOST:
+    return float((missing & (np.convolve(missing, [1, 1, 1], "same") > 1)).mean())
+
+
+def _bridged(run: Run, channel: Channel, values: FloatArray) -> FloatArray:
+    """A channel (n,) with what is missing bridged: by straight lines, single readings by the cubic about them."""
+    missing = ~np.isfinite(values)
+    lost = _lost(values)
+    if lost > _MAX_LOST or missing.all():
         text = f"{missing.mean():.1%} of its samples are missing"
         raise refuse(run.file, f"channel {channel.name}", text, "Repeat the run", run.id)
-    at = np.arange(len(values))
-    return np.interp(at, at[~missing], values[~missing]) if missing.any() else values
-
-
-def _by_first_clock(values: FloatArray, rate: float) -> FloatArray:
-    """A channel (n,) of a clock that is fast by `rate` as if the first clock had sampled it."""
-    if not rate:
+    if not missing.any():
         return values
-    mean, at = values.mean(), np.arange(float(len(values)))
-    return interpolated((values - mean)[None], at * (1 + rate))[0] + mean
+    at = np.arange(len(values))
+    bridged = np.interp(at, at[~missing], values[~missing])
+    return np.where(missing, np.convolve(bridged, _CUBIC, "same"), values) if not lost else bridged
+
+
+def _at(values: FloatArray, places: FloatArray) -> FloatArray:
+    """A channel (n,) at places [samples] of its own grid."""
+    if len(values) == len(places) and np.array_equal(places, np.arange(len(values))):
+        return values
+    mean = values.mean()
+    return interpolated((values - mean)[None], places)[0] + mean
 
 
 def _command(run: Run, n: int) -> FloatArray | None:

@@ -12,7 +12,7 @@ from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.operating_point import OperatingPoint
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimators.stiffness import ENTRIES, DynamicStiffness
-from tpjb_ident.results.frequency_model import FrequencyModel
+from tpjb_ident.results.frequency_model import MODEL_COLUMNS, FrequencyModel
 from tpjb_ident.results.point_result import PointResult
 from tpjb_ident.schema import STATIC_KEY
 
@@ -20,6 +20,25 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _KEY_COLUMNS = (*STATIC_KEY, "excitation")
+_PARTS = [f"h{entry}_{part}_N_per_m" for part in ("real", "imag") for entry in ENTRIES]
+_FIGURES = (
+    "coherence_x",
+    "coherence_y",
+    "method",
+    "dof",
+    "n_records",
+    "n_averages",
+    "resolution_Hz",
+    "condition_number",
+    "quality",
+)
+_LINE_COLUMNS = (
+    *_KEY_COLUMNS,
+    "excitation_Hz",
+    *(name + ending for name in _PARTS for ending in ("", "_lo", "_hi", "_se", "_se_systematic")),
+    *_FIGURES,
+)
+_MODEL_COLUMNS = (*_KEY_COLUMNS, "model", "supported", "method", *MODEL_COLUMNS, "quality")
 
 
 @dataclass(frozen=True)
@@ -86,38 +105,25 @@ def frf_frame(results: Sequence[BandResult], every_method: bool = False) -> pd.D
         for line in result.lines:
             chosen = line.by_method if every_method else {line.method: line.stiffness}
             rows += [_line_row(result, line, name, est) for name, est in chosen.items()]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_LINE_COLUMNS)
 
 
-def _line_row(result: BandResult, line: BandLine, method: str, est: DynamicStiffness) -> dict[str, Any]:
-    row: dict[str, Any] = {**result.key(), "excitation_Hz": line.frequency}
-    half, se = est.half_width(), est.standard_error
+def _line_row(result: BandResult, line: BandLine, method: str, est: DynamicStiffness) -> list[Any]:
+    value, half, se = est.vector, est.half_width(), est.standard_error
     shared = np.zeros(8) if est.systematic is None else np.sqrt(np.diag(est.systematic))
-    for part, offset in (("real", 0), ("imag", 4)):
-        for j, entry in enumerate(ENTRIES):
-            name, i = f"h{entry}_{part}_N_per_m", offset + j
-            value = est.vector[i]
-            row |= {name: value, f"{name}_lo": value - half[i], f"{name}_hi": value + half[i]}
-            row |= {f"{name}_se": se[i], f"{name}_se_systematic": shared[i]}
-    row.update(
-        coherence_x=line.coherence[0],
-        coherence_y=line.coherence[1],
-        method=method,
-        dof=float(np.min(est.dof)),
-        n_records=len(result.runs),
-        n_averages=line.n_rows,
-        resolution_Hz=result.resolution,
-        condition_number=est.condition,
-        quality="; ".join(str(c) for c in result.quality) or "ok",
-    )
-    return row
+    numbers = np.stack([value, value - half, value + half, se, shared], axis=1)
+    quality = "; ".join(str(c) for c in result.quality) or "ok"
+    figures = [*line.coherence, method, float(np.min(est.dof)), len(result.runs), line.n_rows]
+    figures += [result.resolution, est.condition, quality]
+    return [*result.key().values(), line.frequency, *numbers.ravel(), *figures]
 
 
 def models_frame(results: Sequence[BandResult]) -> pd.DataFrame:
     """One row per operating point and model: ``frf_models.csv``."""
     import pandas as pd
 
-    return pd.DataFrame([_model_row(result, model) for result in results for model in result.models.values()])
+    rows = [_model_row(result, model) for result in results for model in result.models.values()]
+    return pd.DataFrame(rows, columns=_MODEL_COLUMNS)
 
 
 def _model_row(result: BandResult, model: FrequencyModel) -> dict[str, Any]:

@@ -41,6 +41,7 @@ OCVIRK = mr.ShortBearing()
 CLOCK_B = ('clock = "B"',)
 DRIFT = ('temperature_coefficient = "0.04 %/K"', 'temperature_reference = "40 degC"')
 FOR_RUNS = ('[[channels."X1A".for]]', 'runs = ["d-00*", "d-01*", "d-02*", "d-03*"]', 'sensitivity = "7.87 mV/um"')
+AT_320: Entries = {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}
 TIME_2 = (Channel("Time 2", "time", 0.0, rate=250.0, extra=CLOCK_B),)
 
 
@@ -51,6 +52,7 @@ FAULTS: dict[str, Fault] = {
     "bits": lambda v, r, i: np.where(r.random(len(v)) < 0.002, np.nan, np.round(v / 2e-8) * 2e-8),  # 0.2 % missing
     "rounded": lambda v, r, i: np.round(2 * v) / 2,
     "glitches": lambda v, r, i: v + 12 * v.std() * (r.random(len(v)) < 0.05) * r.choice([-1.0, 1.0], len(v)),
+    "few": lambda v, r, i: v + 12 * v.std() * (r.random(len(v)) < 0.01) * r.choice([-1.0, 1.0], len(v)),
     "spikes": lambda v, r, i: v + 10 * v.std() * np.isin(np.arange(len(v)) // 5, r.integers(0, len(v) // 5, 12)),
     "gaps": lambda v, r, i: np.where(np.isin(np.arange(len(v)) // 120, r.integers(0, len(v) // 120, 3)), np.nan, v),
     "slip": lambda v, r, i: np.concatenate([v[: 4400 + 40 * i], v[4408 + 40 * i :], v[-8:]]),  # 8 samples are lost
@@ -159,10 +161,9 @@ def good_records() -> list[Condition]:
     image, slow = {"frequencies": (37.0, 61.0)}, {"rate": 250.0, "extra": CLOCK_B}
     spline = {"rate": 250.0, "fill": "spline", "fault": FAULTS["rounded"]}
     drift = {"drift": 4e-4, "extra": DRIFT}
-    at_320 = {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}
     late = {"late": 3e-4, "extra": ('delay_uncertainty = "0.3 ms"',)}
     return [
-        rig("cells at 320 Hz in columns of their own", ("L1", at_320), **image),
+        rig("cells at 320 Hz in columns of their own", ("L1", AT_320), **image),
         rig("cells and accelerometers at 250 Hz, own times", ("L1 A1", slow), more=TIME_2, **image),
         rig("the same as csv", ("L1 A1", slow), more=TIME_2, setup={"form": "csv", "time_digits": 5}, **image),
         rig("cells from 320 Hz, linear", ("L1", {"rate": 320.0, "fill": "linear"}), **image),
@@ -214,6 +215,9 @@ def good_bands() -> list[Condition]:
         rig("random, floating, added mass", limits=WIDER, **{**HEAVY, **random}),
         rig("random, soft cells, accelerometers' corner of 1 Hz", ("A1", {"fault": FAULTS["input"]}), **SOFT, **random),
         rig("random, no command", without="CMD", limits=WIDER, **random),
+        rig("random, cells at 320 Hz in columns of their own", ("L1", AT_320), **random),
+        rig("multi-sine, cells and accelerometers at 320 Hz", ("L1 A1", AT_320), **tones),
+        rig("random, 1 % isolated bad readings in a probe", ("X1B", {"fault": FAULTS["few"]}), **random),
         rig("sweep with quiet parts", share=(0.15, 0.8), **{**BAND, "excitation": "sweep"}),
         rig("multi-sine", **tones),
         rig("multi-sine, one command at rest", idle, **{**tones, "directions": (0.0, 90.0)}),
