@@ -1,4 +1,4 @@
-"""A measured pivot: the monotone curve of a dry test as a law."""
+"""Pivot laws as rows of `model.pad.pivot`: the printed formulas, and the monotone curve of a dry test."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from model.errors import ModelError
-from model.interpolation import monotone_cubics
+from model.interpolation import rising_cubics
 from model.pad.pivot import MEASURED, compliance, deflection
 from rigdata.arrays import FloatArray
 
@@ -22,11 +22,45 @@ class _PivotCurveError(ModelError):
 _LEAST_SHARE = 0.02
 
 
+class _Law:
+    """A law that is a row of numbers, and of a measured one its curve."""
+
+    numbers: Any
+    curve: FloatArray = np.zeros((5, 1))
+    secant_vibrations: bool = False
+
+    def deflection(self, load: float) -> float:
+        """delta(W) [m]."""
+        return float(deflection(self.numbers, self.curve, load))
+
+    def stiffness(self, load: float) -> float:
+        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
+        give = float(compliance(self.numbers, self.curve, load))
+        return 1.0 / give if give else math.inf
+
+    def secant(self, load: float) -> float:
+        """K as printed [N/m]."""
+        return max(load, 1e-9) / self.deflection(max(load, 1e-9))
+
+    def vibration_stiffness(self, load: float) -> float:
+        """Tangent, or the printed secant [N/m]."""
+        return self.secant(load) if self.secant_vibrations else self.stiffness(load)
+
+
+@dataclass(frozen=True)
+class FormulaPivot(_Law):
+    """A formula of `model.pad.pivot`: `numbers` are which it is, two constants, a factor on the stiffness."""
+
+    numbers: tuple[int, float, float, float]
+    name: str
+    secant_vibrations: bool = False
+
+
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value: a curve equals itself only
-class MeasuredPivot:
+class MeasuredPivot(_Law):
     """A measured monotone curve, interpolated with a continuous tangent (PCHIP in load).
 
-    Beyond the last point the curve goes on with its last tangent; `extrapolated` says when that is so.
+    Beyond the last point the curve goes on with its last tangent.
     """
 
     load: FloatArray  #: (n,) [N], and (n,) [m]: strictly increasing, from (0, 0).
@@ -56,27 +90,13 @@ class MeasuredPivot:
                 raise _PivotCurveError("a pivot curve must start at or above zero load and deflection")
         object.__setattr__(self, "load", load)
         object.__setattr__(self, "deflection_points", points)
-        cubics = np.append(monotone_cubics(load, points), np.zeros((4, 1)), axis=1)
+        cubics = np.append(rising_cubics(load, points), np.zeros((4, 1)), axis=1)
         object.__setattr__(self, "curve", np.vstack([load, cubics]))
 
     @property
     def numbers(self) -> Any:
         """Row of `model.pad.pivot`."""
         return MEASURED, len(self.load), 0.0, 1.0
-
-    def deflection(self, load: float) -> float:
-        """delta(W) [m]."""
-        return float(deflection(self.numbers, self.curve, load))
-
-    def stiffness(self, load: float) -> float:
-        """Tangent dW/ddelta [N/m]."""
-        return 1.0 / float(compliance(self.numbers, self.curve, load))
-
-    vibration_stiffness = stiffness
-
-    def extrapolated(self, load: float) -> bool:
-        """Whether `load` lies beyond what was measured."""
-        return not self.valid_from <= load <= self.valid_to
 
     def without_housing(self, compliance: float) -> MeasuredPivot:
         """Return the pivot alone, where a housing of this compliance [m/N] is modelled apart from it.

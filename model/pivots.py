@@ -17,13 +17,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from model.bearing import Bearing, BearingError, Pivot
-from model.measured_pivot import MeasuredPivot
-from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL, compliance, deflection
+from model.measured_pivot import FormulaPivot, MeasuredPivot
+from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL
 from model.toml_text import parse_toml, read_page
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
-
-_NO_CURVE = np.zeros((5, 1))
 
 
 @runtime_checkable
@@ -81,94 +79,9 @@ class PivotLaw(Protocol):
         ...
 
 
-class _Formula:
-    """A law that is a row of `model.pad.pivot`."""
-
-    secant_vibrations: bool = False
-
-    @property
-    def numbers(self) -> Any:
-        """Row of the formula: which it is, two constants, a factor on the stiffness."""
-        raise NotImplementedError
-
-    def deflection(self, load: float) -> float:
-        """delta(W) [m]."""
-        return float(deflection(self.numbers, _NO_CURVE, load))
-
-    def stiffness(self, load: float) -> float:
-        """Tangent dW/ddelta [N/m]; infinite for a rigid pivot."""
-        give = float(compliance(self.numbers, _NO_CURVE, load))
-        return 1.0 / give if give else math.inf
-
-    def secant(self, load: float) -> float:
-        """K as printed [N/m]."""
-        return max(load, 1e-9) / self.deflection(max(load, 1e-9))
-
-    def vibration_stiffness(self, load: float) -> float:
-        """Tangent, or the printed secant [N/m]."""
-        return self.secant(load) if self.secant_vibrations else self.stiffness(load)
-
-
-@dataclass(frozen=True)
-class RigidPivot(_Formula):
-    """No deflection."""
-
-    name: str = "rigid"
-
-    @property
-    def numbers(self) -> Any:
-        """Of no formula."""
-        return RIGID, 0.0, 0.0, 1.0
-
-
-@dataclass(frozen=True)
-class ConstantPivot(_Formula):
+def constant_pivot(stiffness: float) -> FormulaPivot:
     """A linear spring, W / K."""
-
-    value: float
-    name: str = "constant"
-
-    @property
-    def numbers(self) -> Any:
-        """Row of the formula."""
-        return CONSTANT, self.value, 0.0, 1.0
-
-
-@dataclass(frozen=True)
-class RockerPivot(_Formula):
-    """Line contact, Kirk and Reedy, Eq. (16) of the paper.
-
-    K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] } is the secant; its tangent
-    has 1/3 less than the logarithm: [ ln(...) - 1/3 ]. Past W = load_scale / e the formula leaves its physics (the
-    contact is as wide as the gap), and is held there.
-    """
-
-    line_modulus: float
-    load_scale: float
-    secant_vibrations: bool = False
-    name: str = "kirk"
-
-    @property
-    def numbers(self) -> Any:
-        """Row of the formula."""
-        return ROCKER, self.line_modulus, self.load_scale, 1.0
-
-
-@dataclass(frozen=True)
-class SphericalPivot(_Formula):
-    """Point contact, sphere on flat, Eq. (17) of the paper (= Hertz).
-
-    K = W / cbrt(9 W^2 (1 - nu^2)^2 / (2 E^2 D_s)); the tangent is 1.5 K.
-    """
-
-    compliance: float
-    secant_vibrations: bool = False
-    name: str = "kirk"
-
-    @property
-    def numbers(self) -> Any:
-        """Row of the formula."""
-        return SPHERICAL, self.compliance, 0.0, 1.0
+    return FormulaPivot((CONSTANT, stiffness, 0.0, 1.0), "constant")
 
 
 @dataclass(frozen=True)
@@ -196,8 +109,7 @@ class ScaledPivot:
         return self.law.vibration_stiffness(load) * self.stiffness_factor
 
 
-#: Laws that compiled searches know; one derived from them may deflect otherwise.
-_WITH_FORMULA = (RigidPivot, ConstantPivot, RockerPivot, SphericalPivot, MeasuredPivot)
+RIGID_PIVOT = FormulaPivot((RIGID, 0.0, 0.0, 1.0), "rigid")
 
 
 def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray]:
@@ -211,19 +123,19 @@ def encoded(laws: Sequence[PivotLaw]) -> tuple[FloatArray, FloatArray]:
 
 @lru_cache(maxsize=256)
 def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
-    rows, curves = np.zeros((len(laws), 4)), [_NO_CURVE] * len(laws)
-    for k, given in enumerate(laws):
-        factor, law = 1.0, given
+    rows, curves = np.zeros((len(laws), 4)), []
+    for row, law in zip(rows, laws, strict=True):
+        factor = 1.0
         while type(law) is ScaledPivot:
             factor, law = factor * law.stiffness_factor, law.law
-        rows[k] = OTHER, 0.0, 0.0, 1.0
-        if isinstance(law, (_Formula, MeasuredPivot)) and type(law) in _WITH_FORMULA:
-            rows[k] = law.numbers
-            rows[k, 3] = factor
-            curves[k] = getattr(law, "curve", _NO_CURVE)
+        # a law derived from one that compiled searches know may deflect otherwise
+        known = type(law) in (FormulaPivot, MeasuredPivot)
+        row[:] = law.numbers if known else (OTHER, 0.0, 0.0, 1.0)
+        row[3] = factor if known else 1.0
+        curves.append(law.curve if known else np.zeros((5, 1)))
     table = np.zeros((len(laws), 5, max(c.shape[1] for c in curves)))
-    for own, curve in zip(table, curves, strict=True):
-        own[:, : curve.shape[1]] = curve
+    for padded, curve in zip(table, curves, strict=True):
+        padded[:, : curve.shape[1]] = curve
     return rows, table
 
 
@@ -236,19 +148,25 @@ def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> N
 
 
 @lru_cache(maxsize=64)
-def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> PivotLaw:
-    """The printed formula for a contact geometry, Eq. (16) or (17)."""
+def formula_pivot(pivot: Pivot, secant_vibrations: bool = False) -> FormulaPivot:
+    """The printed formula for a contact geometry, Eq. (16) or (17) of the paper.
+
+    Line contact (Kirk and Reedy): K = pi E L / { 2 (1 - nu^2) [ 2/3 + ln( pi E L (D_H - D_P) / (4 W (1 - nu^2)) ) ] }
+    is the secant; its tangent has 1/3 less than the logarithm: [ ln(...) - 1/3 ]. Past W = load_scale / e the formula
+    leaves its physics (the contact is as wide as the gap), and is held there.
+
+    Point contact, sphere on flat (= Hertz): K = W / cbrt(9 W^2 (1 - nu^2)^2 / (2 E^2 D_s)); the tangent is 1.5 K.
+    """
     modulus = pivot.youngs_modulus / (1.0 - pivot.poissons_ratio**2)
     name = "kirk-secant" if secant_vibrations else "kirk"
     if pivot.kind == "rocker":
         line = math.pi * modulus * pivot.contact_length
-        gap = pivot.housing_diameter - pivot.pivot_diameter
-        return RockerPivot(line / 2.0, line * gap / 4.0, secant_vibrations, name)
+        load_scale = 0.25 * line * (pivot.housing_diameter - pivot.pivot_diameter)
+        return FormulaPivot((ROCKER, 0.5 * line, load_scale, 1.0), name, secant_vibrations)
     if pivot.kind == "spherical":
-        return SphericalPivot(
-            (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0), secant_vibrations, name
-        )
-    return RigidPivot()
+        give = (9.0 / (2.0 * modulus**2 * pivot.sphere_diameter)) ** (1.0 / 3.0)
+        return FormulaPivot((SPHERICAL, give, 0.0, 1.0), name, secant_vibrations)
+    return RIGID_PIVOT
 
 
 #: What `pivot_laws` knows by name.
@@ -260,19 +178,17 @@ def pivot_laws(choice: Any, bearing: Bearing) -> tuple[PivotLaw, ...]:
     n = len(bearing.pads)
     if isinstance(choice, str) and choice in NAMED_LAWS:
         if choice == "rigid":
-            return (RigidPivot(),) * n
+            return (RIGID_PIVOT,) * n
         return tuple(formula_pivot(bearing.pivot_of(pad), choice == "kirk-secant") for pad in bearing.pads)
     if isinstance(choice, (str, Path)):
         if not Path(choice).suffix:
-            advice = hint(str(choice), NAMED_LAWS, "Use one of")
-            if not advice.startswith("Did"):
-                advice = "Use rigid, kirk, kirk-secant or a pivots.toml."
+            advice = hint(str(choice), NAMED_LAWS, "Give a pivots.toml or use one of")
             raise BearingError(f"pivots: {str(choice)!r} is not known. {advice}")
         return load_pivots(choice, n)
     if isinstance(choice, (int, float)) and not isinstance(choice, bool):
         if not (math.isfinite(choice) and choice > 0):
             raise BearingError(f"pivots: a constant stiffness must be positive, got {choice!r} N/m.")
-        return (ConstantPivot(float(choice)),) * n
+        return (constant_pivot(float(choice)),) * n
     if isinstance(choice, PivotLaw):
         return (choice,) * n
     laws = tuple(choice)
@@ -358,33 +274,24 @@ def _read_pad(table: Any, name: str, housing: bool) -> tuple[int, MeasuredPivot]
         raise BearingError(f"{name}, [[pads]]: pad must be a number from 1, got {number!r}.")
     place = f"{name}, pad {number}"
     _refuse_unknown(table, _PAD_KEYS, place)
-    low, high = (_number(table.get(key, default), f"{place}, {key}") for key, default in _VALID.items())
-    if not 0.0 <= low < high:
-        raise BearingError(f"{place}: valid from {low:g} to {high:g} N. Give the lower load first, from 0.")
     try:
-        force, deflection = ([_number(v, f"{place}, {key}") for v in table[key]] for key in ("force_N", "deflection_m"))
-        law = MeasuredPivot(
-            np.array(force), np.array(deflection), low, high, str(table.get("law", "measured")), housing
-        )
-    except BearingError:
-        raise
-    except (KeyError, TypeError, ValueError) as error:
-        raise BearingError(f"{name}, pad {number}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
+        low = _number(table.get("valid_from_N", 0.0), "valid_from_N")
+        high = _number(table.get("valid_to_N", math.inf), "valid_to_N")
+        if not 0.0 <= low < high:
+            raise ValueError(f"valid from {low:g} to {high:g} N")
+        force = np.array([_number(value, "force_N") for value in table["force_N"]])
+        points = np.array([_number(value, "deflection_m") for value in table["deflection_m"]])
+        law = MeasuredPivot(force, points, low, high, str(table.get("law", "measured")), housing)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:  # whole numbers of 400 digits overflow
+        raise BearingError(f"{place}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
     return number, law
 
 
-#: Loads between which a curve was measured [N]: keys and defaults.
-_VALID = {"valid_from_N": 0.0, "valid_to_N": math.inf}
-
-
-def _number(value: Any, place: str) -> float:
+def _number(value: Any, key: str) -> float:
     """A number of the file: neither text nor a truth value, and none that is not there."""
-    try:
-        number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
-    except OverflowError as error:  # whole numbers of 400 digits
-        raise BearingError(f"{place}: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
+    number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
     if math.isnan(number):
-        raise BearingError(f"{place}: {value!r} is no number. Write it anew with `tpjb pivot CAMPAIGN`.")
+        raise ValueError(f"{key}: {value!r} is no number")
     return number
 
 

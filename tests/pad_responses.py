@@ -1,42 +1,58 @@
-"""A pad's response to single films, field by field: what tests and pictures ask of `model.pad.solid`."""
+"""A pad's response to single films, field by field: what tests ask of `model.pad`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from model.bearing import Bearing, Pad
+from model.pad.bending import film_maps
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, SectorMesh, sector_mesh
-from model.pad.operators import conduct
-from model.pad.solid import PadSolid, solid_of
+from model.pad.operators import PadOperators, conduct, pad_operators
 from rigdata.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PadResponse(PadSolid):
+class PadResponse:
     """Fields on the film grid have shape (n_theta, n_z); temperatures are rises above the oil supply [K]."""
+
+    geometry: PadGeometry
+    density: MeshDensity
+    film_theta: FloatArray
+    film_z: FloatArray
+
+    @cached_property
+    def _parts(self) -> list[tuple[PadOperators, tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Operators, and gather, project and coarse, for loads even in z and, of a full film, odd."""
+        full = self.film_z[0] < 0.0
+        film = Line(self.film_theta, 1), Line(self.film_z, 1)
+        parts = []
+        for even in (True, False) if full else (True,):
+            solid = pad_operators(self.geometry, self.density, even)
+            parts.append((solid, film_maps((solid.theta, solid.z), film, even if full else None)))
+        return parts
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Deformation per film pressure [m/Pa], (n_film, n_film)."""
+        return self.geometry.inner_radius * sum(to[1] @ (solid.compliance @ to[0]) for solid, to in self._parts)
 
     def bend(self, pressure: ArrayLike) -> FloatArray:
         """Deformation by film pressure, bilinear between film nodes."""
-        given = self._on_grid(pressure)
-        out = np.zeros(given.shape)
-        for solid, to in self._parts:
-            force = self.geometry.inner_radius * (to.theta.gather @ given @ to.z.gather.T)
-            moved = (solid.compliance @ force.ravel()).reshape(force.shape)
-            out += to.theta.project @ moved @ to.z.project.T
-        return out
+        given = np.asarray(pressure, dtype=float)
+        return np.asarray((self.compliance @ given.ravel()).reshape(given.shape))
 
     def expand(self, rise: ArrayLike) -> FloatArray:
         """Thermal deformation for a film temperature rise, conduction through the pad included."""
-        return self._thermal(self._on_grid(rise), "expansion")
+        return self._thermal(np.asarray(rise, dtype=float), "expansion")
 
     def heat_flow(self, rise: ArrayLike) -> FloatArray:
         """Heat flux density from film into pad [W/m^2], shape (n_theta, n_z), for a film temperature rise [K]."""
-        return self._thermal(self._on_grid(rise), "flux")
+        return self._thermal(np.asarray(rise, dtype=float), "flux")
 
     @cached_property
     def film_mass(self) -> FloatArray:
@@ -49,33 +65,24 @@ class PadResponse(PadSolid):
 
     def pad_temperature(self, rise: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Temperature of the pad's mid-plane."""
-        mesh, field_ = self._conducted(rise)
+        mesh, field_ = self._conducted(np.asarray(rise, dtype=float))
         return mesh.theta.nodes, mesh.r.nodes, field_[:, :, 0]
 
     def back_temperature(self, rise: ArrayLike) -> FloatArray:
         """Temperature rise on the pad's back over the film nodes [K], shape (n_theta, n_z)."""
-        (_, to), *_ = self._parts
-        return np.asarray(to.theta.project @ self._conducted(rise)[1][:, -1] @ to.z.project.T)
+        given = np.asarray(rise, dtype=float)
+        return (self._parts[0][1][1] @ self._conducted(given)[1][:, -1].ravel()).reshape(given.shape)
 
-    def _conducted(self, rise: ArrayLike) -> tuple[SectorMesh, FloatArray]:
+    def _conducted(self, rise: FloatArray) -> tuple[SectorMesh, FloatArray]:
         """Mesh of the pad, and the temperature rise at its nodes under one that is even in z."""
-        (_, to), *_ = self._parts
-        coarse = to.coarse_theta @ self._on_grid(rise) @ to.coarse_z.T
+        coarse = self._parts[0][1][2] @ rise.ravel()
         mesh = sector_mesh(self.geometry, self.density)
         along, across = (Line(line.breaks, 1).tabulate(line.nodes) for line in (mesh.theta, mesh.z))
-        face = np.asarray(along @ coarse @ across.T).reshape(-1, 1)
-        return mesh, conduct(mesh, self.geometry.back_convection, face)[0][..., 0]
-
-    def _on_grid(self, values: ArrayLike) -> FloatArray:
-        return np.asarray(values, dtype=float).reshape(self.film_theta.size, self.film_z.size)
+        return mesh, conduct(mesh, self.geometry.back_convection, (np.kron(along, across) @ coarse)[:, None])[0][..., 0]
 
     def _thermal(self, rise: FloatArray, name: str) -> FloatArray:
-        out = np.zeros(rise.shape)
-        for solid, to in self._parts:
-            coarse = to.coarse_theta @ rise @ to.coarse_z.T
-            answer = (getattr(solid, name) @ coarse.ravel()).reshape(solid.theta.n_nodes, solid.z.n_nodes)
-            out += to.theta.project @ answer @ to.z.project.T
-        return out
+        out = sum(to[1] @ (getattr(solid, name) @ (to[2] @ rise.ravel())) for solid, to in self._parts)
+        return np.asarray(out).reshape(rise.shape)
 
 
 def pad_solid(
@@ -87,9 +94,5 @@ def pad_solid(
     density: MeshDensity | None = None,
 ) -> PadResponse:
     """Solid of a pad for a film grid."""
-    return _response(solid_of(PadGeometry.of(pad, bearing, face), film_theta, film_z, density))
-
-
-@lru_cache(maxsize=16)
-def _response(solid: PadSolid) -> PadResponse:
-    return PadResponse(**{f.name: getattr(solid, f.name) for f in fields(PadSolid)})
+    theta, z = np.asarray(film_theta, dtype=float), np.asarray(film_z, dtype=float)
+    return PadResponse(PadGeometry.of(pad, bearing, face), density or MeshDensity(), theta, z)

@@ -8,7 +8,6 @@ times as long for the hundreds of right-hand sides that a compliance has.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky
@@ -55,24 +54,13 @@ def forward_rows(factor: Iterable[BlockRow], rhs: Iterable[FloatArray]) -> Itera
         yield previous[i]
 
 
-@dataclass(frozen=True, eq=False)
-class BlockCholesky:
-    """Factor kept whole, for full solutions."""
-
-    rows: tuple[BlockRow, ...]
-
-    @classmethod
-    def factor(cls, rows: Iterable[BlockRow]) -> BlockCholesky:
-        """Factor; arguments and errors as for `factor_rows`."""
-        return cls(tuple(factor_rows(rows)))
-
-    def solve(self, rhs: FloatArray) -> FloatArray:
-        """Solve K X = B: `rhs` (n_blocks, m, n_columns)."""
-        out = np.stack(list(forward_rows(self.rows, rhs)))
-        for i in reversed(range(len(self.rows))):
-            row = self.rows[i]
-            out[i] = dtrsm(1.0, row[i], out[i], lower=1, trans_a=1)
-            for j in row:
-                if j < i:
-                    out[j] -= row[j].T @ out[i]
-        return out
+def solve_rows(rows: Iterable[BlockRow], rhs: FloatArray) -> FloatArray:
+    """Solve K X = B: `rhs` (n_blocks, m, n_columns); here the whole factor is held."""
+    factor = list(factor_rows(rows))
+    out = np.stack(list(forward_rows(factor, rhs)))
+    for i, row in reversed(list(enumerate(factor))):
+        out[i] = dtrsm(1.0, row[i], out[i], lower=1, trans_a=1)
+        for j in row:
+            if j < i:
+                out[j] -= row[j].T @ out[i]
+    return out

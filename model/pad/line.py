@@ -25,8 +25,6 @@ class Line:
             raise ModelError(
                 f"breaks must be 1-D, strictly increasing, of at least two values; got shape {breaks.shape}."
             )
-        if self.degree < 1:
-            raise ModelError(f"degree must be at least 1, got {self.degree}.")
         breaks.setflags(write=False)
         object.__setattr__(self, "breaks", breaks)
 

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from model.pad.block_cholesky import BlockCholesky, BlockRow, factor_rows, forward_rows
+from model.pad.block_cholesky import BlockRow, factor_rows, forward_rows, solve_rows
 from model.pad.line import Line
 from model.pad.mesh import MeshDensity, PadGeometry, SectorMesh, sector_mesh
 from model.pad.store import load_arrays, save_arrays, storage_key
@@ -17,6 +17,7 @@ from rigdata.arrays import BoolArray, FloatArray
 
 #: Eight nodes: expansion to 2e-6, heat into the pad to 3e-4 (`tests/model/test_convection.py`).
 _NODES = 8
+_DENSITY = MeshDensity()
 #: Largest convection between the nodes [W/m^2/K]; above it a pad is solved for its own.
 LARGEST = 1e4
 
@@ -210,7 +211,7 @@ def conduct(mesh: SectorMesh, convection: float, face: FloatArray, even: bool = 
         rows.append(row)
     rhs = -load
     rhs[:, at_face] = 0.0
-    field = BlockCholesky.factor(rows).solve(rhs) + face_field
+    field = solve_rows(rows, rhs) + face_field
     heat = np.zeros_like(prescribed)
     for i, row in enumerate(to_film):
         for j, block in row.items():
@@ -265,44 +266,61 @@ class PadOperators:
     flux: FloatArray
 
 
-@lru_cache(maxsize=12)  # 4 MB each
-def pad_operators(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
-    """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds)."""
-    return operators_at(geometry, density, even, (geometry.back_convection,))[0]
+def pad_operators(
+    geometry: PadGeometry, density: MeshDensity = _DENSITY, even: bool = True, cooled: bool = False
+) -> PadOperators:
+    """Operators of one pad geometry: from memory, from the cache folder, or by solving (a few seconds).
+
+    `cooled`: interpolated between a few convections, so that the first time costs more and every other nothing.
+    """
+    convections, weights = (geometry.back_convection,), np.ones(1)
+    if cooled and geometry.back_convection <= LARGEST:
+        convections, weights = _between(geometry)
+    at = operators_at(replace(geometry, back_convection=0.0), density, even, convections)
+    return replace(at, expansion=np.tensordot(weights, at.expansion, 1), flux=np.tensordot(weights, at.flux, 1))
 
 
+def _between(geometry: PadGeometry) -> tuple[tuple[float, ...], FloatArray]:
+    """Convections at which a pad is solved, and their shares in its answer at its own (Lagrange).
+
+    Conduction with convection h is (K + h M) T = 0 about a given film face, so that every temperature in the pad is
+    a sum of c_i h / (h_i + h). The smallest h_i is about the conductivity over the thickness, h_0: in x = h / (h +
+    h_0) the sum is smooth up to x = 1, where the faces are as cold as the oil, and a polynomial through a few x
+    follows it.
+    """
+    through = geometry.backing.conductivity / geometry.backing_thickness
+    last = LARGEST / (LARGEST + through)
+    nodes = 0.5 * last * (1.0 - np.cos(np.pi * np.arange(_NODES) / (_NODES - 1)))
+    x = geometry.back_convection / (geometry.back_convection + through)
+    weights = np.empty(_NODES)
+    for k, node in enumerate(nodes):
+        others = np.delete(nodes, k)
+        weights[k] = np.prod((x - others) / (node - others))
+    return tuple((through * nodes / (1.0 - nodes)).tolist()), weights
+
+
+@lru_cache(maxsize=6)  # 13 MB each at most
 def operators_at(
     geometry: PadGeometry, density: MeshDensity, even: bool, convections: tuple[float, ...]
-) -> tuple[PadOperators, ...]:
-    """Operators of one pad geometry at several convections of its free faces, with one solution of its elasticity."""
+) -> PadOperators:
+    """Operators at several convections of the free faces, the first axis of `expansion` and `flux`."""
     mesh = sector_mesh(geometry, density)
-    shapes = _shapes(mesh.theta, mesh.z, len(convections))
-    key = storage_key((replace(geometry, back_convection=0.0), density, even, convections))
+    corners = mesh.theta.breaks.size * mesh.z.breaks.size
+    by_convection = (len(convections), mesh.n_surface, corners)
+    shapes = {"compliance": (mesh.n_surface,) * 2, "expansion": by_convection, "flux": by_convection}
+    key = storage_key((geometry, density, even, convections))
     arrays = load_arrays(key, shapes)
     if arrays is None:
-        arrays = _solve(geometry, density, even, convections)
+        arrays = _solve(geometry, mesh, even, convections)
         save_arrays(key, arrays)
-    for array in arrays.values():
-        array.setflags(write=False)
-    compliance = arrays.pop("compliance")
-    return tuple(
-        PadOperators(mesh.theta, mesh.z, compliance, **{name: array[k] for name, array in arrays.items()})
-        for k in range(len(convections))
-    )
-
-
-def _shapes(theta: Line, z: Line, count: int) -> dict[str, tuple[int, ...]]:
-    n_surface = theta.n_nodes * z.n_nodes
-    n_temperatures = theta.breaks.size * z.breaks.size
-    by_convection = (count, n_surface, n_temperatures)
-    return {"compliance": (n_surface, n_surface), "expansion": by_convection, "flux": by_convection}
+    arrays["compliance"].setflags(write=False)
+    return PadOperators(mesh.theta, mesh.z, **arrays)
 
 
 def _solve(
-    geometry: PadGeometry, density: MeshDensity, even: bool, convections: tuple[float, ...]
+    geometry: PadGeometry, mesh: SectorMesh, even: bool, convections: tuple[float, ...]
 ) -> dict[str, FloatArray]:
     """Solve conduction, then thermoelasticity; see `PadOperators` for the results."""
-    mesh = sector_mesh(geometry, density)
     theta, z = mesh.theta, mesh.z
     spread = np.asarray(np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes)))
     n_temperatures = spread.shape[1]
@@ -326,31 +344,3 @@ def _flux(mesh: SectorMesh, heat: FloatArray) -> FloatArray:
     by_arc = heat.reshape(theta.n_nodes, z.n_nodes, -1)
     flux = np.linalg.solve(theta.matrix(0, 0), by_arc.reshape(theta.n_nodes, -1)).reshape(by_arc.shape)
     return np.asarray(np.linalg.solve(z.matrix(0, 0), flux).reshape(mesh.n_surface, -1))
-
-
-_operators_at_nodes = lru_cache(maxsize=3)(operators_at)  # 13 MB each
-
-
-def pad_operators_between(geometry: PadGeometry, density: MeshDensity, even: bool) -> PadOperators:
-    """As `pad_operators`, interpolated between a few convections: the first time costs more, every other nothing.
-
-    Conduction with convection h is (K + h M) T = 0 about a given film face, so that every temperature in the pad is
-    a sum of c_i h / (h_i + h). The smallest h_i is about the conductivity over the thickness, h_0: in x = h / (h +
-    h_0) the sum is smooth up to x = 1, where the faces are as cold as the oil, and a polynomial through a few x
-    follows it.
-    """
-    if geometry.back_convection > LARGEST:
-        return pad_operators(geometry, density, even)
-    through = geometry.backing.conductivity / geometry.backing_thickness
-    last = LARGEST / (LARGEST + through)
-    nodes = 0.5 * last * (1.0 - np.cos(np.pi * np.arange(_NODES) / (_NODES - 1)))
-    convections = tuple(float(h) for h in through * nodes / (1.0 - nodes))
-    at_nodes = _operators_at_nodes(replace(geometry, back_convection=0.0), density, even, convections)
-    x = geometry.back_convection / (geometry.back_convection + through)
-    weights = []
-    for node in nodes:
-        others = nodes[nodes != node]
-        weights.append(float(np.prod((x - others) / (node - others))))
-    expansion = sum(weight * at_node.expansion for weight, at_node in zip(weights, at_nodes, strict=True))
-    flux = sum(weight * at_node.flux for weight, at_node in zip(weights, at_nodes, strict=True))
-    return replace(at_nodes[0], expansion=np.asarray(expansion), flux=np.asarray(flux))

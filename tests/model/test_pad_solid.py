@@ -11,7 +11,7 @@ import pytest
 from model.bearing import STEEL, Bearing, Material, Oil, Pad, Pivot
 from model.pad import operators as operators_module
 from model.pad import store as pad_store
-from model.pad.block_cholesky import BlockCholesky, factor_rows, forward_rows
+from model.pad.block_cholesky import factor_rows, forward_rows, solve_rows
 from model.pad.line import Line, graded
 from model.pad.mesh import MeshDensity, PadGeometry, PivotFace, pivot_face, sector_mesh
 from model.pad.operators import conduct, pad_operators
@@ -67,8 +67,6 @@ class TestLine:
     def test_rejects_what_is_no_line(self) -> None:
         with pytest.raises(ValueError, match="strictly increasing"):
             Line(np.array([0.0, 0.0, 1.0]))
-        with pytest.raises(ValueError, match="degree"):
-            Line(np.array([0.0, 1.0]), 0)
 
     def test_graded_meets_both_ends(self) -> None:
         breaks = graded(2.0, 3.0, 7, 0.1, 0.01)
@@ -101,7 +99,7 @@ class TestBlockCholesky:
     def test_solves_as_dense_algebra_does(self) -> None:
         dense, rows = self.blocks()
         rhs = np.random.default_rng(1).normal(size=(6, 4, 3))
-        got = BlockCholesky.factor(rows).solve(rhs)
+        got = solve_rows(rows, rhs)
         np.testing.assert_allclose(got.reshape(24, 3), np.linalg.solve(dense, rhs.reshape(24, 3)), rtol=1e-12)
 
     def test_growing_right_hand_sides(self) -> None:
@@ -115,7 +113,7 @@ class TestBlockCholesky:
 
     def test_says_when_not_positive_definite(self) -> None:
         with pytest.raises(np.linalg.LinAlgError):
-            BlockCholesky.factor([{0: -np.eye(2)}])
+            solve_rows([{0: -np.eye(2)}], np.ones((1, 2, 1)))
 
 
 class TestCompliance:
@@ -126,15 +124,6 @@ class TestCompliance:
         scale = np.abs(work).max()
         np.testing.assert_allclose(work, work.T, atol=1e-12 * scale)
         assert np.linalg.eigvalsh(0.5 * (work + work.T)).min() > -1e-12 * scale
-
-    def test_matrices_do_what_the_methods_do(self) -> None:
-        body = solid()
-        p = film_pressure(body)
-        np.testing.assert_allclose(body.compliance @ p.ravel(), body.bend(p).ravel(), rtol=1e-10, atol=1e-15)
-        to_coarse, expansion, flux = body.thermal_factors
-        coarse = to_coarse @ p.ravel()
-        np.testing.assert_allclose(expansion @ coarse, body.expand(p).ravel(), rtol=1e-10)
-        np.testing.assert_allclose(flux @ coarse, body.heat_flow(p).ravel(), rtol=1e-9, atol=1e-9 * np.abs(p).max())
 
     def test_half_film_stands_for_the_whole(self) -> None:
         half, full = solid(), solid(full=True)
@@ -279,29 +268,12 @@ class TestGeometry:
     def test_face_must_fit(self) -> None:
         with pytest.raises(ValueError, match="does not fit"):
             PadGeometry.of(PAD, bearing(), PivotFace(0.2, 0.01))
-        with pytest.raises(ValueError, match="longer than the pad"):
-            PadGeometry.of(PAD, bearing(), PivotFace(0.008, 0.1))
-        with pytest.raises(ValueError, match="positive"):
-            PivotFace(0.0, 0.01)
-
-    def test_density_has_its_least(self) -> None:
-        with pytest.raises(ValueError, match="half_length >= 3"):
-            MeshDensity(half_length=2)
-        assert MeshDensity().refined(2).arc == 2 * MeshDensity().arc
+        with pytest.raises(ValueError, match="does not fit"):
+            PadGeometry.of(dataclasses.replace(PAD, pivot_offset=0.0), bearing())
 
     def test_micron_changes_share_a_solution(self) -> None:
         moved = dataclasses.replace(PAD, pad_clearance=PAD.pad_clearance + 5e-6, assembled_clearance=60e-6)
-        assert solid(moved) is solid()
-
-    def test_grid_must_span_the_pad(self) -> None:
-        theta, z = grids()
-        for bad, name in (
-            ((theta[1:], z), "film_theta"),
-            ((theta, z[:-1]), "film_z"),
-            ((theta[::-1], z), "film_theta"),
-        ):
-            with pytest.raises(ValueError, match=name):
-                pad_solid(PAD, bearing(), *bad, density=COARSE)
+        assert PadGeometry.of(moved, bearing()) == PadGeometry.of(PAD, bearing())
 
 
 class TestStore:
@@ -319,7 +291,7 @@ class TestStore:
 
     @staticmethod
     def fresh() -> np.ndarray:
-        pad_operators.cache_clear()
+        operators_module.operators_at.cache_clear()
         return pad_operators(PadGeometry.of(PAD, bearing()), MeshDensity(2, 1, 3, 1), True).compliance
 
     def test_second_process_reads_the_file(self, tmp_path, monkeypatch, counted) -> None:

@@ -9,22 +9,25 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing, Oil, Pad, Pivot
-from model.measured_pivot import MeasuredPivot
+from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import OTHER, compliance, deflection
-from model.pivots import ConstantPivot, RigidPivot, ScaledPivot, ask_laws, encoded, formula_pivot
+from model.pivots import RIGID_PIVOT, ScaledPivot, ask_laws, constant_pivot, encoded, formula_pivot
 from model.predict import predict
 from model.statics.compiled.anderson import DEPTH, mixed
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 
 
-class Own(ConstantPivot):
+class Own(FormulaPivot):
     """A law of somebody's own, which happens to be known otherwise."""
+
+
+OWN = Own(constant_pivot(5e8).numbers, "own")
 
 
 def laws(bearing):
     kirk = formula_pivot(bearing.pivot)
-    return [kirk, RigidPivot(), ConstantPivot(5e8), CURVE, ScaledPivot(ScaledPivot(CURVE, 2.0), 0.4)]
+    return [kirk, RIGID_PIVOT, constant_pivot(5e8), CURVE, ScaledPivot(ScaledPivot(CURVE, 2.0), 0.4)]
 
 
 @pytest.mark.parametrize("name", ["rocker", "spherical"])
@@ -39,13 +42,13 @@ def test_laws_as_numbers_say_what_the_laws_say(request, name):
 
 
 def test_a_law_of_ones_own_is_asked_step_by_step(rocker):
-    rows, _ = encoded([Own(5e8), ConstantPivot(5e8)])
+    rows, _ = encoded([OWN, constant_pivot(5e8)])
     assert rows[0, 0] == OTHER != rows[1, 0]
-    ask_laws([Own(5e8), ConstantPivot(5e8)], rows, np.array([3000.0, 10.0]))
+    ask_laws([OWN, constant_pivot(5e8)], rows, np.array([3000.0, 10.0]))
     np.testing.assert_allclose(rows[0, 1:3], [3000.0 / 5e8, 1.0 / 5e8])
-    assert encoded([Own(5e8)])[0][0, 1] == 0.0  # what was asked stays where it was asked for
+    assert encoded([OWN])[0][0, 1] == 0.0  # what was asked stays where it was asked for
     for thermal in ("isothermal", "adiabatic", "tehd"):
-        own = predict(rocker, 5000.0, -1.3, 2 * math.pi * 22, pivots=[Own(5e8)] * 5, thermal=thermal)
+        own = predict(rocker, 5000.0, -1.3, 2 * math.pi * 22, pivots=[OWN] * 5, thermal=thermal)
         known = predict(rocker, 5000.0, -1.3, 2 * math.pi * 22, pivots=5e8, thermal=thermal)
         np.testing.assert_allclose(own.h, known.h, rtol=1e-6, atol=1e-6 * np.abs(known.h).max())
 
