@@ -103,23 +103,26 @@ class Prediction:
     def summary(self) -> str:
         """Operating point, direct coefficients in MN/m and kN s/m, position and extremes, in one line."""
         lines = self._frequencies
-        h = self.h.reshape(-1, 2, 2)[0]
-        direct = [h[0, 0].real / 1e6, h[1, 1].real / 1e6, *(h.imag[[0, 1], [0, 1]] / (2e3 * math.pi * lines[0]))]
+        kxx, kyy = np.diagonal(self.k.reshape(-1, 2, 2)[0]) / 1e6
+        cxx, cyy = np.diagonal(self.c.reshape(-1, 2, 2)[0]) / 1e3
         more = f" and at {len(lines) - 1} more" if len(lines) > 1 else ""
         return (
-            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {direct[0]:.4g}, kyy {direct[1]:.4g} MN/m, "
-            f"cxx {direct[2]:.4g}, cyy {direct[3]:.4g} kN s/m"
+            f"{self}; at {lines[0]:.4g} Hz{more}: kxx {kxx:.4g}, kyy {kyy:.4g} MN/m, "
+            f"cxx {cxx:.4g}, cyy {cyy:.4g} kN s/m"
         )
+
+    def _scaled(self) -> pd.DataFrame:
+        """Coefficients over the excitation frequency, MN/m and kN s/m, headed with their units."""
+        table = self.to_dataframe()
+        scaled = table[["excitation_Hz"]].rename(columns={"excitation_Hz": "excitation, Hz"})
+        for column in table.columns[5:13]:
+            scale, unit = (1e6, "MN/m") if column[0] == "k" else (1e3, "kN s/m")
+            scaled[f"{column[:3]}, {unit}"] = table[column] / scale
+        return scaled
 
     def _repr_html_(self) -> str:
         """Coefficients over the excitation frequency, for a notebook."""
-        names = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")
-        lines = self._frequencies
-        cells = np.concatenate([self.k.reshape(-1, 4) / 1e6, self.c.reshape(-1, 4) / 1e3], axis=1)
-        heads = ["excitation, Hz", *(f"{n}, {'MN/m' if n[0] == 'k' else 'kN s/m'}" for n in names)]
-        rows = [[f"{line:.4g}", *(f"{v:.4g}" for v in row)] for line, row in zip(lines, cells, strict=True)]
-        table = "".join("<tr>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>" for row in rows)
-        return f"<p>{self}</p><table><tr>{''.join(f'<th>{n}</th>' for n in heads)}</tr>{table}</table>"
+        return f"<p>{self}</p>{self._scaled().to_html(index=False, float_format='%.4g')}"
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per excitation frequency: point, K, C, position, conditions; SI, names as in prediction.csv."""
@@ -146,15 +149,10 @@ class Prediction:
         -------
         matplotlib.figure.Figure
         """
-        names = ("xx", "xy", "yx", "yy")
-        table = self.to_dataframe().rename(columns={"excitation_Hz": "excitation, Hz"})
-        shown = table[["excitation, Hz"]].copy()
-        for kind, unit, scale in (("k", "N_per_m", 1e6), ("c", "Ns_per_m", 1e3)):
-            shown[[kind + n for n in names]] = table[[f"{kind}{n}_{unit}" for n in names]] / scale
-        groups = [tuple("k" + n for n in names), tuple("c" + n for n in names)]
-        axes = shown.plot(x="excitation, Hz", subplots=groups, style="o-", grid=True, figsize=(7, 6))
-        for axis, label in zip(axes, ("stiffness, MN/m", "damping, kN s/m"), strict=True):
-            axis.set_ylabel(label)
+        table = self._scaled()
+        groups = [tuple(table.columns[1:5]), tuple(table.columns[5:])]
+        axes = table.plot(x="excitation, Hz", subplots=groups, style="o-", grid=True, figsize=(7, 6))
+        for axis in axes:
             axis.legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
         return axes[0].figure
 

@@ -12,7 +12,7 @@ from model.pivots import pivot_laws
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Mesh, Setup
-from model.static_tests import sweep
+from tests.rigs.sweeps import sweep
 
 SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, 2 * math.pi * 25.0, -math.pi / 2
 
@@ -127,4 +127,4 @@ def test_a_prediction_prints_in_the_units_of_its_readers(rocker):
     assert len(repr(found)) < 300
     assert repr(found).startswith("<Prediction 5000 N at -90 deg, 21.96 Hz: shaft at")
     assert f"kxx {found.kxx[0] / 1e6:.4g}, kyy {found.kyy[0] / 1e6:.4g} MN/m" in found.summary()
-    assert found._repr_html_().count("<tr>") == 3
+    assert found._repr_html_().count("<tr") == 3

@@ -12,12 +12,8 @@ from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.setup import Mesh, Setup
-from model.static_tests import (
-    dry_curve,
-    locus,
-    polygon_sides,
-    sweep,
-)
+from model.static_tests import dry_curve, polygon_sides
+from tests.rigs.sweeps import sweep
 
 SPEED, OMEGA, DOWN = 2 * math.pi * 22.0, np.array([2 * math.pi * 25.0]), -math.pi / 2
 LOADS = np.linspace(2500.0, 8750.0, 6)
@@ -31,8 +27,8 @@ def test_dry_curve_is_the_law_through_structure_and_instruments(rocker):
     load = np.linspace(0.0, 5000.0, 11)
     plain = dry_curve(setup(rocker), 1, load)
     law = pivot_laws("kirk", rocker)[0]
-    np.testing.assert_allclose(plain.deflection, [law.deflection(w) for w in load])
-    np.testing.assert_allclose(plain.load, load)
+    np.testing.assert_allclose(plain[1], [law.deflection(w) for w in load])
+    np.testing.assert_allclose(plain[0], load)
     read = dry_curve(
         setup(
             rocker,
@@ -43,30 +39,29 @@ def test_dry_curve_is_the_law_through_structure_and_instruments(rocker):
         1,
         load,
     )
-    np.testing.assert_allclose(read.deflection, 1.1 * (plain.deflection + load / 1e9), atol=1e-15)
-    np.testing.assert_allclose(read.load, 0.9 * load)
+    np.testing.assert_allclose(read[1], 1.1 * (plain[1] + load / 1e9), atol=1e-15)
+    np.testing.assert_allclose(read[0], 0.9 * load)
 
 
 def test_polygon_of_equal_pads_is_regular(rocker):
-    sides = polygon_sides(setup(rocker), 0.0)
-    np.testing.assert_allclose(sides.clearance, rocker.pads[0].assembled_clearance)
-    np.testing.assert_allclose(sides.pushed, sides.clearance)
-    np.testing.assert_allclose(np.diff(np.unwrap(sides.angle)), 2 * math.pi / 5)
+    distance, angle = polygon_sides(setup(rocker), 0.0)
+    np.testing.assert_allclose(distance, rocker.pads[0].assembled_clearance)
+    np.testing.assert_allclose(np.diff(np.unwrap(angle)), 2 * math.pi / 5)
 
 
 def test_push_load_enlarges_the_polygon_by_what_pivots_and_housing_give(rocker):
     spring = setup(
         rocker, Effect("housing_flexibility", stiffness=4e8), Effect("soft_pivot", pad=3, stiffness_factor=0.3)
     )
-    sides = polygon_sides(spring, 200.0)
+    pushed, clearance = polygon_sides(spring, 200.0)[0], polygon_sides(spring, 0.0)[0]
     give = [law.deflection(200.0) for law in spring.pivots]
-    np.testing.assert_allclose(sides.pushed - sides.clearance, np.array(give) + 200.0 / 4e8)
-    assert np.argmax(sides.pushed) == 2
+    np.testing.assert_allclose(pushed - clearance, np.array(give) + 200.0 / 4e8)
+    assert np.argmax(pushed) == 2
     # running conditions do not change what is measured cold
-    warm = polygon_sides(setup(rocker, Effect("thermal_growth", clearance_change=1e-5)), 200.0)
-    np.testing.assert_allclose(warm.clearance, rocker.pads[0].assembled_clearance)
-    moved = polygon_sides(setup(rocker, Effect("pad_offset", pad=3, radial_offset=1e-5)), 200.0)
-    assert moved.clearance[2] == pytest.approx(rocker.pads[2].assembled_clearance + 1e-5)
+    warm = polygon_sides(setup(rocker, Effect("thermal_growth", clearance_change=1e-5)), 0.0)
+    np.testing.assert_allclose(warm[0], rocker.pads[0].assembled_clearance)
+    moved = polygon_sides(setup(rocker, Effect("pad_offset", pad=3, radial_offset=1e-5)), 0.0)
+    assert moved[0][2] == pytest.approx(rocker.pads[2].assembled_clearance + 1e-5)
 
 
 def test_sweeps_up_and_down_meet_cold_starts(rocker):
@@ -87,15 +82,16 @@ def test_sweeps_up_and_down_meet_cold_starts(rocker):
 
 def test_locus_of_equal_pads_repeats_every_pad(rocker):
     directions = np.linspace(-math.pi, math.pi, 20, endpoint=False)
-    points = locus(setup(rocker), 5000.0, directions, 2 * math.pi * 20.0)
+    turning = 2 * math.pi * 20.0
+    found = sweep(setup(rocker), [(5000.0, d, turning, np.array([turning])) for d in directions.tolist()])
+    points = np.array([p.position for p in found])
     assert points.shape == (20, 2)
     turned = points[4:8]  # 72 deg further
     c, s = math.cos(2 * math.pi / 5), math.sin(2 * math.pi / 5)
     np.testing.assert_allclose(turned, points[:4] @ np.array([[c, s], [-s, c]]), atol=2e-9)
     # inside the clearance polygon
-    sides = polygon_sides(setup(rocker), 5000.0)
-    normals = np.column_stack([np.cos(sides.angle), np.sin(sides.angle)])
-    assert (points @ normals.T < sides.pushed).all()
+    pushed, angle = polygon_sides(setup(rocker), 5000.0)
+    assert (points @ np.array([np.cos(angle), np.sin(angle)]) < pushed).all()
 
 
 def test_a_point_that_fails_does_not_spoil_the_next(rocker):
@@ -105,4 +101,3 @@ def test_a_point_that_fails_does_not_spoil_the_next(rocker):
     assert [p.converged for p in found] == [True, False, True]
     np.testing.assert_allclose(found[2].h, found[0].h, rtol=1e-6)
     assert "not converged" in "; ".join(found[1].status)
-    assert np.isnan(locus(one, 5000.0, np.array([1.5]), SPEED)).all()

@@ -199,18 +199,16 @@ class _PredictedTable:
         """Logarithm of the tangent compliance at loads as read."""
         for load in test.load:
             step = 0.02 * load
-            curve = dry_curve(self.setup, test.pad, np.array([load - step, load + step]))
-            gain = curve.load[1] / (load + step)  # loads are as read: ask at the true ones
+            forces, deflections = dry_curve(self.setup, test.pad, np.array([load - step, load + step]))
+            gain = forces[1] / (load + step)  # loads are as read: ask at the true ones
             if abs(gain - 1.0) > 1e-12:
-                curve = dry_curve(self.setup, test.pad, np.array([load - step, load + step]) / gain)
-            slope = max(float(np.diff(curve.deflection)[0] / np.diff(curve.load)[0]), 1e-16)
+                forces, deflections = dry_curve(self.setup, test.pad, np.array([load - step, load + step]) / gain)
+            slope = max(float(np.diff(deflections)[0] / np.diff(forces)[0]), 1e-16)
             self.table[("dry_compliance", float(test.pad), load)] = float(np.log(slope))
 
     def clearance(self, push_load: float) -> None:
-        sides = polygon_sides(self.setup, push_load)
-        for k, (pad, pushed, angle) in enumerate(
-            zip(self.setup.bearing.pads, sides.pushed, sides.angle, strict=True), start=1
-        ):
+        sides = zip(self.setup.bearing.pads, *polygon_sides(self.setup, push_load), strict=True)
+        for k, (pad, pushed, angle) in enumerate(sides, start=1):
             self.table[("clearance_pushed", float(k), pad.pivot_angle)] = float(pushed)
             turn = angle - pad.pivot_angle
             self.table[("side_angle", float(k), pad.pivot_angle)] = float(np.arctan2(np.sin(turn), np.cos(turn)))
