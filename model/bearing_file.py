@@ -11,78 +11,73 @@ from model.toml_text import parse_toml, read_page
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
-_MATERIAL_KEYS = {
+#: Dimension of every entry, and what else holds for it: "per pad" may be a list, pad #1 first.
+_MATERIAL = {
     "youngs_modulus": "pressure",
     "poissons_ratio": "ratio",
-    "thermal_expansion": "per kelvin",
-    "conductivity": "conductivity",
+    "thermal_expansion": "per kelvin, zero",
+    "conductivity": "conductivity, zero",
 }
 _KEYS: dict[str, dict[str, str]] = {
-    "": {"schema": "text", "name": "text"},
+    "": {"schema": "text, optional", "name": "text, optional"},
     "journal": {"diameter": "length"},
     "bearing": {
         "length": "length",
-        "assembled_clearance": "length",
-        "pad_clearance": "length",
-        "rotation": "text",
+        "assembled_clearance": "length, per pad",
+        "pad_clearance": "length, per pad",
+        "rotation": "text, optional",
     },
     "pads": {
-        "pivot_angles": "angle",
-        "arc": "angle",
-        "pivot_offset": "ratio",
-        "thickness": "length",
-        "babbitt_thickness": "length",
-        "elastic_thickness": "length",
-        "mass": "mass",
-        "moment_of_inertia": "moment of inertia",
-        "back_convection": "heat transfer",
-        "leading_edge_pressure": "pressure",
+        "pivot_angles": "angle, per pad, signed",
+        "arc": "angle, per pad",
+        "pivot_offset": "ratio, per pad, optional",
+        "thickness": "length, per pad",
+        "babbitt_thickness": "length, per pad, optional, zero",
+        "elastic_thickness": "length, per pad, optional",
+        "mass": "mass, per pad, zero",
+        "moment_of_inertia": "moment of inertia, per pad, zero",
+        "back_convection": "heat transfer, optional, zero",
+        "leading_edge_pressure": "pressure, per pad, optional, zero",
     },
-    "pads.backing": _MATERIAL_KEYS,
-    "pads.babbitt": _MATERIAL_KEYS,
+    "pads.backing": _MATERIAL,
+    "pads.babbitt": _MATERIAL,
     "pivot": {
         "kind": "text",
-        "contact_length": "length",
-        "housing_diameter": "length",
-        "pivot_diameter": "length",
-        "sphere_diameter": "length",
-        "youngs_modulus": "pressure",
-        "poissons_ratio": "ratio",
+        "contact_length": "length, per pad, optional",
+        "housing_diameter": "length, per pad, optional",
+        "pivot_diameter": "length, per pad, optional",
+        "sphere_diameter": "length, per pad, optional",
+        "youngs_modulus": "pressure, optional",
+        "poissons_ratio": "ratio, optional",
     },
     "oil": {
-        "grade": "text",
-        "supply_temperature": "temperature",
-        "supply_flow": "flow",
+        "grade": "text, optional",
+        "supply_temperature": "temperature, signed",
+        "supply_flow": "flow, optional",
         "viscosity_40C": "viscosity",
-        "viscosity_exponent": "per kelvin",
+        "viscosity_exponent": "per kelvin, zero",
         "density_40C": "density",
-        "thermal_expansion": "per kelvin",
+        "thermal_expansion": "per kelvin, zero",
         "specific_heat": "specific heat",
-        "conductivity": "conductivity",
+        "conductivity": "conductivity, zero",
+    },
+    # how well drawing and data sheet are known, one standard deviation each (`rig-export.md`)
+    "tolerances": {
+        "viscosity": "ratio, optional, zero",
+        "viscosity_exponent": "ratio, optional, zero",
+        "supply_temperature": "temperature difference, optional, zero",
+        "assembled_clearance": "length, optional, zero",
+        "pad_clearance": "length, optional, zero",
+        "clearance_scatter": "length, optional, zero",
+        "pivot_stiffness_scatter": "ratio, optional, zero",
+        "film_heat": "ratio, optional, zero",
+        "thermometer": "temperature difference, optional, zero",
+        "probe_gain": "ratio, optional, zero",
+        "model": "ratio, optional, zero",
+        "pivot_offset": "ratio, optional, zero",
     },
 }
-_OPTIONAL = {
-    "schema", "name", "grade", "rotation", "elastic_thickness", "babbitt_thickness", "back_convection", "pivot_offset",
-    "contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter", "youngs_modulus", "poissons_ratio",
-    "pads.backing", "pads.babbitt", "tolerances", "supply_flow", "leading_edge_pressure",
-}  # fmt: skip
-#: How well drawing and data sheet are known, one standard deviation each (`rig-export.md`).
-_TOLERANCES = {
-    "viscosity": "ratio", "viscosity_exponent": "ratio", "supply_temperature": "temperature difference",
-    "assembled_clearance": "length", "pad_clearance": "length", "clearance_scatter": "length",
-    "pivot_stiffness_scatter": "ratio", "film_heat": "ratio", "thermometer": "temperature difference",
-    "probe_gain": "ratio", "model": "ratio", "pivot_offset": "ratio",
-}  # fmt: skip
-_KEYS["tolerances"] = _TOLERANCES
-_MAY_BE_ZERO = {"babbitt_thickness", "back_convection", "viscosity_exponent", "thermal_expansion", "mass",
-                "moment_of_inertia", "conductivity", "leading_edge_pressure"}  # fmt: skip
-#: Lengths of a pivot.
-_PIVOT_SIZES = ("contact_length", "housing_diameter", "pivot_diameter", "sphere_diameter")
-#: Entries that may be a list, one value per pad.
-_PER_PAD = {
-    "pivot_angles", "arc", "pivot_offset", "assembled_clearance", "pad_clearance", "thickness", "babbitt_thickness",
-    "elastic_thickness", "mass", "moment_of_inertia", "leading_edge_pressure", *_PIVOT_SIZES,
-}  # fmt: skip
+_OPTIONAL_SECTIONS = ("pads.backing", "pads.babbitt", "tolerances")
 #: What makes a pad besides its place, its material and its pivot.
 _PAD_SIZES = (
     *(("bearing", key) for key in ("assembled_clearance", "pad_clearance")),
@@ -148,7 +143,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
 def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
     section: Any = data
     for part in key.split(".") if key else []:
-        section = section.get(part, {} if key in _OPTIONAL else None)
+        section = section.get(part, {} if key in _OPTIONAL_SECTIONS else None)
         if section is None:
             raise BearingError(f"{name}: section [{key}] is missing. Add it; see the bundled rocker.toml.")
         if not isinstance(section, dict):
@@ -164,58 +159,41 @@ def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
 
 def _read_section(section: dict[str, Any], key: str, name: str) -> dict[str, Any]:
     out: dict[str, Any] = {}
-    material = key.startswith("pads.")
-    if material and not section:
+    if not section and key in _OPTIONAL_SECTIONS:
         return out
-    if key == "tolerances":
-        return {entry: _read_tolerance(value, entry, name) for entry, value in section.items()}
-    for entry, dimension in _KEYS[key].items():
+    for entry, kind in _KEYS[key].items():
+        dimension, *flags = kind.split(", ")
         place = f"{name}, [{key}] {entry}" if key else f"{name}, {entry}"
-        if entry not in section:
-            if entry in _OPTIONAL and not material:
-                continue
+        if entry in section:
+            out[entry] = _read_value(section[entry], dimension, flags, place)
+        elif "optional" not in flags:
             raise BearingError(f"{place}: missing. Add it with its unit; see the bundled rocker.toml.")
-        out[entry] = _read_value(section[entry], entry, dimension, place)
     return out
 
 
-def _read_tolerance(value: Any, entry: str, name: str) -> float:
-    place = f"{name}, [tolerances] {entry}"
-    number = _quantity(value, _TOLERANCES[entry], place)
-    if not 0.0 <= number < math.inf:
-        raise BearingError(f"{place}: must be zero or more, got {value!r}.")
-    return number
-
-
-def _quantity(value: Any, dimension: str, place: str) -> float:
-    try:
-        return float(parse_quantity(value, dimension, place))
-    except UnitError as error:
-        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
-
-
-def _read_value(value: Any, entry: str, dimension: str, place: str) -> Any:
+def _read_value(value: Any, dimension: str, flags: list[str], place: str) -> Any:
     if dimension == "text":
         if not isinstance(value, str):
             raise BearingError(f"{place}: must be text, got {value!r}. Put it in quotes.")
         return value
-    if isinstance(value, list) and entry in _PER_PAD:
-        if any(isinstance(v, list) for v in value):
-            raise BearingError(f"{place}: must be a list of quantities, not of lists.")
-        return tuple(_read_value(v, entry, dimension, f"{place}[{i}]") for i, v in enumerate(value))
-    number = _quantity(value, dimension, place)
+    if isinstance(value, list) and "per pad" in flags:
+        flags = [flag for flag in flags if flag != "per pad"]  # no lists of lists
+        return tuple(_read_value(v, dimension, flags, f"{place}[{i}]") for i, v in enumerate(value))
+    try:
+        number = float(parse_quantity(value, dimension, place))
+    except UnitError as error:
+        raise BearingError(f"{error}. Write a number and a unit in quotes.") from error
     if dimension == "temperature":
         number = round(number - ZERO_CELSIUS, 9)  # the decimals of the file, not those of the difference
-    signed = dimension == "temperature" or entry == "pivot_angles"
-    if not signed and (number < 0 or (number == 0 and entry not in _MAY_BE_ZERO)):
+    if "signed" not in flags and (number < 0 or (number == 0 and "zero" not in flags)):
         raise BearingError(f"{place}: must be positive, got {value!r}.")
-    if entry == "poissons_ratio" and not number < 0.5:
+    if place.endswith("poissons_ratio") and not number < 0.5:
         raise BearingError(f"{place}: must be below 0.5, got {value!r}. Steel has 0.3.")
     return number
 
 
 def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
-    pads, bearing = values["pads"], values["bearing"]
+    pads = values["pads"]
     angles = pads["pivot_angles"]
     if not isinstance(angles, tuple) or not 1 <= len(angles) <= 40:
         raise BearingError(f"{name}, [pads] pivot_angles: must be a list of 1 to 40 angles, pad #1 first.")
@@ -226,7 +204,7 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
     for section, key in _PAD_SIZES:
         value = values[section].get(key, defaults.get(key, 0.0))
         sizes[key] = _per_pad(value, count, f"{name}, [{section}] {key}")
-    _check_offsets(angles, sizes["arc"], sizes["pivot_offset"], bearing.get("rotation", ""), name)
+    _check_arcs(values, sizes, name)
     for lining, elastic, thickness in zip(*(sizes[f"{k}thickness"] for k in ("babbitt_", "elastic_", "")), strict=True):
         if not lining < elastic <= thickness:
             raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
@@ -265,21 +243,19 @@ def _pivots(values: dict[str, Any], count: int, name: str) -> list[Pivot]:
     return pivots
 
 
-def _check_offsets(
-    angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], rotation: str, name: str
-) -> None:
+def _check_arcs(values: dict[str, dict[str, Any]], sizes: dict[str, tuple[float, ...]], name: str) -> None:
     """Check the sense of turning, and with it the arcs, which are laid out from the leading edges."""
+    angles, rotation = values["pads"]["pivot_angles"], values["bearing"].get("rotation", "")
     if rotation not in ("", *ROTATIONS):
         choices = hint(rotation, ROTATIONS, "Use one of")
         raise BearingError(f"{name}, [bearing] rotation: {rotation!r} is no sense of turning. {choices}")
-    from_lower_edge = tuple(1.0 - f for f in offset) if rotation == ROTATIONS[1] else offset
-    _check_arcs(angles, arc, from_lower_edge, name)
-
-
-def _check_arcs(angles: tuple[float, ...], arc: tuple[float, ...], offset: tuple[float, ...], name: str) -> None:
-    if any(not 0 < f < 1 for f in offset):
-        raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
-    edges = sorted(((a - f * s) % (2 * math.pi), s, k + 1) for k, (a, s, f) in enumerate(zip(angles, arc, offset)))
+    edges = []
+    for k, (angle, arc, offset) in enumerate(zip(angles, sizes["arc"], sizes["pivot_offset"], strict=True), start=1):
+        if not 0 < offset < 1:
+            raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
+        from_lower_edge = 1.0 - offset if rotation == ROTATIONS[1] else offset
+        edges.append(((angle - from_lower_edge * arc) % (2 * math.pi), arc, k))
+    edges.sort()
     for i, (start, span, number) in enumerate(edges):
         follower = edges[(i + 1) % len(edges)]
         room = (follower[0] - start) % (2 * math.pi) or 2 * math.pi

@@ -206,11 +206,6 @@ class EffectKind:
         return out
 
 
-def effect_on(side: Side, *parameters: Parameter, **more: Any) -> Callable[[Callable[..., Setup]], EffectKind]:
-    """Make a function an `EffectKind` of its name."""
-    return lambda apply: EffectKind(apply.__name__, side, parameters, apply, **more)
-
-
 def _number(value: Any, parameter: Parameter, place: str) -> float:
     if isinstance(value, str):
         try:
