@@ -7,76 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.possible import KEYS
 from model.toml_text import parse_toml, read_page
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
-#: Dimension of every entry, and what else holds for it: "per pad" may be a list, pad #1 first.
-_MATERIAL = {
-    "youngs_modulus": "pressure",
-    "poissons_ratio": "ratio",
-    "thermal_expansion": "per kelvin, zero",
-    "conductivity": "conductivity, zero",
-}
-_KEYS: dict[str, dict[str, str]] = {
-    "": {"schema": "text, optional", "name": "text, optional"},
-    "journal": {"diameter": "length"},
-    "bearing": {
-        "length": "length",
-        "assembled_clearance": "length, per pad",
-        "pad_clearance": "length, per pad",
-        "rotation": "text, optional",
-    },
-    "pads": {
-        "pivot_angles": "angle, per pad, signed",
-        "arc": "angle, per pad",
-        "pivot_offset": "ratio, per pad, optional",
-        "thickness": "length, per pad",
-        "babbitt_thickness": "length, per pad, optional, zero",
-        "elastic_thickness": "length, per pad, optional",
-        "mass": "mass, per pad, zero",
-        "moment_of_inertia": "moment of inertia, per pad, zero",
-        "back_convection": "heat transfer, optional, zero",
-        "leading_edge_pressure": "pressure, per pad, optional, zero",
-    },
-    "pads.backing": _MATERIAL,
-    "pads.babbitt": _MATERIAL,
-    "pivot": {
-        "kind": "text",
-        "contact_length": "length, per pad, optional",
-        "housing_diameter": "length, per pad, optional",
-        "pivot_diameter": "length, per pad, optional",
-        "sphere_diameter": "length, per pad, optional",
-        "youngs_modulus": "pressure, optional",
-        "poissons_ratio": "ratio, optional",
-    },
-    "oil": {
-        "grade": "text, optional",
-        "supply_temperature": "temperature, signed",
-        "supply_flow": "flow, optional",
-        "viscosity_40C": "viscosity",
-        "viscosity_exponent": "per kelvin, zero",
-        "density_40C": "density",
-        "thermal_expansion": "per kelvin, zero",
-        "specific_heat": "specific heat",
-        "conductivity": "conductivity, zero",
-    },
-    # how well drawing and data sheet are known, one standard deviation each (`rig-export.md`)
-    "tolerances": {
-        "viscosity": "ratio, optional, zero",
-        "viscosity_exponent": "ratio, optional, zero",
-        "supply_temperature": "temperature difference, optional, zero",
-        "assembled_clearance": "length, optional, zero",
-        "pad_clearance": "length, optional, zero",
-        "clearance_scatter": "length, optional, zero",
-        "pivot_stiffness_scatter": "ratio, optional, zero",
-        "film_heat": "ratio, optional, zero",
-        "thermometer": "temperature difference, optional, zero",
-        "probe_gain": "ratio, optional, zero",
-        "model": "ratio, optional, zero",
-        "pivot_offset": "ratio, optional, zero",
-    },
-}
+_KEYS: dict[str, dict[str, str]] = KEYS["keys"]
 _OPTIONAL_SECTIONS = ("pads.backing", "pads.babbitt", "tolerances")
 #: What makes a pad besides its place, its material and its pivot.
 _PAD_SIZES = (

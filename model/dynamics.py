@@ -9,7 +9,10 @@ those of `docs/theory.md`: the force on the housing, dF = +h d.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +26,7 @@ from model.setup import Setup
 from model.statics.axial_tilt import AxialTilt, axial_shape
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
-from model.tilt_hold import TiltHold, friction_limits, tilt_hold
+from model.tilt_hold import friction_limits, tilt_hold
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
@@ -52,18 +55,17 @@ def flexing_impedance(
 
     `position` (2,) [m], `omega` (n,) [rad/s].
     """
-    work, weights = film.work, force_weights(film.grid)
-    conductance = conductances(film.grid, work, film.pad.pad_clearance, *film.approach(position))
-    still, moving = work.slopes[:, :2], work.slopes[:, 2:4]
+    weights = force_weights(film.grid)
+    conductance = conductances(film.grid, film.work, film.pad.pad_clearance, *film.approach(position))
+    bend = _Bend(film, conductance, factor)
+    still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
-        shape = axial.shape[:, :, None]
-        still = np.hstack([still, shape_slopes(film.grid, work, conductance, shape)])
-        moving = np.hstack([moving, squeeze_slopes(film.grid, work, shape)])
-    bend = _Bend(film, conductance, factor) if factor else None
+        more = bend.slopes(axial.shape[:, :, None])
+        still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
     for k, w in enumerate(omega.tolist()):
         rigid = still + 1j * w * moving
-        pressure = rigid if bend is None else bend.pressure(rigid, w)
+        pressure = bend.pressure(rigid, w) if factor else rigid
         out[k] = weights @ (pressure - rigid)[:, :2]
         if axial is not None:
             moment = axial.weights @ pressure
@@ -72,19 +74,31 @@ def flexing_impedance(
     return out
 
 
+@dataclass
 class _Bend:
     """The film's pressure with a pad that bends, from that with a rigid one."""
 
-    def __init__(self, film: PadFilm, conductance: tuple[FloatArray, FloatArray], factor: float) -> None:
-        assert film.deformation is not None
-        self.film, self.conductance, self.factor, self.body = film, conductance, factor, film.deformation
-        self.still = shape_slopes(film.grid, film.work, conductance, self.body.shapes)
-        self.moving = squeeze_slopes(film.grid, film.work, self.body.shapes)
+    film: PadFilm
+    conductance: tuple[FloatArray, FloatArray]
+    factor: float
+
+    def slopes(self, shapes: Any) -> tuple[Any, Any]:
+        """The pressure by shapes of the film and by their rates."""
+        film = self.film
+        still = shape_slopes(film.grid, film.work, self.conductance, shapes)
+        return still, squeeze_slopes(film.grid, film.work, shapes)
+
+    @cached_property
+    def _softest(self) -> tuple[FloatArray, FloatArray]:
+        assert self.film.deformation is not None
+        return self.slopes(self.film.deformation.shapes)
 
     def pressure(self, rigid: ComplexArray, omega: float) -> ComplexArray:
         """Pressure (unknowns, m) from that of a rigid pad; NaN where it finds no rest."""
-        body, factor = self.body, self.factor
-        closed = np.eye(len(body.response)) - factor * (body.response @ (self.still + 1j * omega * self.moving))
+        body, factor = self.film.deformation, self.factor
+        assert body is not None
+        still, moving = self._softest
+        closed = np.eye(len(body.response)) - factor * (body.response @ (still + 1j * omega * moving))
         pressure, bent = rigid, np.zeros((*self.film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
         for _ in range(_MOST_TURNS):
             wanted = factor * (body.compliance @ _everywhere(self.film, pressure))
@@ -93,8 +107,8 @@ class _Bend:
                 return pressure
             asked = body.amplitudes @ missing
             bent += missing.reshape(bent.shape) + body.shapes @ (np.linalg.solve(closed, asked) - asked)
-            film, moving = self.film, squeeze_slopes(self.film.grid, self.film.work, bent)
-            pressure = rigid + shape_slopes(film.grid, film.work, self.conductance, bent) + 1j * omega * moving
+            still, moving = self.slopes(bent)
+            pressure = rigid + still + 1j * omega * moving
         return np.full_like(rigid, np.nan)
 
 
@@ -106,7 +120,7 @@ def _everywhere(film: PadFilm, pressure: ComplexArray) -> ComplexArray:
     return field.reshape(-1, pressure.shape[1])
 
 
-def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray:
+def describing(amplitude: FloatArray, stick: Any, slip: Any) -> ComplexArray:
     """N(A) [N m/rad] of a pivot with contact stiffness `stick` [N m/rad] and friction moment `slip` [N m]."""
     share = slip / (stick * np.maximum(amplitude, slip / stick))
     phi = np.arccos(np.clip(1.0 - 2.0 * share, -1.0, 1.0))
@@ -114,7 +128,7 @@ def describing(amplitude: FloatArray, stick: float, slip: float) -> ComplexArray
     return np.asarray(stick / math.pi * (turning + 4.0j * share * (1.0 - share)), dtype=np.complex128)
 
 
-def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: float, slip: float) -> ComplexArray:
+def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: Any, slip: Any) -> ComplexArray:
     """Rotational impedance of a pivot's friction.
 
     A pivot that sticks has the stiffness k_s of its contact; one that slides passes the moment M_f = mu W R,
@@ -128,11 +142,9 @@ def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: fl
 
     T. K. Caughey, ASME J. Appl. Mech. 27 (1960) 640 (harmonic response of the bilinear hysteretic element).
 
-    `drive` (n, 2) [N m].
+    `drive` [N m] as `pad_impedance`.
     """
-    if not slip > 0.0:
-        return np.zeros_like(pad_impedance)
-    low = np.full(pad_impedance.shape, slip / stick)
+    low = np.broadcast_to(slip / stick, pad_impedance.shape)
     # tilted as far as the contact gives, it would take more than there is
     held = np.abs(pad_impedance + stick) * low >= drive
     high = np.maximum(2.0 * low, 2.0 * drive / np.maximum(np.abs(pad_impedance), 1e-30) + 2.0 * low)
@@ -148,6 +160,8 @@ class PadMatrices:
     """Full matrices of one pad in (x, y, theta, eta), Eq. (11) and (12)."""
 
     number: int
+    frame: FloatArray  #: (2, 4): J, and what the film's forces do in these directions.
+    moments: FloatArray
     stiffness: FloatArray  #: (4, 4): film [N/m, N/rad, N m/rad]; damping the same times s.
     damping: FloatArray
     pad_mass: FloatArray  #: (2, 2) each: Eq. (12), in (theta, eta); a rigid pivot has infinite k_eta.
@@ -156,38 +170,36 @@ class PadMatrices:
     friction: tuple[float, float] = (0.0, math.inf)
 
 
-def pad_matrices(setup: Setup, film: PadFilm) -> PadMatrices | None:
-    """Assemble the full matrices of one pad; None if it idles."""
-    if film.forces is None:
-        return None
-    pad, law = film.pad, setup.pivots[film.number - 1]
-    load = float(film.forces.force[0])
-    frame, moments, hold = _frames(setup, film)
-    friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
-    coupling = -pad.mass * mass_centre_offset(setup, film)  # the centre moves outward by eta - b tilt
-    return PadMatrices(
-        number=film.number,
-        stiffness=moments.T @ film.forces.stiffness @ frame,
-        damping=moments.T @ film.forces.damping @ frame,
-        pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
-        pad_damping=np.array([[0.0, 0.0], [0.0, setup.pivot_damping]]),
-        pad_stiffness=np.array([[hold.stiffness + friction[0], 0.0], [0.0, law.vibration_stiffness(load)]]),
-        friction=friction,
-    )
-
-
-def _frames(setup: Setup, film: PadFilm) -> tuple[FloatArray, FloatArray, TiltHold]:
-    """J = d(a, b)/d(x, y, theta, eta), (2, 4), what the film's forces do in these directions, and what holds the pad.
-
-    Without friction, which vibrates otherwise than it holds.
-    """
-    assert film.forces is not None
+def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
+    """Assemble the full matrices of the pads that carry."""
+    # friction vibrates otherwise than it holds
     smooth = setup.change(friction=0.0) if setup.friction else setup
-    hold = tilt_hold(smooth, film.tilt, float(film.forces.force[0]))
-    frame = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, film.pivot_radius, 0.0]])
-    moments = frame.copy()
-    moments[0, 2] = hold.arm
-    return frame, moments, hold
+    matrices = []
+    for film in films:
+        if film.forces is None:
+            continue
+        pad, load = film.pad, float(film.forces.force[0])
+        hold = tilt_hold(smooth, film.tilt, load)
+        frame = np.array([[*film.normal, 0.0, -1.0], [*film.tangent, film.pivot_radius, 0.0]])
+        moments = frame.copy()
+        moments[0, 2] = hold.arm
+        friction = friction_limits(setup, load) if setup.friction else (0.0, math.inf)
+        coupling = -pad.mass * mass_centre_offset(setup, film)  # the centre moves outward by eta - b tilt
+        pivot = setup.pivots[film.number - 1].vibration_stiffness(load)
+        matrices.append(
+            PadMatrices(
+                number=film.number,
+                frame=frame,
+                moments=moments,
+                stiffness=moments.T @ film.forces.stiffness @ frame,
+                damping=moments.T @ film.forces.damping @ frame,
+                pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
+                pad_damping=np.diag([0.0, setup.pivot_damping]),
+                pad_stiffness=np.diag([hold.stiffness + friction[0], pivot]),
+                friction=friction,
+            )
+        )
+    return matrices
 
 
 def mass_centre_offset(setup: Setup, film: PadFilm) -> float:
@@ -216,14 +228,14 @@ def reduce_pads(
     z, film = _impedances(pads, omega, added)
     driven = z[..., 2:, :2]
     follow = np.linalg.solve(film, driven)
-    for k, pad in enumerate(pads):
-        if not pad.friction[0]:
-            continue
-        loose = _broken_loose(pad, z[k], film[k], vibration)
+    rubbing = [k for k, pad in enumerate(pads) if pad.friction[0]]
+    if rubbing:
+        loose = _broken_loose([pads[k] for k in rubbing], z[rubbing], film[rubbing], vibration)
+        stick = np.array([pads[k].friction[0] for k in rubbing])[:, None]
         for axis in range(2):  # X and Y excited one at a time
-            held, column = film[k].copy(), slice(axis, axis + 1)
-            held[:, 0, 0] += loose[:, axis] - pad.friction[0]
-            follow[k, :, :, column] = np.linalg.solve(held, driven[k, :, :, column])
+            held, column = film[rubbing], driven[rubbing][..., axis : axis + 1]
+            held[..., 0, 0] += loose[..., axis] - stick
+            follow[rubbing, :, :, axis] = np.linalg.solve(held, column)[..., 0]
     return np.asarray((z[..., :2, :2] - z[..., :2, 2:] @ follow).sum(axis=0), dtype=np.complex128)
 
 
@@ -247,27 +259,27 @@ def _impedances(
     return z, z[..., 2:, 2:] + pivot
 
 
-def _broken_loose(pad: PadMatrices, z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
-    """Rotational impedance (n, 2) of a pivot's friction [N m/rad] for the journal vibrating along X, along Y."""
-    stick, slip = pad.friction
-    compliance = film[:, 0, 1] / film[:, 1, 1]  # the pivot gives way as well
-    pad_impedance = film[:, 0, 0] - stick - compliance * film[:, 1, 0]
-    drive = z[:, 2, :2] - compliance[:, None] * z[:, 3, :2]
-    return friction_impedance(np.repeat(pad_impedance[:, None], 2, axis=1), np.abs(drive) * vibration, stick, slip)
+def _broken_loose(pads: list[PadMatrices], z: ComplexArray, film: ComplexArray, vibration: float) -> ComplexArray:
+    """Rotational impedance (pads, n, 2) of the pivots' friction [N m/rad], the journal vibrating along X, along Y."""
+    stick, slip = np.array([pad.friction for pad in pads]).T[:, :, None, None]
+    compliance = film[..., 0, 1] / film[..., 1, 1]  # the pivot gives way as well
+    pad_impedance = (film[..., 0, 0] - compliance * film[..., 1, 0])[..., None] - stick
+    drive = z[..., 2, :2] - compliance[..., None] * z[..., 3, :2]
+    pad_impedance = np.broadcast_to(pad_impedance, drive.shape)
+    return friction_impedance(pad_impedance, np.abs(drive) * vibration, stick, slip)
 
 
 def bearing_impedance(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> ComplexArray:
     """h(omega) in the rig's frame of the bearing inside the measured displacement, with effects of the structure."""
-    pads = [m for film in equilibrium.films if (m := pad_matrices(setup, film)) is not None]
+    pads = pad_matrices(setup, equilibrium.films)
     heat = setup.options.perturbed_heat and setup.thermal != "isothermal"
     added = None
     if heat or setup.pads_follow or (setup.options.perturbed_bending and setup.flexible_pads):
-        more = _following_heat if heat else _following_shape
+        follow = _following_heat if heat else _following_shape
         added = []
-        for film in equilibrium.films:
-            if film.forces is not None:
-                frame, moments, _ = _frames(setup, film)
-                added.append(moments.T @ more(setup, equilibrium, film, omega) @ frame)
+        for pad in pads:
+            more = follow(setup, equilibrium, equilibrium.films[pad.number - 1], omega)
+            added.append(pad.moments.T @ more @ pad.frame)
     h = with_structure(setup, reduce_pads(pads, omega, setup.vibration, added), omega)
     return np.asarray(MIRROR @ h @ MIRROR) if setup.mirrored else h
 
@@ -316,15 +328,15 @@ def with_structure(setup: Setup, h: ComplexArray, omega: FloatArray) -> ComplexA
 
 def friction_regimes(setup: Setup, equilibrium: Equilibrium, omega: FloatArray) -> tuple[Condition, ...]:
     """Named regimes of pivots with friction: which ones it holds, and which ones the vibration breaks loose."""
+    pads = [pad for pad in pad_matrices(setup, equilibrium.films) if pad.friction[0]]
+    if not pads:
+        return ()
+    z, tilting = _impedances(pads, omega)
+    impedance = np.abs(_broken_loose(pads, z, tilting, setup.vibration))
     held: list[int] = []
     loose: list[int] = []
-    for film in equilibrium.films:
-        pad = pad_matrices(setup, film)
-        if pad is None or not pad.friction[0]:
-            continue
-        z, tilting = _impedances([pad], omega)
-        free = np.abs(_broken_loose(pad, z[0], tilting[0], setup.vibration)) < pad.friction[0]
-        (loose if free.any() else held).append(film.number)
+    for pad, sizes in zip(pads, impedance, strict=True):
+        (loose if (sizes < pad.friction[0]).any() else held).append(pad.number)
     names = []
     if held:
         names.append(named("pivot friction holds pads {pads}", held))

@@ -300,8 +300,7 @@ class Prediction:
     @property
     def pad_matrices(self) -> tuple[PadMatrices, ...]:
         """Full matrices of the pads that carry, Eq. (11) and (12), in the frame of `equilibrium`."""
-        matrices = (pad_matrices(self.setup, f) for f in self._films)
-        return tuple(m for m in matrices if m is not None)
+        return tuple(pad_matrices(self.setup, self._films))
 
     @functools.cached_property
     def mesh_error(self) -> float:
