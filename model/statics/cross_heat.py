@@ -13,20 +13,20 @@ that is solved as a correction by a few Krylov steps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from model.film.cross_energy import cross_operator
-from model.film.cross_film import CrossOperator
+from model.film.cross_film import CrossOperator, cross_pressure_change
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
+from model.film.edge_flows import edge_flows
 from model.pad.bending import PadDeformation
-from model.setup import Setup
-from model.statics.compiled.case import BOUNDLESS
+from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Case
 from model.statics.compiled.heat import balance_heat
+from model.statics.compiled.stack import BACKFLOW, JOURNAL, PadStack, PadState
 from model.statics.pad_film import PadFilm
-from model.statics.pad_flow import outlet_temperature, through_flow
 from rigdata.arrays import FloatArray
 
 #: What a pad conducts is solved to this share in every step; what is left contracts with the rest.
@@ -37,8 +37,7 @@ _ROUGH_TOLERANCE, _ROUGH = 0.15, 3.0
 _FACE_SHARE = 0.1
 
 
-@dataclass
-class CrossAnswer:
+class CrossAnswer(NamedTuple):
     """What one film's temperatures are made of: with all else at zero, per kelvin of its inlet, of the journal."""
 
     fields: FloatArray  #: (nt + 1, n, 3): Of the cells [degC].
@@ -48,52 +47,56 @@ class CrossAnswer:
 
 
 def settle_cross_temperatures(
-    setup: Setup,
-    films: list[PadFilm],
-    surface_speed: float,
-    journal: float,
-    limits: tuple[float, float],
-    operator: CrossOperator,
-) -> tuple[float, float, float]:
-    """Temperatures of all films, pads and the journal for the present flows.
+    films: list[PadFilm], pads: PadStack, state: PadState, case: Case, relaxation: float, operator: CrossOperator
+) -> float:
+    """Temperatures of all films, pads and the journal for the present flows; returns the largest change asked for [K].
 
     As `exchange_heat` of `model.statics.compiled.heat`.
     """
-    order = sorted(films, key=lambda f: f.pad.pivot_angle % (2 * math.pi))
-    start = journal if math.isfinite(journal) else setup.inlet_temperature
-    answers: list[CrossAnswer | None] = []
-    outlets, taken = [], []
-    back, around = 0.0, sum(f.inlet for f in films) / len(films)  # what the grooves hold, on the mean
-    for film in order:
-        answer, share = _answer(setup, film, surface_speed, (start, around), operator)
-        answers.append(answer)
-        # an idle pad passes its inlet on, somewhat warmer
-        warmer = (outlet_temperature(film) - film.inlet, 1.0, 0.0)
-        outlets.append(warmer if answer is None else answer.outlet)
-        taken.append(np.zeros(3) if answer is None else answer.taken)
-        back = max(back, share)
-    outer = np.array([through_flow(f) for f in order]), np.array(outlets), np.array(taken)
-    solved = np.array([a is not None for a in answers])
-    supply, mixing = float(setup.inlet_temperature), float(setup.mixing)
-    inlets, journal = balance_heat(np.arange(len(order)), outer, solved, supply, mixing)
-    change = 0.0
-    for film, part, inlet in zip(order, answers, inlets.tolist(), strict=True):
-        hotter = inlet - film.inlet
-        film.inlet += _limited_share(hotter, limits) * hotter
-        film.temperature_change = abs(hotter)
-        change = float(np.maximum(change, film.temperature_change))  # a NaN is not to be lost
-        if part is None or film.cross is None:
+    n, limits = len(films), (relaxation, HEATING_STEP)
+    flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    answers: dict[int, CrossAnswer] = {}
+    journal, around = float(state.figures[JOURNAL]), float(state.inlet.mean())  # what the grooves hold, on the mean
+    start = journal if math.isfinite(journal) else case.supply
+    for m, film in enumerate(films):
+        if not state.solved[m]:  # an idle pad passes its inlet on, somewhat warmer
+            flows[m], outlets[m] = state.resting[m, 1], (state.resting[m, 2] - state.inlet[m], 1.0, 0.0)
             continue
-        weights = np.array([1.0, inlet, journal])
-        asked = (part.fields @ weights).reshape(film.cross.temperature.shape) - film.cross.temperature
-        face = np.tensordot(weights, part.faces, 1) - film.cross.face
-        film.temperature_change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
-        share = _limited_share(film.temperature_change, limits)
-        film.cross.temperature[:] += share * asked
-        film.cross.face[:] += share * face
-        film.outlet = float(np.dot(part.outlet, weights))
-        change = float(np.maximum(change, film.temperature_change))
-    return change, back, journal
+        entering, sides = edge_flows(film.grid, film.work, math.inf)
+        flows[m] = entering, entering - sides
+        far = state.heating[m] > _ROUGH
+        answer = _answer(film, case, (start, float(state.inlet[m]), around), far, state.figures, operator)
+        answers[m], outlets[m], taken[m] = answer, answer.outlet, answer.taken
+    inlets, journal = balance_heat(pads.order, (flows, outlets, taken), state.solved, case.supply, case.mixing)
+    change = 0.0
+    for m, inlet in enumerate(inlets.tolist()):
+        hotter = inlet - state.inlet[m]
+        state.inlet[m] += _limited_share(hotter, limits) * hotter
+        state.heating[m] = abs(hotter)
+        if m in answers:
+            weights = np.array([1.0, inlet, journal])
+            state.heating[m] = _warm(films[m], answers[m], weights, limits)
+            more = cross_pressure_change(
+                films[m].grid, films[m].work, films[m].cross, case.running.speed, case.running.oil, state.shift[m]
+            )
+            state.corrected[m] = state.force[m] + more
+        change = float(np.maximum(change, max(abs(hotter), state.heating[m])))  # a NaN is not to be lost
+    state.figures[JOURNAL] = journal
+    return change
+
+
+def _warm(film: PadFilm, answer: CrossAnswer, weights: FloatArray, limits: tuple[float, float]) -> float:
+    """Change a film's temperatures by a share of what is asked for, no more than a limit; returns the largest [K]."""
+    cross = film.cross
+    assert cross is not None
+    asked = (answer.fields @ weights).reshape(cross.temperature.shape) - cross.temperature
+    face = np.tensordot(weights, answer.faces, 1) - cross.face
+    change = float(np.maximum(np.abs(asked).max(), np.abs(face).max()))
+    share = _limited_share(change, limits)
+    cross.temperature[:] += share * asked
+    cross.face[:] += share * face
+    film.outlet = float(answer.outlet @ weights)
+    return change
 
 
 def _limited_share(change: float, limits: tuple[float, float]) -> float:
@@ -111,20 +114,24 @@ def _settled(pad: PadDeformation, power: int) -> FloatArray:
 
 
 def _answer(
-    setup: Setup, film: PadFilm, surface_speed: float, temperatures: tuple[float, float], operator: CrossOperator
-) -> tuple[CrossAnswer | None, float]:
-    """A film's answers, and which share of its oil runs back where it enters; None if the film carries nothing.
+    film: PadFilm,
+    case: Case,
+    temperatures: tuple[float, float, float],
+    far: bool,
+    figures: FloatArray,
+    operator: CrossOperator,
+) -> CrossAnswer:
+    """A film's answers, for the temperatures so far of the journal, the inlet and the oil around the pads.
 
-    For the temperatures of the journal and of the oil around the pads so far.
+    Which share of its oil runs back where it enters is noted in the figures.
     """
-    journal, around = temperatures
-    cross = film.cross
-    pad = film.deformation
-    if film.forces is None or cross is None or pad is None:
-        return None, 0.0
-    oil = setup.bearing.oil
-    heat = (oil.specific_heat, oil.conductivity, film.kept, 1.0, oil.viscosity_exponent)
-    back = cross_operator(film.grid, film.work, cross, surface_speed, heat, operator)
+    journal, inlet, around = temperatures
+    cross, pad, (specific, conductivity) = film.cross, film.deformation, case.running.heat
+    assert cross is not None
+    assert pad is not None
+    heat = (specific, conductivity, case.kept, 1.0, case.running.oil[1])
+    back = cross_operator(film.grid, film.work, cross, case.running.speed, heat, operator)
+    figures[BACKFLOW] = max(figures[BACKFLOW], back)
     taken: FloatArray = np.asarray(pad.flux @ (pad.to_coarse @ (cross.face - around).ravel())).reshape(cross.face.shape)
     fields = np.zeros((taken.shape[0], operator.dissipation.shape[1], 3))
     fields[0, :, 1] = 1.0
@@ -134,16 +141,14 @@ def _answer(
     faces = np.empty((3, *taken.shape))
     for m in range(3):
         given = taken if m == 0 else np.zeros_like(taken)
-        face_temperature(film.work, cross.edges, oil.conductivity, fields[:, :, m], given, faces[m])
-    missing = faces[0] + film.inlet * faces[1] + journal * faces[2] - cross.face
+        face_temperature(film.work, cross.edges, conductivity, fields[:, :, m], given, faces[m])
+    missing = faces[0] + inlet * faces[1] + journal * faces[2] - cross.face
     if 0.0 < np.abs(missing).max() < BOUNDLESS:
-        solved = (film.grid, film.work, cross.edges, oil.conductivity)
-        resistance = _FACE_SHARE * float(film.work.thickness.mean()) / oil.conductivity
+        solved = (film.grid, film.work, cross.edges, conductivity)
+        resistance = _FACE_SHARE * float(film.work.thickness.mean()) / conductivity
         body = (pad.flux, pad.to_coarse, _settled(pad, round(math.log2(resistance))))
-        far = film.temperature_change > _ROUGH
         tolerance = _ROUGH_TOLERANCE if far else _CONDUCTION_TOLERANCE
         more = conduct(solved, operator, body, missing, tolerance, (fields[:, :, 0], faces[0]))
         kept[0] += more if math.isfinite(more) else 0.0
     weight = operator.carried / operator.carried.sum()
-    outlet = weight.ravel() @ fields[-1]
-    return CrossAnswer(fields, faces, outlet, kept), back
+    return CrossAnswer(fields, faces, weight.ravel() @ fields[-1], kept)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -39,7 +39,6 @@ class PadFilm:
     deflection: float = 0.0
     idle: bool = False
     forces: FilmForces | None = None
-    temperature_change: float = field(default=math.inf)
     kept: float = 1.0
     rupture: str = "swift-stieber"
     resting: RestingFilm | None = None
@@ -82,8 +81,8 @@ class PadFilm:
         return Running(surface_speed, oil_constants(oil), (oil.specific_heat / self.kept, oil.conductivity / self.kept))
 
 
-def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack]:
-    """Lay out every pad's film."""
+def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack, CrossFilm | None]:
+    """Lay out every pad's film; all of them side by side besides."""
     bearing = setup.bearing
     symmetric = setup.misalignment[0] == 0.0
     across = setup.thermal == "thd"
@@ -95,6 +94,7 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack]:
     grids, stack = _grids(spans, bearing.journal_radius, bearing.length, shape, symmetric)
     works, each = film_works(grids, setup.inlet_temperature)
     bent = np.zeros_like(works.extra)
+    crosses = cross_film(works, setup.inlet_temperature) if across else None
     for k, (pad, grid, work) in enumerate(zip(bearing.pads, grids, each, strict=True)):
         work.pressure[0, grid.first : -1] = pad.leading_edge_pressure
         if not symmetric:
@@ -115,10 +115,10 @@ def pad_films(setup: Setup) -> tuple[list[PadFilm], FilmWork, GridStack]:
                 deformation=pad_deformation(pad, bearing, grid, setup.options.conduction) if solid else None,
                 kept=1.0 - setup.heat_loss,
                 rupture=rupture_of(setup),
-                cross=cross_film(work, setup.inlet_temperature) if across else None,
+                cross=None if crosses is None else CrossFilm(crosses.edges, *(values[k] for values in crosses[1:])),
             )
         )
-    return films, works, stack
+    return films, works, stack, crosses
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ import numpy as np
 
 from model.conditions import named
 from model.film.attitudes import BETWEEN, attitudes
-from model.film.cross_film import CrossOperator, cross_pressure_change, set_cross_viscosity
+from model.film.cross_film import CrossOperator, set_cross_viscosity
 from model.film.following_heat import heat_impedance
 from model.film.oil_state import set_viscosity
 from model.film.resting import RestingFilm
@@ -22,7 +22,7 @@ from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
 from model.statics.axial_tilt import aligned_tilt, axial_shape
-from model.statics.compiled.case import ACROSS, ALONE, COUPLED, HEATING_STEP, ISOTHERMAL
+from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
@@ -71,7 +71,7 @@ class Search:
         cold, supply = setup, setup.inlet_temperature
         if setup.growth is not None:  # the clearances of a journal as warm as the supply
             cold = setup.change(bearing=grown(setup.bearing, setup.growth, supply, supply))
-        self.films, self.works, self.grids = pad_films(cold)
+        self.films, self.works, self.grids, self.crosses = pad_films(cold)
         for film in self.films:
             film.kept *= heat
         self.other: BoolArray = np.zeros(len(self.films), dtype=np.bool_)  #: Pads of another equilibrium.
@@ -82,8 +82,8 @@ class Search:
         self.pads = self._pads()
         self.state = self._state()
         self.operator = None
-        if self.films[0].cross is not None:
-            self.operator = CrossOperator.place(*self.films[0].cross.temperature.shape)
+        if self.crosses is not None:
+            self.operator = CrossOperator.place(*self.crosses.temperature.shape[1:])
 
     @property
     def surface_speed(self) -> float:
@@ -104,18 +104,10 @@ class Search:
         )  # fmt: skip
 
     def _state(self) -> PadState:
-        n, works, across = len(self.films), self.works, self.case.thermal == ACROSS
+        n, works, crosses = len(self.films), self.works, self.crosses
         bends = self.setup.flexible_pads or self.case.axial
         shape = works.extra.shape
-        faces, warmth = works.temperature, works.temperature.reshape(n, -1)
-        if across:
-            faces = np.full(shape, self.case.supply)
-            assert self.films[0].cross is not None
-            warmth = np.full((n, self.films[0].cross.temperature.size), self.case.supply)
-            for film, face, warm in zip(self.films, faces, warmth, strict=True):
-                assert film.cross is not None
-                cells = warm.reshape(film.cross.temperature.shape)
-                film.cross = film.cross._replace(temperature=cells, face=face)
+        faces, warmth = (works.temperature,) * 2 if crosses is None else (crosses.face, crosses.temperature)
         bent = np.zeros(shape if bends else (n, 0, 0))
         axial = np.zeros(n)
         if self.case.axial:
@@ -144,7 +136,7 @@ class Search:
             amplitude=np.zeros((n, SHAPES, 3)),
             axial_step=np.zeros((n, 3)),
             faces=faces,
-            warmth=warmth,
+            warmth=warmth.reshape(n, -1),
             figures=np.array([math.nan, self.case.supply, 0.0, 0.0]),
         )
 
@@ -307,7 +299,7 @@ class Search:
                         eddies = turbulent if film.rupture == "turbulent" else (0.0, 0.0)
                         set_cross_viscosity(film.cross, film.work, running.oil, eddies)
             elif code == ASKS_HEAT:
-                memory.trail[HEAT] = self._heat_across(memory)
+                memory.trail[HEAT] = self._heat_across(float(memory.trail[RELAXED]))
             elif code == ASKS_LAWS:
                 ask_laws(self.setup.pivots, self.pads.laws, self.state.felt[:, 0])
             elif code == ASKS_STABLE:
@@ -335,22 +327,10 @@ class Search:
         running = film.running(self.surface_speed, self.setup.bearing.oil)
         return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0).real)
 
-    def _heat_across(self, memory: Memory) -> float:
+    def _heat_across(self, relaxation: float) -> float:
         """Temperatures across the films for their pressures; returns the largest change asked for [K]."""
-        self._take_over()
-        state, limits = self.state, (float(memory.trail[RELAXED]), HEATING_STEP)
         assert self.operator is not None
-        change, state.figures[BACKFLOW], state.figures[JOURNAL] = settle_cross_temperatures(
-            self.setup, self.films, self.surface_speed, float(state.figures[JOURNAL]), limits, self.operator
-        )
-        for m, film in enumerate(self.films):
-            state.inlet[m], state.heating[m] = film.inlet, film.temperature_change
-            if state.solved[m] and film.cross is not None:
-                more = cross_pressure_change(
-                    film.grid, film.work, film.cross, self.surface_speed, self.case.running.oil, state.shift[m]
-                )
-                state.corrected[m] = state.force[m] + more
-        return change
+        return settle_cross_temperatures(self.films, self.pads, self.state, self.case, relaxation, self.operator)
 
     def _take_over(self) -> None:
         """Leave the films where the arrays stand."""
@@ -358,8 +338,7 @@ class Search:
         for m, film in enumerate(self.films):
             film.tilt, film.deflection = float(state.tilt[m]), float(state.deflection[m])
             film.idle, film.axial_tilt = bool(state.idle[m]), float(state.axial[m])
-            film.temperature_change, film.inlet = float(state.heating[m]), float(state.inlet[m])
-            film.supplied = float(state.supplied[m])
+            film.inlet, film.supplied = float(state.inlet[m]), float(state.supplied[m])
             film.forces = film.resting = None
             if self.setup.flexible_pads:
                 film.bent = state.bent[m]
