@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot
+from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot, pad_rooms
 from model.possible import KEYS
 from model.toml_text import parse_toml, read_page
 from rigdata.near_names import hint
@@ -63,7 +63,7 @@ def parse_bearing(text: str, name: str) -> Bearing:
         raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
     values = {key: _read_section(section, key, name) for key, section in sections.items()}
     pads = _pads(values, name)
-    return Bearing(
+    bearing = Bearing(
         name=values[""].get("name", name),
         journal_diameter=values["journal"]["diameter"],
         length=values["bearing"]["length"],
@@ -74,6 +74,8 @@ def parse_bearing(text: str, name: str) -> Bearing:
         source=name,
         tolerances=tuple(values["tolerances"].items()),
     )
+    _check_pads(bearing, name)
+    return bearing
 
 
 def _section(data: dict[str, Any], key: str, name: str) -> dict[str, Any]:
@@ -140,10 +142,6 @@ def _pads(values: dict[str, dict[str, Any]], name: str) -> tuple[Pad, ...]:
     for section, key in _PAD_SIZES:
         value = values[section].get(key, defaults.get(key, 0.0))
         sizes[key] = _per_pad(value, count, f"{name}, [{section}] {key}")
-    _check_arcs(values, sizes, name)
-    for lining, elastic, thickness in zip(*(sizes[f"{k}thickness"] for k in ("babbitt_", "elastic_", "")), strict=True):
-        if not lining < elastic <= thickness:
-            raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
     pivots = _pivots(values["pivot"], count, name)
     return tuple(
         Pad(
@@ -179,26 +177,22 @@ def _pivots(values: dict[str, Any], count: int, name: str) -> list[Pivot]:
     return pivots
 
 
-def _check_arcs(values: dict[str, dict[str, Any]], sizes: dict[str, tuple[float, ...]], name: str) -> None:
+def _check_pads(bearing: Bearing, name: str) -> None:
     """Check the sense of turning, and with it the arcs, which are laid out from the leading edges."""
-    angles, rotation = values["pads"]["pivot_angles"], values["bearing"].get("rotation", "")
-    if rotation not in ("", *ROTATIONS):
-        choices = hint(rotation, ROTATIONS, "Use one of")
-        raise BearingError(f"{name}, [bearing] rotation: {rotation!r} is no sense of turning. {choices}")
-    edges = []
-    for k, (angle, arc, offset) in enumerate(zip(angles, sizes["arc"], sizes["pivot_offset"], strict=True), start=1):
-        if not 0 < offset < 1:
+    if bearing.rotation not in ("", *ROTATIONS):
+        choices = hint(bearing.rotation, ROTATIONS, "Use one of")
+        raise BearingError(f"{name}, [bearing] rotation: {bearing.rotation!r} is no sense of turning. {choices}")
+    for pad in bearing.pads:
+        if not 0 < pad.pivot_offset < 1:
             raise BearingError(f"{name}, [pads] pivot_offset: must lie between 0 and 1 (0.5 is the middle).")
-        from_lower_edge = 1.0 - offset if rotation == ROTATIONS[1] else offset
-        edges.append(((angle - from_lower_edge * arc) % (2 * math.pi), arc, k))
-    edges.sort()
-    for i, (start, span, number) in enumerate(edges):
-        follower = edges[(i + 1) % len(edges)]
-        room = (follower[0] - start) % (2 * math.pi) or 2 * math.pi
-        if span > room + 1e-9:
+        if not pad.babbitt_thickness < pad.elastic_thickness <= pad.thickness:
+            raise BearingError(f"{name}, [pads]: need babbitt_thickness < elastic_thickness <= thickness.")
+    for number, other, room in pad_rooms(bearing):
+        arc = bearing.pads[number - 1].arc
+        if arc > room + 1e-9:
             raise BearingError(
-                f"{name}, [pads]: pad #{number} overlaps pad #{follower[2]} "
-                f"({math.degrees(span):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc, pivot_angles."
+                f"{name}, [pads]: pad #{number} overlaps pad #{other} "
+                f"({math.degrees(arc):.1f} deg of arc, {math.degrees(room):.1f} deg of room). Check arc, pivot_angles."
             )
 
 

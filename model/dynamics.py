@@ -56,7 +56,7 @@ def flexing_impedance(
     `position` (2,) [m], `omega` (n,) [rad/s].
     """
     weights = force_weights(film.grid)
-    conductance = conductances(film.grid, film.work, film.pad.pad_clearance, *film.approach(position))
+    conductance = conductances(film.grid, film.work, (film.pad.pad_clearance, *film.approach(position)))
     bend = _Bend(film, conductance, factor)
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import face_height
 from model.film.reynolds import conductances
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -40,12 +41,11 @@ def face_flows(
 
     `supplied`: share of the gap there that is filled at most, and what the groove gives at most [kg/s/m].
     """
-    along, across = conductances(grid, work, wedge[0], wedge[1], wedge[2])
+    along, across = conductances(grid, work, wedge)
     couette, height = np.empty_like(along), np.empty_like(along)
     for i in range(along.shape[0]):
-        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(along.shape[1]):
-            height[i, j] = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            height[i, j] = face_height(grid, work, wedge, i, j)
             density = 0.5 * (work.density[i, j] + work.density[i + 1, j])
             couette[i, j] = 0.5 * speed * height[i, j] * density * grid.height[j]
     supply, follows = np.empty(along.shape[1]), np.zeros(along.shape[1])

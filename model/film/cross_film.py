@@ -180,12 +180,11 @@ def cross_pressure_change(
     Gives (2,) [N].
     """
     shape = work.temperature.shape
-    old, new, denser = np.empty(shape), np.empty(shape), np.empty(shape)
+    lighter, denser = np.empty(shape), np.empty(shape)
     for i in range(shape[0]):
         for j in range(shape[1]):
             mean, _, centre, f2 = _integrals(cross, i, j, oil)
             density = oil[2] * (1.0 + oil[3] * (40.0 - mean))
-            old[i, j] = work.density[i, j] / work.viscosity[i, j]
-            new[i, j] = density * 12.0 * f2
+            lighter[i, j] = density * 12.0 * f2 - work.density[i, j] / work.viscosity[i, j]
             denser[i, j] = density * 2.0 * (1.0 - centre) - work.density[i, j] * work.drag[i, j]
-    return change_by_oil(grid, work, speed, (old, new, denser), change)
+    return change_by_oil(grid, work, speed, (lighter, denser), change)

@@ -22,7 +22,7 @@ from model.film.matrix import substitute
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.oil_state import Running
 from model.film.reynolds import conductances
-from model.film.slopes import force_of, keep_ruptured, net_inflow
+from model.film.slopes import flow_changes, force_of, keep_ruptured, net_inflow
 from rigdata.arrays import ComplexArray, FloatArray
 
 #: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
@@ -42,7 +42,7 @@ def heat_impedance(
     grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, omega: float
 ) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance."""
-    conductance = conductances(grid, work, wedge[0], wedge[1], wedge[2])
+    conductance = conductances(grid, work, wedge)
     shape, unknowns = work.pressure.shape, work.unknown.shape[0]
     width = shape[1] - 1 - grid.first
     out = np.zeros((2, 2), dtype=np.complex128)
@@ -124,27 +124,15 @@ def _flows(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Change of the mass flows through the faces along, (nt, nz + 1, 1), and across, (nt + 1, nz, 1) [kg/s/m]."""
     gx, gz = conductance
-    thicker, warmer, pressure = change
-    h, density, oil = work.thickness, work.density, running.oil
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    along = np.empty((nt, nz + 1, 1), dtype=np.complex128)
-    across = np.empty((nt + 1, nz, 1), dtype=np.complex128)
-    denser, light = -oil[2] * oil[3] * warmer, density / work.viscosity
-    lighter = light * (denser / density + oil[1] * warmer)
-    for i in range(nt):
-        for j in range(nz + 1):
-            thick, dense = h[i, j] + h[i + 1, j], density[i, j] + density[i + 1, j]
-            couette = 0.125 * running.speed * thick * dense * grid.height[j]
-            share = (thicker[i] + thicker[i + 1]) / thick
-            ratio = (lighter[i, j] + lighter[i + 1, j]) / (light[i, j] + light[i + 1, j])
-            flow = couette * (share + (denser[i, j] + denser[i + 1, j]) / dense)
-            flow -= (couette - work.flow_x[i, j]) * (3.0 * share + ratio)
-            along[i, j, 0] = flow - gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
-    for i in range(nt + 1):
-        for j in range(nz):
-            share = 2.0 * thicker[i] / (h[i, j] + h[i, j + 1])
-            ratio = (lighter[i, j] + lighter[i, j + 1]) / (light[i, j] + light[i, j + 1])
-            across[i, j, 0] = work.flow_z[i, j] * (3.0 * share + ratio)
+    oil, pressure = running.oil, change.pressure
+    denser = -oil[2] * oil[3] * change.warmer
+    lighter = work.density / work.viscosity * (denser / work.density + oil[1] * change.warmer)
+    along, across = flow_changes(grid, work, running.speed, change.thicker, lighter, denser)
+    for i in range(gx.shape[0]):
+        for j in range(gx.shape[1]):
+            along[i, j, 0] -= gx[i, j] * (pressure[i + 1, j] - pressure[i, j])
+    for i in range(gz.shape[0]):
+        for j in range(gz.shape[1]):
             across[i, j, 0] -= gz[i, j] * (pressure[i, j + 1] - pressure[i, j])
     return along, across
 

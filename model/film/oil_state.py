@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.compilation import compiled
+from model.compilation import compiled, inner
 from model.film.mesh import FilmGrid, FilmWork
 from rigdata.arrays import FloatArray
 
@@ -27,6 +27,13 @@ def set_viscosity(work: FilmWork, oil: tuple[float, float, float, float]) -> Non
         for j in range(t.shape[1]):
             work.viscosity[i, j] = oil[0] * np.exp(oil[1] * (40.0 - t[i, j]))
             work.density[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t[i, j]))
+
+
+@inner
+def face_height(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], i: int, j: int) -> float:
+    """Film thickness at the face between stations i and i + 1 [m]; `wedge` is (Cp, a, b)."""
+    base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
+    return base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
 
 
 @compiled

@@ -25,6 +25,7 @@ import numpy as np
 from model.compilation import compiled, inner
 from model.film.matrix import add_diagonal, assemble, factorise, substitute
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import face_height
 from model.film.slopes import derivatives, rupture_line
 from model.film.turbulence import heat_beyond, resist
 from rigdata.arrays import BoolArray, FloatArray
@@ -94,15 +95,14 @@ def solve_film(
     -----
     Eq. (2) of Dang, Chatterton, Pennacchi, Lubricants 2019, 7, 61; perturbed pressure zero where ruptured.
     """
-    clearance, a, b = wedge
-    min_film = _thickness(grid, work, clearance, a, b)
+    min_film = _thickness(grid, work, wedge)
     if not min_film > 0.0:
         return FilmForces(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)), min_film, -1)
-    gx, gz = conductances(grid, work, clearance, a, b)
+    gx, gz = conductances(grid, work, wedge)
     powers = None
     if turbulent is not None:
         powers = resist(grid, work, wedge, speed, (gx, gz))
-    source = _source(grid, work, clearance, a, b, speed)
+    source = _source(grid, work, wedge, speed)
     steps = 1 if solved else _active_set(grid, work, gx, gz, source)
     weight = grid.area
     if steps > 0:
@@ -119,11 +119,11 @@ def solve_film(
 
 
 @inner
-def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> float:
+def _thickness(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float]) -> float:
     h = work.thickness
     low = np.inf
     for i in range(h.shape[0]):
-        base = clearance - a * grid.cos[i] - b * grid.sin[i]
+        base = wedge[0] - wedge[1] * grid.cos[i] - wedge[2] * grid.sin[i]
         for j in range(h.shape[1]):
             h[i, j] = base + work.extra[i, j]
             low = min(low, h[i, j])
@@ -131,10 +131,10 @@ def _thickness(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: fl
 
 
 @compiled
-def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float) -> tuple[FloatArray, FloatArray]:
+def conductances(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float]) -> tuple[FloatArray, FloatArray]:
     """Rho h^3 / (12 mu) times face length over distance, at the faces along and across.
 
-    Gives gx, gz (nt + 1, nz) [kg/s/Pa].
+    Gives gx (nt, nz + 1), gz (nt + 1, nz) [kg/s/Pa].
     """
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     gx = np.empty((nt, nz + 1))
@@ -144,9 +144,8 @@ def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: 
         for j in range(nz + 1):
             fluidity[i, j] = work.density[i, j] / work.viscosity[i, j]
     for i in range(nt):
-        base = clearance - a * grid.cos_face[i] - b * grid.sin_face[i]
         for j in range(nz + 1):
-            h = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            h = face_height(grid, work, wedge, i, j)
             gx[i, j] = h**3 / 24.0 * (fluidity[i, j] + fluidity[i + 1, j]) * grid.height[j] / grid.dx
     for i in range(nt + 1):
         for j in range(nz):
@@ -156,14 +155,13 @@ def conductances(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: 
 
 
 @inner
-def _source(grid: FilmGrid, work: FilmWork, clearance: float, a: float, b: float, speed: float) -> FloatArray:
+def _source(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     source = np.zeros((nt + 1, nz + 1))
     for i in range(nt):
-        base = clearance - a * grid.cos_face[i] - b * grid.sin_face[i]
         for j in range(nz + 1):
-            h = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
+            h = face_height(grid, work, wedge, i, j)
             dragged = work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j]
             couette = 0.25 * speed * h * dragged * grid.height[j]
             work.flow_x[i, j] = couette

@@ -13,6 +13,7 @@ import numpy as np
 from model.compilation import compiled, inner
 from model.film.matrix import substitute, substitute_four, substitute_many
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import face_height
 from rigdata.arrays import FloatArray
 
 
@@ -96,12 +97,11 @@ def derivatives(
     nt, nz = gx.shape[0], gz.shape[1]
     along, across = np.empty((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
     for i in range(nt):
-        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(nz + 1):
             poiseuille = gx[i, j] * (p[i + 1, j] - p[i, j])
-            thickness = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
             # couette flow is as h; dh/da = -cos, dh/db = -sin
-            slope = (work.flow_x[i, j] - _power(powers, 0, i, j) * poiseuille) / thickness
+            slope = work.flow_x[i, j] - _power(powers, 0, i, j) * poiseuille
+            slope /= face_height(grid, work, wedge, i, j)
             work.flow_x[i, j] -= poiseuille
             along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
     for i in range(nt + 1):
@@ -176,7 +176,7 @@ def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: Any) -> Any:
     return rhs
 
 
-@compiled
+@inner
 def pressure_change(
     grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
 ) -> FloatArray:
@@ -184,52 +184,61 @@ def pressure_change(
 
     `change` (unknowns,) [Pa]; gives (2,) [N].
     """
-    return change_by_oil(grid, work, speed, _fluidity(work, oil), change)
+    rows, columns = work.temperature.shape
+    lighter, denser = np.empty((rows, columns)), np.empty((rows, columns))
+    for i in range(rows):
+        for j in range(columns):
+            t, density = work.temperature[i, j], work.density[i, j]
+            denser[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t)) - density
+            lighter[i, j] = (density + denser[i, j]) / (oil[0] * np.exp(oil[1] * (40.0 - t)))
+            lighter[i, j] -= density / work.viscosity[i, j]
+    return change_by_oil(grid, work, speed, (lighter, denser), change)
 
 
 @inner
 def change_by_oil(
-    grid: FilmGrid,
-    work: FilmWork,
-    speed: float,
-    fluidity: tuple[FloatArray, FloatArray, FloatArray],
-    change: FloatArray,
+    grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[FloatArray, FloatArray], change: FloatArray
 ) -> FloatArray:
-    """`pressure_change` for given properties of the oil: `fluidity` (nt + 1, nz + 1); gives (2,) [N]."""
-    h = work.thickness
-    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    old, new, denser = fluidity
-    along, across = np.empty((nt, nz + 1, 1)), np.empty((nt + 1, nz, 1))
-    for i in range(nt):
-        for j in range(nz + 1):
-            couette = 0.25 * speed * 0.5 * (h[i, j] + h[i + 1, j]) * grid.height[j]
-            dragged = work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j]
-            poiseuille = couette * dragged - work.flow_x[i, j]
-            ratio = (new[i, j] + new[i + 1, j]) / (old[i, j] + old[i + 1, j]) - 1.0
-            along[i, j, 0] = couette * (denser[i, j] + denser[i + 1, j]) - poiseuille * ratio
-    for i in range(nt + 1):
-        for j in range(nz):
-            ratio = (new[i, j] + new[i, j + 1]) / (old[i, j] + old[i, j + 1]) - 1.0
-            across[i, j, 0] = work.flow_z[i, j] * ratio
+    """`pressure_change` for given changes of the oil, see `flow_changes`; gives (2,) [N]."""
+    along, across = flow_changes(grid, work, speed, None, oil[0], oil[1])
     rhs = change.reshape((change.shape[0], 1))
     net_inflow(along, across, grid.first, rhs)
     keep_ruptured(work, grid.first, rhs)
     substitute(work.band, change)
-    return force_of(grid, change, h.shape)
+    return force_of(grid, change, work.thickness.shape)
 
 
 @inner
-def _fluidity(work: FilmWork, oil: tuple[float, float, float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Density over viscosity as the pressure was solved with and at the new temperature; change of the density."""
-    rows, columns = work.temperature.shape
-    old, new, denser = np.empty((rows, columns)), np.empty((rows, columns)), np.empty((rows, columns))
-    for i in range(rows):
-        for j in range(columns):
-            t = work.temperature[i, j]
-            denser[i, j] = oil[2] * (1.0 + oil[3] * (40.0 - t)) - work.density[i, j]
-            old[i, j] = work.density[i, j] / work.viscosity[i, j]
-            new[i, j] = (work.density[i, j] + denser[i, j]) / (oil[0] * np.exp(oil[1] * (40.0 - t)))
-    return old, new, denser
+def flow_changes(
+    grid: FilmGrid, work: FilmWork, speed: float, thicker: FloatArray | None, lighter: Any, denser: Any
+) -> tuple[Any, Any]:
+    """Change of the flows through the faces at the present pressure, (nt, nz + 1, 1) and (nt + 1, nz, 1) [kg/s].
+
+    By changes of the thickness along the arc (nt + 1,), of density over viscosity, and of what the journal drags
+    along, density times drag, (nt + 1, nz + 1); real or complex.
+    """
+    h, light = work.thickness, work.density / work.viscosity
+    nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
+    along, across = np.empty((nt, nz + 1, 1), dtype=lighter.dtype), np.empty((nt + 1, nz, 1), dtype=lighter.dtype)
+    for i in range(nt):
+        for j in range(nz + 1):
+            thick = h[i, j] + h[i + 1, j]
+            half = 0.125 * speed * thick * grid.height[j]
+            couette = half * (work.density[i, j] * work.drag[i, j] + work.density[i + 1, j] * work.drag[i + 1, j])
+            ratio = (lighter[i, j] + lighter[i + 1, j]) / (light[i, j] + light[i + 1, j])
+            flow = half * (denser[i, j] + denser[i + 1, j])
+            if thicker is not None:
+                share = (thicker[i] + thicker[i + 1]) / thick
+                ratio += 3.0 * share
+                flow += couette * share
+            along[i, j, 0] = flow - (couette - work.flow_x[i, j]) * ratio
+    for i in range(nt + 1):
+        for j in range(nz):
+            ratio = (lighter[i, j] + lighter[i, j + 1]) / (light[i, j] + light[i, j + 1])
+            if thicker is not None:
+                ratio += 6.0 * thicker[i] / (h[i, j] + h[i, j + 1])
+            across[i, j, 0] = work.flow_z[i, j] * ratio
+    return along, across
 
 
 @inner

@@ -29,6 +29,7 @@ import numpy as np
 from model.compilation import compiled, inner
 from model.film.energy import slope_products
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import face_height
 from rigdata.arrays import FloatArray
 
 #: Factor and exponent of Re in k_x, k_z (beside 12) and C (beside 1).
@@ -79,27 +80,25 @@ def resist(
     """Lower the conductances by 12 / k; returns with which power of h they grow, 3 - dln k / dln Re."""
     gx, gz = conductance
     px, pz = np.empty(gx.shape), np.empty(gz.shape)
-    h = work.thickness
+    h, light = work.thickness, work.density / work.viscosity
     for i in range(gx.shape[0]):
-        base = wedge[0] - wedge[1] * grid.cos_face[i] - wedge[2] * grid.sin_face[i]
         for j in range(gx.shape[1]):
-            thick = base + 0.5 * (work.extra[i, j] + work.extra[i + 1, j])
-            light = 0.5 * (
-                work.density[i, j] / work.viscosity[i, j] + work.density[i + 1, j] / work.viscosity[i + 1, j]
-            )
-            more, rate = excess(light * speed * thick, ALONG[0], ALONG[1])
-            gx[i, j] *= 12.0 / (12.0 + more)
-            px[i, j] = 3.0 - rate / (12.0 + more)
+            thick = face_height(grid, work, wedge, i, j)
+            share, px[i, j] = _resisted(0.5 * (light[i, j] + light[i + 1, j]) * speed * thick, ALONG)
+            gx[i, j] *= share
     for i in range(gz.shape[0]):
         for j in range(gz.shape[1]):
             thick = 0.5 * (h[i, j] + h[i, j + 1])
-            light = 0.5 * (
-                work.density[i, j] / work.viscosity[i, j] + work.density[i, j + 1] / work.viscosity[i, j + 1]
-            )
-            more, rate = excess(light * speed * thick, ACROSS[0], ACROSS[1])
-            gz[i, j] *= 12.0 / (12.0 + more)
-            pz[i, j] = 3.0 - rate / (12.0 + more)
+            share, pz[i, j] = _resisted(0.5 * (light[i, j] + light[i, j + 1]) * speed * thick, ACROSS)
+            gz[i, j] *= share
     return px, pz
+
+
+@inner
+def _resisted(reynolds: float, law: tuple[float, float]) -> tuple[float, float]:
+    """Share of the laminar conductance that is left, 12 / k, and the power of h with which it grows."""
+    more, rate = excess(reynolds, law[0], law[1])
+    return 12.0 / (12.0 + more), 3.0 - rate / (12.0 + more)
 
 
 @inner

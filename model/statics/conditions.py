@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from model.bearing import pad_rooms
 from model.conditions import named
 from model.setup import Setup
 from model.statics.pad_film import PadFilm
@@ -119,13 +120,8 @@ def _misfits(setup: Setup) -> list[Condition]:
     inside = [k for k, p in enumerate(pads, 1) if not p.assembled_clearance + setup.clearance_change > 0.0]
     if inside:
         names.append(named("interference: no clearance at pads {pads}", inside))
-    ring = sorted(((p.pivot_angle + p.leading_edge) % (2.0 * math.pi), k) for k, p in enumerate(pads))
-    for at, (start, k) in enumerate(ring):
-        following, other = ring[(at + 1) % len(ring)]
-        room = (following - start) % (2.0 * math.pi) or 2.0 * math.pi
-        if len(pads) > 1 and other != k and following == start:
-            room = 0.0
-        gap = room - pads[k].arc
+    for number, other, room in pad_rooms(setup.bearing):
+        gap = room - pads[number - 1].arc
         if gap < 1e-9:
-            names.append(named("pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (k + 1, other + 1)))
+            names.append(named("pads {pads} touch" if gap > -1e-9 else "pads {pads} overlap", (number, other)))
     return names

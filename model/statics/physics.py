@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from model.film.models import FILM_MODELS
 from model.film.oil_state import Running
-from model.pad.bending import PadDeformation
 from model.pad.pivot import OTHER
 from model.pivots import encoded
 from model.setup import Setup
-from model.statics.compiled.bending import Shapes, stacked_bodies
+from model.statics.compiled.bending import stacked_bodies
 from model.statics.compiled.case import ACROSS, ALONE, COUPLED, ISOTHERMAL, Case
-from model.statics.compiled.heat import Conduction
-from model.statics.compiled.stack import GridStack
+from model.statics.compiled.stack import BodyStack
 from model.statics.pad_film import PadFilm, oil_constants, rupture_of
 from model.tilt_hold import hold_numbers
 from rigdata.arrays import FloatArray
@@ -61,24 +58,11 @@ def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -
     )
 
 
-def shapes_of(setup: Setup, case: Case, films: Sequence[PadFilm], grids: GridStack) -> Shapes:
-    """Meshes of the films, and the bodies of their pads where they bend or conduct."""
+def bodies_of(setup: Setup, case: Case, films: Sequence[PadFilm]) -> BodyStack | None:
+    """The bodies of pads that bend or conduct; None for rigid pads whose films are for themselves."""
     if case.thermal in (ISOTHERMAL, ALONE) and not (setup.flexible_pads or case.axial):
-        return Shapes(grids, None, None)
+        return None
     bodies = tuple(f.deformation for f in films if f.deformation is not None)
-    conducting = bodies if case.thermal == COUPLED and setup.options.conduction else ()
-    bending = bodies if setup.flexible_pads else ()
-    unknown = grids.first, grids.z.shape[1]
-    stacked = stacked_bodies(bending, unknown, setup.bending_factor, case.supply)
-    return Shapes(grids, stacked, _stacked_conduction(conducting))
-
-
-@lru_cache(maxsize=8)
-def _stacked_conduction(bodies: tuple[PadDeformation, ...]) -> Conduction:
-    """What the pads conduct, side by side; without bodies nothing."""
-    if not bodies:
-        nothing = np.zeros((0, 0, 0))
-        return Conduction(np.zeros(0, dtype=np.int64), nothing, nothing)
-    kinds = list(dict.fromkeys(bodies))
-    which = np.array([kinds.index(b) for b in bodies])
-    return Conduction(which, np.array([b.flux for b in kinds]), np.array([b.to_coarse for b in kinds]))
+    factor = setup.bending_factor if setup.flexible_pads else 0.0
+    conducting = case.thermal == COUPLED and setup.options.conduction
+    return stacked_bodies(bodies, films[0].grid.first, factor, conducting)

@@ -22,7 +22,7 @@ from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
 from model.statics.axial_tilt import aligned_tilt, axial_shape
-from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL
+from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL, Problem
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
     ASKS_LAWS,
@@ -50,7 +50,7 @@ from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
 from model.statics.pad_film import pad_films
 from model.statics.pad_flow import through_flow
-from model.statics.physics import case_of, couples_heat, shapes_of
+from model.statics.physics import bodies_of, case_of, couples_heat
 from rigdata.arrays import BoolArray, FloatArray
 from rigdata.problem import Condition
 
@@ -78,7 +78,7 @@ class Search:
         #: Of every pad its curve's first point that counts, and the temperatures along the curve.
         self.rises: list[tuple[int, FloatArray]] = []
         self.case = case_of(setup, self.load, self.surface_speed, heat)
-        self.shapes = shapes_of(setup, self.case, self.films, self.grids)
+        self.bodies = bodies_of(setup, self.case, self.films)
         self.pads = self._pads()
         self.state = self._state()
         self.operator = None
@@ -288,9 +288,10 @@ class Search:
         """Iterate from where the search stands."""
         size = vector_size(self.state, self.case)
         memory = fresh_memory(size)
+        problem = Problem(self.grids, self.bodies, self.pads, self.works, self.state, self.case)
         code = ASKS_OIL
         while code in (ASKS_OIL, ASKS_HEAT, ASKS_LAWS, ASKS_STABLE):
-            code = iterate(self.shapes, self.pads, self.works, self.state, self.case, memory)
+            code = iterate(problem, memory)
             if code == ASKS_OIL:
                 running = self.case.running
                 turbulent = (running.speed, running.heat[0] / max(running.heat[1], 1e-9))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,108 +14,67 @@ from model.film.reynolds import conductances
 from model.film.slopes import force_of, shape_slopes
 from model.interpolation import largest
 from model.pad.bending import PadDeformation
-from model.statics.compiled.case import Case
-from model.statics.compiled.heat import Conduction
-from model.statics.compiled.stack import GridStack, PadStack, PadState, grid_of, work_of
+from model.statics.compiled.case import Case, Problem
+from model.statics.compiled.stack import BodyStack, PadState, grid_of, work_of
 from model.tilt_hold import held_moment
 from rigdata.arrays import FloatArray, IntArray
 
 
-class BodyStack(NamedTuple):
-    """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes."""
-
-    which: IntArray  #: (pads,) of int: Body of every film; empty for rigid pads.
-    #: (k, n, unknowns + c) of float32: Deformation by the pressure at the unknown nodes [m/Pa] and by the
-    #: temperatures of the pad's coarser nodes [m/K]: half the memory, which is what the product waits for, at a
-    #: ten-millionth of a deformation.
-    answer: np.ndarray
-    to_coarse: np.ndarray  #: (k, c, n) of float32: Those temperatures by the film's.
-    shapes: FloatArray  #: (k, nt + 1, nz + 1, m)
-    amplitudes: FloatArray  #: (k, m, n)
-    response: FloatArray  #: (k, m, unknowns): With the factor on the deformation, as `answer`.
-    supply: float
-
-
-class Shapes(NamedTuple):
-    """The films' meshes and the bodies of their pads."""
-
-    grids: GridStack
-    bodies: BodyStack | None  #: None, both: rigid pads and films for themselves, a search without those loops.
-    conduction: Conduction | None
-
-
-def stacked_bodies(
-    bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], factor: float, supply: float
-) -> BodyStack:
-    """Matrices of the pads side by side."""
-    if not bodies:
-        return _RIGID._replace(supply=supply)
-    return _stacked(bodies, unknown, factor)._replace(supply=supply)
-
-
 @lru_cache(maxsize=8)
-def _stacked(bodies: tuple[PadDeformation, ...], unknown: tuple[int, int], factor: float) -> BodyStack:
+def stacked_bodies(bodies: tuple[PadDeformation, ...], first: int, factor: float, conducting: bool) -> BodyStack:
+    """Matrices of the pads side by side: of their deformation times a factor, of what they conduct."""
     kinds = list(dict.fromkeys(bodies))
-    first, across = unknown
-    inner = np.zeros((kinds[0].compliance.shape[0] // across, across), dtype=bool)
+    bending, conductors = (kinds if factor else []), (kinds if conducting else [])
+    inner = np.zeros(kinds[0].shapes.shape[:2] if kinds else (0, 0), dtype=bool)
     inner[1:-1, first:-1] = True
-    answer = [factor * np.hstack([b.compliance[:, inner.ravel()], b.expansion]) for b in kinds]
+    answer = [factor * np.hstack([b.compliance[:, inner.ravel()], b.expansion]) for b in bending]
     return BodyStack(
-        np.array([kinds.index(b) for b in bodies]),
-        np.array(answer, dtype=np.float32),
-        np.array([b.to_coarse for b in kinds], dtype=np.float32),
-        np.array([b.shapes for b in kinds]),
-        np.array([b.amplitudes for b in kinds]),
-        np.array([factor * b.response for b in kinds]),
-        0.0,
+        np.array([kinds.index(b) for b in bodies], dtype=np.int64),
+        _stack(answer, 3).astype(np.float32),
+        _stack([b.to_coarse for b in bending], 3).astype(np.float32),
+        _stack([b.shapes for b in bending], 4),
+        _stack([b.amplitudes for b in bending], 3),
+        _stack([factor * b.response for b in bending], 3),
+        _stack([b.flux for b in conductors], 3),
+        _stack([b.to_coarse for b in conductors], 3),
     )
 
 
-_NOTHING = np.zeros((0, 0, 0))
-_RIGID = BodyStack(
-    np.zeros(0, dtype=np.int64),
-    _NOTHING.astype(np.float32),
-    _NOTHING.astype(np.float32),
-    np.zeros((0, 0, 0, 0)),
-    _NOTHING,
-    _NOTHING,
-    0.0,
-)
+def _stack(matrices: Sequence[FloatArray], dimensions: int) -> FloatArray:
+    return np.array(matrices) if matrices else np.zeros((0,) * dimensions)
 
 
 @inner
-def bend_pads(
-    bodies: BodyStack | None, shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case
-) -> float:
+def bend_pads(bodies: BodyStack | None, problem: Problem) -> float:
     """Close the loop of pressure, deformation and tilt along the shaft for every pad that carries.
 
     Returns the largest change asked for, as a share of the thinnest film.
     """
+    state, works = problem.state, problem.works
     if bodies is None or state.bent.size == 0:
         return 0.0
-    grids, count = shapes.grids, len(state.tilt)
+    count = len(state.tilt)
     asked = np.zeros((count, state.bent[0].size))
-    if len(bodies.which) > 0:
-        _ask_bodies(bodies, works, state, asked)
+    if len(bodies.shapes) > 0:
+        _ask_bodies(bodies, works, state, problem.case.supply, asked)
     share = 0.0
     for m in range(count):
         if state.solved[m]:
             change = asked[m] - state.bent[m].reshape(-1)
-            film = (grid_of(grids, m), work_of(works, m))
-            tilted = _close_loop(film, pads, state, bodies, case, m, change)
+            tilted = _close_loop(bodies, problem, m, change)
             share = max(share, max(largest(change), tilted) / state.least[m])
     return share
 
 
 @inner
-def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: FloatArray) -> None:
+def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, supply: float, asked: FloatArray) -> None:
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     count = len(state.tilt)
-    unknowns, coarse = works.unknown.shape[1], bodies.to_coarse.shape[1]
+    unknowns, coarse = works.unknown.shape[1], bodies.lighter.shape[1]
     rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
     for m in range(count):
         if state.solved[m]:
-            rise[m] = state.faces[m].reshape(-1) - bodies.supply
+            rise[m] = state.faces[m].reshape(-1) - supply
             given[m, :unknowns] = works.unknown[m] + state.shift[m]
     same = np.empty(count, dtype=np.int64)
     for k in range(bodies.answer.shape[0]):
@@ -125,7 +84,7 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, asked: Floa
                 same[some] = m
                 some += 1
         if some > 0:
-            _times(bodies.to_coarse[k], rise, same[:some], given[:, unknowns:])
+            _times(bodies.lighter[k], rise, same[:some], given[:, unknowns:])
             _times(bodies.answer[k], given, same[:some], asked)
 
 
@@ -142,25 +101,18 @@ def _times(matrix: np.ndarray, given: FloatArray, rows: IntArray, out: FloatArra
 
 
 @inner
-def _close_loop(
-    film: tuple[FilmGrid, FilmWork],
-    pads: PadStack,
-    state: PadState,
-    bodies: BodyStack,
-    case: Case,
-    m: int,
-    change: FloatArray,
-) -> float:
+def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray) -> float:
     """One pad's part of a Newton step, see `model.pad.bending`; how far a tilt along the shaft moves the ends [m]."""
-    grid, work = film
-    body = bodies.which[m] if len(bodies.which) > 0 else -1
-    bending = bodies.shapes.shape[3] if body >= 0 else 0
+    grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
+    state, case = problem.state, problem.case
+    bends = len(bodies.shapes) > 0
+    body, bending = (bodies.which[m], bodies.shapes.shape[3]) if bends else (0, 0)
     count, unknowns = bending + (1 if case.axial else 0), len(work.unknown)
     rows, columns = work.pressure.shape
     shapes = np.empty((rows, columns, count))
     response = np.empty((count, unknowns))
     matrix, right = np.zeros((count, count)), np.zeros((count, 3))
-    if body >= 0:
+    if bends:
         shapes[:, :, :bending], response[:bending] = bodies.shapes[body], bodies.response[body]
         for r in range(bending):
             matrix[r, r] = 1.0
@@ -172,8 +124,8 @@ def _close_loop(
             for j in range(columns):
                 shapes[i, j, bending] = grid.cos[i] * grid.z[j]
     asked = right[:, 0].copy()
-    a, b = state.wedge[m, 0], state.wedge[m, 1]
-    slopes = shape_slopes(grid, work, conductances(grid, work, pads.clearance[m], a, b), shapes)
+    wedge = (problem.pads.clearance[m], state.wedge[m, 0], state.wedge[m, 1])
+    slopes = shape_slopes(grid, work, conductances(grid, work, wedge), shapes)
     felt = np.empty((2, count))
     for q in range(unknowns):
         for r in range(count):
@@ -233,7 +185,7 @@ def change_shape(bodies: BodyStack | None, state: PadState, case: Case, m: int, 
     if bodies is None:
         return 0.0
     out = state.mismatch[m]
-    if len(bodies.which) > 0:
+    if len(bodies.shapes) > 0:
         shapes = bodies.shapes[bodies.which[m]]
         for r in range(shapes.shape[2]):
             amount = state.amplitude[m, r, 0] + state.amplitude[m, r, 1] * da + state.amplitude[m, r, 2] * db

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from model.compilation import inner
+from model.film.mesh import FilmWork
 from model.film.oil_state import Running
-from model.statics.compiled.stack import PadStack
+from model.statics.compiled.stack import BodyStack, GridStack, PadStack, PadState
 from model.tilt_hold import HoldNumbers
 from rigdata.arrays import FloatArray
 
@@ -42,6 +43,17 @@ class Case(NamedTuple):
     length: float  #: Of the pads [m].
     asks_laws: bool  #: Some pivots have laws that only Python knows.
     tried: int = -1  #: The search asks whether this pad carries, and ends where it does not.
+
+
+class Problem(NamedTuple):
+    """All that a search works on."""
+
+    grids: GridStack
+    bodies: BodyStack | None  #: None: rigid pads and films for themselves, a search without those loops.
+    pads: PadStack
+    works: FilmWork
+    state: PadState
+    case: Case
 
 
 @inner

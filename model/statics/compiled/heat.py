@@ -17,7 +17,6 @@ heat goes round. What a pad conducts depends on all of its film; that is solved 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +27,8 @@ from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid, FilmWork
 from model.film.resting import resting_film
 from model.interpolation import largest
-from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, rigid_approach
-from model.statics.compiled.stack import BACKFLOW, JOURNAL, GridStack, PadStack, PadState, grid_of, work_of
+from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach
+from model.statics.compiled.stack import BACKFLOW, JOURNAL, BodyStack, grid_of, work_of
 from rigdata.arrays import BoolArray, FloatArray, IntArray
 
 #: q h / k (T_mean - T_wall) of a parabolic profile, flat at the other wall.
@@ -41,24 +40,16 @@ _KRYLOV_STEPS = 12
 _LEAST_FRESH = 1e-3
 
 
-class Conduction(NamedTuple):
-    """Heat into the pads: which of k bodies the films have, (pads,), empty without; as `PadDeformation`."""
-
-    which: IntArray
-    flux: FloatArray  #: (k, nodes, c)
-    to_coarse: FloatArray  #: (k, c, nodes)
-
-
 @inner
-def heat_films(grids: GridStack, works: FilmWork, state: PadState, case: Case, relaxation: float) -> float:
+def heat_films(problem: Problem, relaxation: float) -> float:
     """Temperatures of the films that carry, each for itself; returns the largest change asked for [K]."""
+    grids, _, _, works, state, case = problem
     change = 0.0
     for m in range(len(state.tilt)):
         if state.solved[m]:
-            asked, cut, radial, tangential = heat_step(
-                grid_of(grids, m), work_of(works, m), case.running, (state.inlet[m], relaxation, HEATING_STEP),
-                state.shift[m],
-            )  # fmt: skip
+            thermal = (state.inlet[m], relaxation, HEATING_STEP)
+            found = heat_step(grid_of(grids, m), work_of(works, m), case.running, thermal, state.shift[m])
+            asked, cut, radial, tangential = found
             state.heating[m] = asked
             state.corrected[m, 0] = state.force[m, 0] + radial
             state.corrected[m, 1] = state.force[m, 1] + tangential
@@ -69,27 +60,21 @@ def heat_films(grids: GridStack, works: FilmWork, state: PadState, case: Case, r
 
 
 @inner
-def rest_films(grids: GridStack, pads: PadStack, state: PadState, case: Case) -> None:
+def rest_films(problem: Problem) -> None:
     """Say what the films of idle pads do."""
+    pads, state = problem.pads, problem.state
     for m in range(len(state.tilt)):
         if state.idle[m]:
             wedge = (pads.clearance[m], rigid_approach(pads, state.position, m))
-            found = resting_film(grid_of(grids, m), wedge, case.running, state.inlet[m])
+            found = resting_film(grid_of(problem.grids, m), wedge, problem.case.running, state.inlet[m])
             for k in range(4):
                 state.resting[m, k] = found[k]
 
 
 @inner
-def exchange_heat(
-    grids: GridStack,
-    bodies: Conduction,
-    pads: PadStack,
-    works: FilmWork,
-    state: PadState,
-    case: Case,
-    relaxation: float,
-) -> float:
+def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> float:
     """Temperatures of all films, the inlets and the journal for their present flows; returns the largest change [K]."""
+    grids, _, pads, works, state, case = problem
     n, fields = len(state.tilt), 3 if case.journal else 2
     answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
     flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
@@ -97,11 +82,10 @@ def exchange_heat(
         if not state.solved[m]:
             flows[m], outlets[m, 0], outlets[m, 1] = state.resting[m, 1], state.resting[m, 2] - state.inlet[m], 1.0
             continue
-        grid, work = grid_of(grids, m), work_of(works, m)
-        _answer(grid, work, bodies, state, case, m, answers[m])
-        entering, sides = edge_flows(grid, work, state.supplied[m])
+        _answer(bodies, problem, m, answers[m])
+        entering, sides = edge_flows(grid_of(grids, m), work_of(works, m), state.supplied[m])
         flows[m, 0], flows[m, 1] = entering, entering - sides
-        _pass_on(work, answers[m], outlets[m], taken[m])
+        _pass_on(work_of(works, m), answers[m], outlets[m], taken[m])
     change = 0.0
     for m in range(n):
         if case.fresh < math.inf and case.mixing > 0.0:  # who gets less oil has another film
@@ -116,9 +100,9 @@ def exchange_heat(
         asked = answers[m, 0] + inlets[m] * answers[m, 1] - works.temperature[m]
         if case.journal:
             asked += journal * answers[m, 2]
-        hotter, radial, tangential = warm(
-            grid_of(grids, m), work_of(works, m), case.running, asked, (relaxation, HEATING_STEP), state.shift[m]
-        )
+        limits = (relaxation, HEATING_STEP)
+        found = warm(grid_of(grids, m), work_of(works, m), case.running, asked, limits, state.shift[m])
+        hotter, radial, tangential = found
         state.heating[m] = hotter
         state.corrected[m, 0], state.corrected[m, 1] = state.force[m, 0] + radial, state.force[m, 1] + tangential
         if not change >= hotter:
@@ -129,13 +113,13 @@ def exchange_heat(
 
 
 @inner
-def _answer(
-    grid: FilmGrid, work: FilmWork, bodies: Conduction, state: PadState, case: Case, m: int, fields: FloatArray
-) -> None:
+def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> None:
     """Temperature of a film with all else at zero, per kelvin of its inlet, and per kelvin of the journal.
 
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
+    grid, work, case = grid_of(problem.grids, m), work_of(problem.works, m), problem.case
+    figures = problem.state.figures
     count, rows, columns = fields.shape
     sources, loss = np.zeros((count, rows, columns)), np.empty((rows, columns))
     for i in range(rows):
@@ -148,48 +132,41 @@ def _answer(
     heat_sources(grid, work, case.running, case.kept, sources[0], loss)
     for j in range(columns):
         fields[1, 0, j] = 1.0
-    conducts = len(bodies.which) > 0
+    conducts = len(bodies.flux) > 0
     if conducts:
         # what the pad takes at the present temperature is known; its answer to the change is solved for
-        sources[0] -= _into_pad(grid, bodies, bodies.which[m], work.temperature.reshape(-1) - case.supply)
+        sources[0] -= _into_pad(grid, bodies, m, work.temperature.reshape(-1) - case.supply)
     backflow = march(grid, work, case.running, loss, fields, between(sources))
-    state.figures[BACKFLOW] = max(state.figures[BACKFLOW], backflow)
+    figures[BACKFLOW] = max(figures[BACKFLOW], backflow)
     if conducts and largest(fields.reshape(-1)) < BOUNDLESS:
-        _conduct(grid, work, bodies, state, case, (m, loss), fields)
+        _conduct(bodies, problem, m, loss, fields)
 
 
 @inner
-def _conduct(
-    grid: FilmGrid,
-    work: FilmWork,
-    bodies: Conduction,
-    state: PadState,
-    case: Case,
-    film: tuple[int, FloatArray],
-    fields: FloatArray,
-) -> None:
+def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fields: FloatArray) -> None:
     """Give a film's answers the heat that the pad takes of them, (I + A^-1 F) T = T without it.
 
     The answer to its sources as a correction, which vanishes at the equilibrium, and with it what stays unsolved.
     """
-    journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else case.supply
-    hot = (1.0, state.inlet[film[0]], journal)
-    temperature = work.temperature.reshape(-1)
+    state = problem.state
+    journal = state.figures[JOURNAL] if math.isfinite(state.figures[JOURNAL]) else problem.case.supply
+    hot = (1.0, state.inlet[m], journal)
+    temperature = problem.works.temperature[m].reshape(-1)
     answers = fields.reshape((len(fields), len(temperature)))
     missing = -temperature
     for k in range(len(answers)):
         missing += hot[k] * answers[k]
-    missing = temperature + _krylov(grid, work, bodies, case, film, missing)
+    missing = temperature + _krylov(bodies, problem, m, loss, missing)
     for k in range(1, len(answers)):
-        answers[k] = _krylov(grid, work, bodies, case, film, answers[k])
+        answers[k] = _krylov(bodies, problem, m, loss, answers[k])
         missing -= hot[k] * answers[k]
     answers[0] = missing
 
 
 @inner
-def _into_pad(grid: FilmGrid, bodies: Conduction, k: int, rise: FloatArray) -> FloatArray:
+def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> FloatArray:
     """What a pad takes from its film at every station, (nt + 1, nz + 1) [W], for the rise (nodes,) of its face [K]."""
-    to_coarse, flux = bodies.to_coarse[k], bodies.flux[k]
+    to_coarse, flux = bodies.to_coarse[bodies.which[m]], bodies.flux[bodies.which[m]]
     coarse, heat = np.zeros(to_coarse.shape[0]), np.zeros((len(grid.angle), len(grid.height)))
     for c in range(len(coarse)):
         for q in range(len(rise)):
@@ -203,16 +180,9 @@ def _into_pad(grid: FilmGrid, bodies: Conduction, k: int, rise: FloatArray) -> F
 
 
 @inner
-def _krylov(
-    grid: FilmGrid,
-    work: FilmWork,
-    bodies: Conduction,
-    case: Case,
-    film: tuple[int, FloatArray],
-    right: FloatArray,
-) -> FloatArray:
+def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right: FloatArray) -> FloatArray:
     """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
-    m, loss = film
+    grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
     size, answer = math.sqrt(product(right, right)), np.zeros(len(right))
     if not size > 0.0:
         return answer
@@ -221,9 +191,9 @@ def _krylov(
     weights = np.zeros((_KRYLOV_STEPS, 1))
     basis[0] = right / size
     for k in range(_KRYLOV_STEPS):
-        taken[0] = -_into_pad(grid, bodies, bodies.which[m], basis[k])
+        taken[0] = -_into_pad(grid, bodies, m, basis[k])
         fields[0, 0] = 0.0
-        march(grid, work, case.running, loss, fields, between(taken))
+        march(grid, work, problem.case.running, loss, fields, between(taken))
         images[k] = basis[k] - fields[0].reshape(-1)
         if not product(images[k], images[k]) < BOUNDLESS:
             answer[:] = math.nan

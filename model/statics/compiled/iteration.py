@@ -13,14 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.mesh import FilmWork
 from model.statics.compiled.anderson import DEPTH, mixed
-from model.statics.compiled.bending import Shapes
-from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Case
+from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Case, Problem
 from model.statics.compiled.elimination import newton
-from model.statics.compiled.heat import Conduction, exchange_heat, heat_films
+from model.statics.compiled.heat import exchange_heat, heat_films
 from model.statics.compiled.place import is_doubtful
-from model.statics.compiled.stack import BACKFLOW, GROWN, GridStack, PadStack, PadState
+from model.statics.compiled.stack import BACKFLOW, GROWN, BodyStack, PadStack, PadState
 from model.statics.compiled.step import grow_and_bend, move, solve_pressures
 from rigdata.arrays import FloatArray
 
@@ -73,9 +71,9 @@ def fresh_memory(size: int) -> Memory:
 
 
 @compiled
-def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, memory: Memory) -> int:
+def iterate(problem: Problem, memory: Memory) -> int:
     """Iterate from where the arrays stand until the end, or until Python is asked for a step."""
-    trail = memory.trail
+    pads, state, case, trail = problem.pads, problem.state, problem.case, memory.trail
     across, sharp = case.thermal == ACROSS, False
     accuracy = case.accuracy * (_ACROSS_ACCURACY if across else 1.0)
     while True:
@@ -88,8 +86,8 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
                 return ASKS_OIL
         if trail[_STAGE] == _PRESSURE:
             if not sharp:
-                _begin(pads, state, case, memory)
-            found = solve_pressures(shapes, pads, works, state, case, sharp)
+                _begin(problem, memory)
+            found = solve_pressures(problem, sharp)
             if sharp:  # derivatives once more, with the rupture line between the nodes; the pressure stays
                 return SETTLED
             if not found:
@@ -98,8 +96,8 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
             if across:
                 return ASKS_HEAT
         if trail[_STAGE] == _HEATING:
-            heat = _heat(shapes.conduction, shapes.grids, pads, works, state, case, trail)
-            trail[HEAT] = grow_and_bend(shapes, pads, works, state, case, trail[RELAXED], heat)
+            heat = _heat(problem.bodies, problem, trail)
+            trail[HEAT] = grow_and_bend(problem, trail[RELAXED], heat)
             if not trail[HEAT] < BOUNDLESS:
                 trail[RESIDUAL] = math.inf
                 return BOUNDLESS_HEAT
@@ -117,52 +115,36 @@ def iterate(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, ca
                 return ASKS_STABLE
             sharp, trail[_STAGE] = True, _PRESSURE
             continue
-        _go_on(shapes, pads, works, state, case, memory, shift)
+        _go_on(problem, memory, shift)
 
 
 @inner
-def _heat(
-    bodies: Conduction | None,
-    grids: GridStack,
-    pads: PadStack,
-    works: FilmWork,
-    state: PadState,
-    case: Case,
-    trail: FloatArray,
-) -> float:
+def _heat(bodies: BodyStack | None, problem: Problem, trail: FloatArray) -> float:
     """Temperatures of the films for their pressures; returns the largest change asked for [K]."""
-    if case.thermal == ALONE:
-        return heat_films(grids, works, state, case, trail[RELAXED])
-    if bodies is not None and case.thermal == COUPLED:
-        return exchange_heat(grids, bodies, pads, works, state, case, trail[RELAXED])
+    if problem.case.thermal == ALONE:
+        return heat_films(problem, trail[RELAXED])
+    if bodies is not None and problem.case.thermal == COUPLED:
+        return exchange_heat(bodies, problem, trail[RELAXED])
     return trail[HEAT]
 
 
 @inner
-def _begin(pads: PadStack, state: PadState, case: Case, memory: Memory) -> None:
+def _begin(problem: Problem, memory: Memory) -> None:
     """Remember where a step starts from, if the last ones were slow."""
-    trail = memory.trail
+    state, case, trail = problem.state, problem.case, memory.trail
     state.figures[BACKFLOW] = 0.0
     trail[_STAGE], trail[HEAT] = _HEATING, 0.0
     slow = _SLOW_ACROSS if case.thermal == ACROSS else _SLOW
     mixes = case.thermal != ISOTHERMAL or state.bent.size > 0
     trail[_KEPT] = 1.0 if trail[_LEFT] > slow * trail[_BEST_LEFT] and mixes else 0.0
     if trail[_KEPT] > 0.0:
-        _write_vector(pads, state, case, memory.before)
+        _write_vector(problem, memory.before)
 
 
 @inner
-def _go_on(
-    shapes: Shapes,
-    pads: PadStack,
-    works: FilmWork,
-    state: PadState,
-    case: Case,
-    memory: Memory,
-    shift: FloatArray,
-) -> None:
+def _go_on(problem: Problem, memory: Memory, shift: FloatArray) -> None:
     """Move by a step, and where slow modes are left, to where the last few steps head."""
-    trail, across = memory.trail, case.thermal == ACROSS
+    trail, across = memory.trail, problem.case.thermal == ACROSS
     residual, heat = trail[RESIDUAL], trail[HEAT]
     trail[_BEST_LEFT] = min(trail[_BEST_LEFT], trail[_LEFT])
     trail[_LEFT] = max(residual, heat / HEAT_PER_FORCE)
@@ -172,15 +154,15 @@ def _go_on(
     trail[_STALLED] = 0.0 if residual < _PROGRESS * trail[_BEST] else trail[_STALLED] + 1.0
     trail[_BEST] = min(trail[_BEST], residual)
     damping = 0.5 if trail[_STALLED] > _PATIENCE else 1.0
-    whole = move(shapes, pads, works, state, case, shift, damping)
+    whole = move(problem, shift, damping)
     # steps that were cut short, or still far off, say nothing of the iteration's slow modes
     slow = _SLOW_ACROSS if across else _SLOW
     if trail[_KEPT] > 0.0 and whole and near and trail[_LEFT] > slow * trail[_BEST_LEFT]:
         count = _remember(memory)
-        _write_vector(pads, state, case, memory.images[count - 1])
+        _write_vector(problem, memory.images[count - 1])
         for q in range(len(memory.before)):
             memory.residuals[count - 1, q] = memory.images[count - 1, q] - memory.before[q]
-        _read_vector(shapes, pads, works, state, case, mixed(memory.images, memory.residuals, count))
+        _read_vector(problem, mixed(memory.images, memory.residuals, count))
     else:
         trail[_COUNT] = 0
 
@@ -222,8 +204,9 @@ def vector_size(state: PadState, case: Case) -> int:
 
 
 @inner
-def _write_vector(pads: PadStack, state: PadState, case: Case, out: FloatArray) -> None:
+def _write_vector(problem: Problem, out: FloatArray) -> None:
     """Journal, pads, temperatures and deformations as one vector, in micrometres and kelvins."""
+    _, _, pads, _, state, case = problem
     out[0], out[1] = state.position[0] / _MICROMETRE, state.position[1] / _MICROMETRE
     out[2] = state.figures[GROWN]
     warm = 3 + state.warmth.shape[1]
@@ -245,10 +228,9 @@ def _part(state: PadState, vector: FloatArray, m: int) -> FloatArray:
 
 
 @inner
-def _read_vector(
-    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, vector: FloatArray
-) -> None:
+def _read_vector(problem: Problem, vector: FloatArray) -> None:
     """Undo `_write_vector`."""
+    grids, _, pads, works, state, case = problem
     state.position[0], state.position[1] = vector[0] * _MICROMETRE, vector[1] * _MICROMETRE
     closing = case.closing * (vector[2] - state.figures[GROWN])
     state.figures[GROWN] = vector[2]
@@ -267,4 +249,4 @@ def _read_vector(
         state.bent[m] += change
         for i in range(change.shape[0]):
             for j in range(change.shape[1]):
-                works.extra[m, i, j] += change[i, j] + more * shapes.grids.cos[m, i] * shapes.grids.z[m, j]
+                works.extra[m, i, j] += change[i, j] + more * grids.cos[m, i] * grids.z[m, j]

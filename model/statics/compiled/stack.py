@@ -28,6 +28,25 @@ class GridStack(NamedTuple):
     first: int
 
 
+class BodyStack(NamedTuple):
+    """The matrices of k different pads and which of them the films have; n = (nt + 1)(nz + 1) film nodes.
+
+    Those of pads that do not bend, or do not conduct, are empty.
+    """
+
+    which: IntArray  #: (pads,) of int: Body of every film.
+    #: (k, n, unknowns + c) of float32: Deformation by the pressure at the unknown nodes [m/Pa] and by the
+    #: temperatures of the pad's coarser nodes [m/K]: half the memory, which is what the product waits for, at a
+    #: ten-millionth of a deformation.
+    answer: np.ndarray
+    lighter: np.ndarray  #: (k, c, n) of float32: Those temperatures by the film's.
+    shapes: FloatArray  #: (k, nt + 1, nz + 1, m)
+    amplitudes: FloatArray  #: (k, m, n)
+    response: FloatArray  #: (k, m, unknowns): With the factor on the deformation, as `answer`.
+    flux: FloatArray  #: (k, n, c), (k, c, n): Of pads that conduct, as `PadDeformation`.
+    to_coarse: FloatArray
+
+
 class PadStack(NamedTuple):
     """What a search is told of the pads; of it only clearances grow, and laws of somebody's own are asked anew."""
 
@@ -67,7 +86,7 @@ class PadState(NamedTuple):
     least: FloatArray  #: (n,): Thinnest film [m].
     steps: IntArray  #: (n,) of int: See `model.film.reynolds.FilmForces`.
     heating: FloatArray  #: (n,): Largest change of temperature that the last step asked for [K].
-    shift: FloatArray  #: (n, unknowns): See `model.statics.pad_film.PadFilm.pressure_change`.
+    shift: FloatArray  #: (n, unknowns): See `model.film.slopes.pressure_change`.
     felt: FloatArray  #: (n, 2): `corrected`, and ...
     felt_stiffness: FloatArray  #: (n, 2, 2): ... `stiffness` with the pad giving way: what journal and pivot feel.
     #: (n, nt + 1, nz + 1): Deformation; what is missing of it besides the shapes of the Newton step [m]. Empty

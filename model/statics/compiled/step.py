@@ -7,15 +7,15 @@ import math
 import numpy as np
 
 from model.compilation import inner
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid
 from model.film.models import solve_by
 from model.film.oil_state import least_share, set_viscosity
 from model.interpolation import least
-from model.statics.compiled.bending import Shapes, bend_pads, change_shape
-from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Case, along, rigid_approach
+from model.statics.compiled.bending import bend_pads, change_shape
+from model.statics.compiled.case import ACROSS, BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, along, rigid_approach
 from model.statics.compiled.heat import rest_films
 from model.statics.compiled.place import let_idle, rescue
-from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadStack, PadState, grid_of, work_of
+from model.statics.compiled.stack import GROWING, GROWN, JOURNAL, PadState, grid_of, work_of
 from rigdata.arrays import FloatArray
 
 #: Largest step of the journal, as a share of the least clearance: the films' slopes are those of where it stands.
@@ -26,15 +26,16 @@ _SHRINK = 0.4
 
 
 @inner
-def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, sharp: bool) -> bool:
+def solve_pressures(problem: Problem, sharp: bool) -> bool:
     """Pressure of every film that carries, at its present temperature; False if one is lost.
 
     A film without force is that of the unloaded attitude, in which nothing holds the pad: the loaded one counts.
     """
+    grids, _, pads, works, state, case = problem
     lost = False
     for k in range(len(pads.order)):
         m = pads.order[k]
-        grid, work = grid_of(shapes.grids, m), work_of(works, m)
+        grid, work = grid_of(grids, m), work_of(works, m)
         state.supplied[m] = case.fresh + case.mixing * state.passed[pads.order[k - 1]] / case.length
         while not state.idle[m]:
             if not sharp and case.thermal != ACROSS:
@@ -60,57 +61,56 @@ def solve_pressures(shapes: Shapes, pads: PadStack, works: FilmWork, state: PadS
             work.pressure[1:] = 0.0
         elif state.steps[m] < 0:
             lost = True
-    rest_films(shapes.grids, pads, state, case)
+    rest_films(problem)
     return not lost
 
 
 @inner
-def grow_and_bend(
-    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, relaxation: float, change: float
-) -> float:
+def grow_and_bend(problem: Problem, relaxation: float, change: float) -> float:
     """What a journal grows, what pads bend; returns the largest change asked for, from `change` on [K]."""
-    if case.closing > 0.0 and change < BOUNDLESS:
-        change = max(change, _warm_journal(shapes, works, state, relaxation))
+    state = problem.state
+    if problem.case.closing > 0.0 and change < BOUNDLESS:
+        change = max(change, _warm_journal(problem, relaxation))
     for m in range(len(state.tilt)):
         for i in range(2):
             state.felt[m, i] = state.corrected[m, i]
             for j in range(2):
                 state.felt_stiffness[m, i, j] = state.stiffness[m, i, j]
     # a deformation counts like a temperature change of the same weight in the film's resistance
-    share = bend_pads(shapes.bodies, shapes, pads, works, state, case) if change < BOUNDLESS else 0.0
+    share = bend_pads(problem.bodies, problem) if change < BOUNDLESS else 0.0
     return max(change, HEAT_PER_FORCE * share)
 
 
 @inner
-def _warm_journal(shapes: Shapes, works: FilmWork, state: PadState, relaxation: float) -> float:
+def _warm_journal(problem: Problem, relaxation: float) -> float:
     """Say what the journal's temperature will take from the clearances; returns the change asked for [K]."""
-    felt = state.figures[JOURNAL]
+    figures = problem.state.figures
+    felt = figures[JOURNAL]
     if not math.isfinite(felt):
-        felt = mean_temperature(shapes, works, state)
-    asked = felt - state.figures[GROWN]
-    state.figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
+        felt = _mean_temperature(problem)
+    asked = felt - figures[GROWN]
+    figures[GROWING] = relaxation * min(max(asked, -HEATING_STEP), HEATING_STEP)
     return abs(asked)
 
 
 @inner
-def mean_temperature(shapes: Shapes, works: FilmWork, state: PadState) -> float:
+def _mean_temperature(problem: Problem) -> float:
     """Mean of the films that carry, by area; of the oil where it enters if none does [degC]."""
+    weight, temperature, state = problem.grids.area, problem.works.temperature, problem.state
     area, total = 0.0, 0.0
     for m in range(len(state.tilt)):
         if not state.idle[m]:
-            for i in range(works.temperature.shape[1]):
-                for j in range(works.temperature.shape[2]):
-                    area += shapes.grids.area[m, i, j]
-                    total += shapes.grids.area[m, i, j] * works.temperature[m, i, j]
+            for i in range(temperature.shape[1]):
+                for j in range(temperature.shape[2]):
+                    area += weight[m, i, j]
+                    total += weight[m, i, j] * temperature[m, i, j]
     return total / area if area > 0.0 else state.inlet[0]
 
 
 @inner
-def move(
-    shapes: Shapes, pads: PadStack, works: FilmWork, state: PadState, case: Case, shift: FloatArray, damping: float
-) -> bool:
+def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     """Move journal and pads, no further than lets every film keep a share of its thickness; True if all the way."""
-    grids = shapes.grids
+    grids, _, pads, works, state, case = problem
     scale = min(damping, _LONGEST_STEP * least(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
     extra, bending = np.empty((0, 0)), state.bent.size > 0
     closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
@@ -120,7 +120,7 @@ def move(
             da = frame[0, 0] * shift[0] + frame[0, 1] * shift[1] - moves[1] + closing
             db = frame[1, 0] * shift[0] + frame[1, 1] * shift[1] + pads.pivot_radius[m] * moves[0]
             if bending:
-                axial[m] = change_shape(shapes.bodies, state, case, m, da, db)
+                axial[m] = change_shape(problem.bodies, state, case, m, da, db)
                 extra = _extra(grid_of(grids, m), state, m, axial[m])
             worst = least_share(grid_of(grids, m), work_of(works, m), da, db, extra)
             if worst * damping < _SHRINK - 1.0:
