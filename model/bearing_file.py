@@ -8,7 +8,7 @@ from typing import Any
 
 from model.bearing import BABBITT, ROTATIONS, STEEL, Bearing, BearingError, Material, Oil, Pad, Pivot, pad_rooms
 from model.possible import KEYS
-from model.toml_text import parse_toml, read_page
+from model.toml_text import read_page, read_table
 from rigdata.near_names import hint
 from rigdata.units import ZERO_CELSIUS, UnitError, parse_quantity
 
@@ -53,14 +53,8 @@ def load_bearing(source: str | Path) -> Bearing:
 
 def parse_bearing(text: str, name: str) -> Bearing:
     """Build a `Bearing` from TOML text; `name` is what error messages call the file."""
-    try:
-        data = parse_toml(text)
-    except ValueError as error:
-        raise BearingError(f"{name}: not valid TOML: {error}. Mend that line.") from error
+    data = read_table(text, name, "tpjb-bearing/1", BearingError)
     sections = {key: _section(data, key, name) for key in _KEYS}
-    schema = sections[""].get("schema", "tpjb-bearing/1")
-    if schema != "tpjb-bearing/1":
-        raise BearingError(f"{name}, schema: {schema!r} is not known. This version reads 'tpjb-bearing/1'.")
     values = {key: _read_section(section, key, name) for key, section in sections.items()}
     pads = _pads(values, name)
     bearing = Bearing(

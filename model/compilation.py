@@ -20,40 +20,6 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-#: Files with compiled functions, relative to the package; a test holds the list complete.
-KERNELS = (
-    "compilation.py",
-    "film/attitudes.py",
-    "film/cavitation.py",
-    "film/cavitation_matrix.py",
-    "film/cross_energy.py",
-    "film/cross_film.py",
-    "film/cross_march.py",
-    "film/dense.py",
-    "film/edge_flows.py",
-    "film/energy.py",
-    "film/following_heat.py",
-    "film/matrix.py",
-    "film/models.py",
-    "film/oil_state.py",
-    "film/resting.py",
-    "film/reynolds.py",
-    "film/slopes.py",
-    "film/turbulence.py",
-    "interpolation.py",
-    "pad/pivot.py",
-    "statics/compiled/anderson.py",
-    "statics/compiled/bending.py",
-    "statics/compiled/case.py",
-    "statics/compiled/elimination.py",
-    "statics/compiled/heat.py",
-    "statics/compiled/iteration.py",
-    "statics/compiled/place.py",
-    "statics/compiled/stack.py",
-    "statics/compiled/start.py",
-    "statics/compiled/step.py",
-    "tilt_hold.py",
-)
 #: Sums may be reordered, but NaN and infinity keep their meaning.
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
@@ -115,12 +81,18 @@ def _compiler() -> Any:
     return numba
 
 
+def kernels() -> list[Path]:
+    """Files with compiled functions: this one and those that import from it."""
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    return [path for path in files if path == Path(__file__) or b"\nfrom model.compilation" in path.read_bytes()]
+
+
 @functools.cache
 def stamp() -> str:
     """Of the sources of all kernels."""
     digest = hashlib.sha256()
-    for name in KERNELS:
-        digest.update((Path(__file__).parent / name).read_bytes())
+    for path in kernels():
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 

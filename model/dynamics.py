@@ -12,20 +12,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from model.conditions import named
 from model.film.following_heat import heat_impedance
+from model.film.mesh import Faces
 from model.film.reynolds import conductances
 from model.film.slopes import shape_slopes, squeeze_slopes
 from model.mirror import MIRROR
 from model.pad.bending import force_weights
 from model.setup import Setup
-from model.statics.axial_tilt import AxialTilt, axial_shape
 from model.statics.equilibrium import Equilibrium
-from model.statics.pad_film import PadFilm
+from model.statics.pad_film import PadFilm, axial_shape
 from model.tilt_hold import friction_limits, tilt_hold
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
@@ -34,6 +34,16 @@ from rigdata.problem import Condition
 _MOST_TURNS, _SETTLED = 40, 1e-7
 #: Halvings of the amplitude with which a pivot with friction vibrates.
 _HALVINGS = 60
+
+
+class AxialTilt(NamedTuple):
+    """A pad on a sphere that follows a shaft that leans: one more tilt, about the axis across it through its pivot."""
+
+    shape: FloatArray  #: (nt + 1, nz + 1): What a unit of axial tilt adds to h [m/rad].
+    #: (unknowns,): Moment by the pressure at the film's unknown nodes, less what grows with the pad's load [m^3].
+    weights: FloatArray
+    stiffness: float  #: [N m/rad]
+    inertia: float  #: [kg m^2]
 
 
 def flexing_impedance(
@@ -50,7 +60,7 @@ def flexing_impedance(
 
     The pad's softest shapes are solved at once, the rest follows in a few turns, as in an equilibrium. At rest this
     is the slope of the static locus with pads that bend; for a stiff pad it is the rigid one. A pad's axial tilt
-    (`model.statics.axial_tilt`) is one more column of S_ab, and leaves by its own equation of motion about the
+    (`AxialTilt`) is one more column of S_ab, and leaves by its own equation of motion about the
     pivot.
 
     `position` (2,) [m], `omega` (n,) [rad/s].
@@ -79,7 +89,7 @@ class _Bend:
     """The film's pressure with a pad that bends, from that with a rigid one."""
 
     film: PadFilm
-    conductance: tuple[FloatArray, FloatArray]
+    conductance: Faces
     factor: float
 
     def slopes(self, shapes: Any) -> tuple[Any, Any]:

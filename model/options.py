@@ -30,12 +30,11 @@ class Options:
         check_known("turbulence", self.turbulence, _TURBULENCE)
         if self.turbulence != "none" and self.cavitation != "swift-stieber":
             raise OptionError(f"a turbulent film ruptures by swift-stieber, not by {self.cavitation!r}")
-        if self.perturbed_heat and (self.cavitation, self.turbulence) != ("swift-stieber", "none"):
+        plain = (self.cavitation, self.turbulence) == ("swift-stieber", "none")
+        if self.perturbed_heat and not plain:
             raise OptionError("perturbed_heat is for laminar films that rupture by swift-stieber")
-        plain = (self.cavitation, self.turbulence, self.perturbed_heat) == ("swift-stieber", "none", False)
-        if self.perturbed_bending and not plain:
-            raise OptionError("perturbed_bending is for laminar films that rupture by swift-stieber, their heat frozen")
-        if self.axial_tilt and not plain:
-            raise OptionError("axial_tilt is for laminar films that rupture by swift-stieber, without perturbed_heat")
+        for name in ("perturbed_bending", "axial_tilt"):
+            if getattr(self, name) and not (plain and not self.perturbed_heat):
+                raise OptionError(f"{name} is for laminar films that rupture by swift-stieber, without perturbed_heat")
         if not (self.growth is None or isinstance(self.growth, Growth)):
             raise OptionError(f"growth must be a Growth or None, got {self.growth!r}")

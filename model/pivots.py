@@ -19,7 +19,7 @@ import numpy as np
 from model.bearing import Bearing, BearingError, Pivot
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import CONSTANT, OTHER, RIGID, ROCKER, SPHERICAL
-from model.toml_text import parse_toml, read_page
+from model.toml_text import read_page, read_table
 from rigdata.arrays import FloatArray
 from rigdata.near_names import hint
 
@@ -226,12 +226,7 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     path = Path(path)
     kind, missing = "A pivots.toml holds some hundred numbers", "`tpjb pivot CAMPAIGN` writes a pivots.toml."
     text = read_page(path, BearingError, kind, missing, 20)
-    try:
-        data = parse_toml(text)
-    except ValueError as error:
-        raise BearingError(f"{path}: cannot be read: {error}. Write it anew with `tpjb pivot CAMPAIGN`.") from error
-    if data.get("schema") != "tpjb-pivots/1":
-        raise BearingError(f"{path.name}, schema: need 'tpjb-pivots/1', got {data.get('schema')!r}.")
+    data = read_table(text, path.name, "tpjb-pivots/1", BearingError)
     _refuse_unknown(data, _FILE_KEYS, path.name)
     tables, housing = data.get("pads"), data.get("includes_housing", True)
     if not isinstance(tables, list) or not tables:

@@ -16,8 +16,7 @@ from model.setup import Setup
 from model.statics.conditions import largest_reynolds
 from model.statics.equilibrium import Equilibrium
 from model.statics.pad_film import PadFilm
-from model.statics.pad_flow import PadFlow, pad_flow
-from model.statics.power import power_loss
+from model.statics.pad_flow import PadFlow, pad_flow, power_loss
 from rigdata.arrays import ComplexArray, FloatArray
 from rigdata.problem import Condition
 
@@ -278,7 +277,7 @@ class Prediction:
     def power_loss(self) -> float:
         """Shear of all films, those of idle pads too [W]."""
         turbulent = self.setup.options.turbulence != "none"
-        return power_loss(self.equilibrium, self.speed * self.setup.bearing.journal_radius, turbulent)
+        return power_loss(self._films, self.speed * self.setup.bearing.journal_radius, turbulent)
 
     def pad_temperature(self, fraction: float = 0.75) -> FloatArray:
         """Film temperature at mid-length, at a fraction of the arc from the leading edge, per pad [degC].

@@ -27,6 +27,18 @@ def read_page(path: Path, refuse: type[ModelError], kind: str, missing: str, meg
     raise refuse(f"{path.name}: larger than {megabytes} MB. {kind}; check the path.")
 
 
+def read_table(text: str, place: str, schema: str, refuse: type[ModelError]) -> dict[str, Any]:
+    """Parse the text of a file of a schema, or refuse it by the name of its place."""
+    try:
+        data = parse_toml(text)
+    except ValueError as error:
+        raise refuse(f"{place}: cannot be read, not valid TOML: {error}. Mend that line.") from error
+    found = data.get("schema", schema)
+    if found != schema:
+        raise refuse(f"{place}, schema: {found!r} is not known. This version reads {schema!r}.")
+    return data
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """Parse TOML text."""
     for number, line in enumerate(text.split("\n"), start=1):

@@ -11,7 +11,7 @@ from typing import Any
 from model.effects.kind import EffectError
 from model.effects.registry import kind_of
 from model.setup import Setup
-from model.toml_text import parse_toml, read_page
+from model.toml_text import read_page, read_table
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,7 @@ def load_effects(path: str | Path) -> tuple[Effect, ...]:
     path = Path(path)
     missing = "Give the path of an effects file (TOML)."
     text = read_page(path, EffectError, "An effects file is a page of text", missing)
-    try:
-        data = parse_toml(text)
-    except ValueError as error:
-        raise EffectError(f"{path}: cannot be read: {error}. Mend that line.") from error
-    schema = data.get("schema", "tpjb-effects/1")
-    if schema != "tpjb-effects/1":
-        raise EffectError(f"{path.name}, schema: need 'tpjb-effects/1', got {schema!r}.")
-    tables = data.get("effects", [])
+    tables = read_table(text, path.name, "tpjb-effects/1", EffectError).get("effects", [])
     if not isinstance(tables, list):
         raise EffectError(f"{path.name}: 'effects' must be a list of tables. Write [[effects]].")
     return tuple(_read_effect(table, f"{path.name}, effect {i}") for i, table in enumerate(tables, start=1))

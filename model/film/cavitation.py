@@ -32,15 +32,15 @@ from model.film.cavitation_matrix import (
     substitute_columns,
 )
 from model.film.matrix import assemble, factorise, factorise_general
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.reynolds import FilmForces, _integrate, solve_film
-from model.film.slopes import net_inflow
+from model.film.slopes import face_slopes, net_inflow
 from rigdata.arrays import BoolArray, FloatArray
 
 
 @inner
 def _jfo_slopes(
-    grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, sharp: bool
+    grid: FilmGrid, work: FilmWork, wedge: Wedge, faces: FaceFlows, x: FloatArray, sharp: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Solve for the derivatives by a, b, da/dt, db/dt; then the mass flows.
 
@@ -56,11 +56,12 @@ def _jfo_slopes(
     factorise_general(band)
     slopes = np.zeros((x.shape[0], 4))
     static, rate = slopes[:, :2], slopes[:, 2:]
-    _displaced(grid, work, faces, x, static)
+    _displaced(grid, work, wedge, faces, x, static)
     substitute_columns(band, static)
     _stored(grid, work, faces, x, static, rate)
     substitute_columns(band, rate)
-    _flows(work, faces)
+    # heat goes with the flows of a full film
+    work.flow_x[:] = faces.couette - faces.along * (work.pressure[1:] - work.pressure[:-1])
     return weight, slopes
 
 
@@ -97,27 +98,18 @@ def _behind_front(faces: FaceFlows, work: FilmWork, x: FloatArray, k: int, width
 
 
 @inner
-def _displaced(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray, rhs: FloatArray) -> None:
+def _displaced(grid: FilmGrid, work: FilmWork, wedge: Wedge, faces: FaceFlows, x: FloatArray, rhs: FloatArray) -> None:
     """What more flows into a control volume when a or b grows and pressure and filling stay."""
-    p, h = work.pressure, work.thickness
-    nt, nz = faces.along.shape[0], faces.across.shape[1]
-    width = nz - grid.first
-    along, across = np.zeros((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
-    for i in range(nt):
-        for j in range(grid.first, nz):
-            if i == 0 and work.ruptured[0, j]:  # the supply follows the gap at the edge itself
-                slope, cos, sin = faces.follows[j], grid.cos[0], grid.sin[0]
-            else:
-                upstream = (i - 1) * width + j - grid.first
-                filling = 1.0 + (x[upstream, 0] if i > 0 and work.ruptured[i, j] else 0.0)
-                poiseuille = faces.along[i, j] * (p[i + 1, j] - p[i, j])
-                slope = (faces.couette[i, j] * filling - 3.0 * poiseuille) / faces.height[i, j]
-                cos, sin = grid.cos_face[i], grid.sin_face[i]
-            along[i, j, 0], along[i, j, 1] = -slope * cos, -slope * sin  # dh/da = -cos, dh/db = -sin
-    for i in range(nt + 1):
-        for j in range(nz):
-            slope = -3.0 * faces.across[i, j] * (p[i, j + 1] - p[i, j]) / (0.5 * (h[i, j] + h[i, j + 1]))
-            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+    nt, width = faces.along.shape[0], faces.across.shape[1] - grid.first
+    work.flow_x[:] = faces.couette
+    for i in range(1, nt):
+        for j in range(grid.first, faces.across.shape[1]):
+            if work.ruptured[i, j]:
+                work.flow_x[i, j] *= 1.0 + x[(i - 1) * width + j - grid.first, 0]
+    along, across = face_slopes(grid, work, wedge, (faces.along, faces.across), None)
+    for j in range(len(faces.follows)):
+        if work.ruptured[0, j]:  # the supply follows the gap at the edge itself
+            along[0, j, 0], along[0, j, 1] = -faces.follows[j] * grid.cos[0], -faces.follows[j] * grid.sin[0]
     net_inflow(along, across, grid.first, rhs)
 
 
@@ -149,17 +141,6 @@ def _stored(
                 rhs[k, 1] += mass * grid.sin[0]
 
 
-@inner
-def _flows(work: FilmWork, faces: FaceFlows) -> None:
-    p = work.pressure
-    for i in range(faces.along.shape[0]):
-        for j in range(p.shape[1]):
-            work.flow_x[i, j] = faces.couette[i, j] - faces.along[i, j] * (p[i + 1, j] - p[i, j])
-    for i in range(p.shape[0]):
-        for j in range(faces.across.shape[1]):
-            work.flow_z[i, j] = -faces.across[i, j] * (p[i, j + 1] - p[i, j])
-
-
 _MAX_STEPS = 4000
 #: How many steps in a row may fail to lower the number of nodes on the wrong side before they change one at a time.
 _PATIENCE = 8
@@ -169,7 +150,7 @@ _PATIENCE = 8
 def solve_film_jfo(
     grid: FilmGrid,
     work: FilmWork,
-    wedge: tuple[float, float, float],
+    wedge: Wedge,
     speed: float,
     sharp: bool,
     supplied: tuple[float, float],
@@ -178,59 +159,33 @@ def solve_film_jfo(
     forces = solve_film(grid, work, wedge, speed, sharp)
     if forces.steps < 0:
         return forces
-    steps, force, stiffness, damping = _conserve(grid, work, wedge, speed, sharp, supplied)
-    if steps == 0:
+    faces = face_flows(grid, work, wedge, speed, supplied)
+    _starved(work, faces)
+    if not work.ruptured.any():
         return forces
+    x = np.empty((work.unknown.shape[0], 1))
+    steps = _pivot(grid, work, faces, x)
+    _read(work, x, grid.first)
+    force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
+    if steps > 0:
+        weight, slopes = _jfo_slopes(grid, work, wedge, faces, x, sharp)
+        _leave_behind(grid, work, faces, slopes)
+        force, stiffness, damping = _integrate(grid, work, weight)
     return FilmForces(force, stiffness, damping, forces.min_film, steps)
 
 
-@compiled
-def _conserve(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    speed: float,
-    sharp: bool,
-    supplied: tuple[float, float],
-) -> tuple[int, FloatArray, FloatArray, FloatArray]:
-    """Go on from Swift and Stieber's film: steps (0: it was right; -2: not settled), force, stiffness, damping."""
-    force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
-    faces = face_flows(grid, work, wedge, speed, supplied)
-    _starved(work, faces)
-    if not _any_ruptured(work.ruptured):
-        return 0, force, stiffness, damping
-    x = np.empty((work.unknown.shape[0], 1))
-    band = np.empty((work.unknown.shape[0], 2 * (work.band.shape[1] - 1) + 1))
-    steps = _pivot(grid, work, faces, (band, x))
-    _read(work, x, grid.first)
-    if steps > 0:
-        weight, slopes = _jfo_slopes(grid, work, faces, x, sharp)
-        _leave_behind(grid, work, faces, slopes)
-        force, stiffness, damping = _integrate(grid, work, weight)
-    return steps, force, stiffness, damping
-
-
 @inner
-def _any_ruptured(ruptured: BoolArray) -> bool:
-    for i in range(ruptured.shape[0]):
-        for j in range(ruptured.shape[1]):
-            if ruptured[i, j]:
-                return True
-    return False
-
-
-@inner
-def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatArray, FloatArray]) -> int:
+def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, x: FloatArray) -> int:
     """Solve F(x) = 0 by block principal pivoting; returns the number of factorisations, -2 if it did not settle."""
-    band, x = space
     ruptured, first = work.ruptured, grid.first
+    band = np.empty((x.shape[0], 2 * (work.band.shape[1] - 1) + 1))
     fewest, patience = ruptured.size + 1, _PATIENCE
     for step in range(1, _MAX_STEPS + 1):
         assemble_columns(band, faces, ruptured, first)
         factorise_general(band)
         _drag(work, faces, first, x)
         substitute_columns(band, x)
-        wrong = _misplaced(x, ruptured, first)
+        wrong = _change_sides(x, ruptured, first, 0)
         _read(work, x, first)
         changed = _starved(work, faces)
         if wrong + changed == 0:
@@ -240,7 +195,7 @@ def _pivot(grid: FilmGrid, work: FilmWork, faces: FaceFlows, space: tuple[FloatA
         else:
             patience -= 1
         if changed == 0 or patience >= 0:
-            _change_sides(x, ruptured, first, patience < 0)
+            _change_sides(x, ruptured, first, 1 if patience < 0 else ruptured.size)
     return -2
 
 
@@ -274,29 +229,21 @@ def _drag(work: FilmWork, faces: FaceFlows, first: int, x: FloatArray) -> None:
 
 
 @inner
-def _misplaced(x: FloatArray, ruptured: BoolArray, first: int) -> int:
-    """Wet nodes that pull and ruptured nodes that are more than full."""
+def _change_sides(x: FloatArray, ruptured: BoolArray, first: int, most: int) -> int:
+    """Move nodes that are on the wrong side: wet ones that pull, ruptured ones that are more than full.
+
+    The last ones first, and `most` of them (one at a time cannot cycle: Murty's rule); returns how many there are.
+    """
     nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
     count = 0
-    for i in range(1, nt):
-        for j in range(first, nz):
-            value = x[(i - 1) * (nz - first) + j - first, 0]
-            if value > 0.0 if ruptured[i, j] else value < 0.0:
-                count += 1
-    return count
-
-
-@inner
-def _change_sides(x: FloatArray, ruptured: BoolArray, first: int, single: bool) -> None:
-    """Move the nodes that are on the wrong side, or of them the last one only (Murty's rule: this cannot cycle)."""
-    nt, nz = ruptured.shape[0] - 1, ruptured.shape[1] - 1
     for i in range(nt - 1, 0, -1):
         for j in range(nz - 1, first - 1, -1):
             value = x[(i - 1) * (nz - first) + j - first, 0]
             if value > 0.0 if ruptured[i, j] else value < 0.0:
-                ruptured[i, j] = not ruptured[i, j]
-                if single:
-                    return
+                if count < most:
+                    ruptured[i, j] = not ruptured[i, j]
+                count += 1
+    return count
 
 
 @inner

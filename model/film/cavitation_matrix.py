@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.oil_state import face_height
 from model.film.reynolds import conductances
 from rigdata.arrays import BoolArray, FloatArray
@@ -34,9 +34,7 @@ class FaceFlows(NamedTuple):
 
 
 @compiled
-def face_flows(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float, supplied: tuple[float, float]
-) -> FaceFlows:
+def face_flows(grid: FilmGrid, work: FilmWork, wedge: Wedge, speed: float, supplied: tuple[float, float]) -> FaceFlows:
     """Conductances and drag of a film that is full everywhere but for its supply.
 
     `supplied`: share of the gap there that is filled at most, and what the groove gives at most [kg/s/m].

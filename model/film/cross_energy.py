@@ -114,16 +114,10 @@ def _shared_flow(film: tuple[FilmGrid, FilmWork, CrossFilm], speed: float, i: in
     below, total, driven = 0.0, 0.0, 0.0
     for m in range(cells):
         light = 0.5 * (cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m])
-        a, b = edges[m], edges[m + 1]
-        wide = b - a
-        shear, slope = speed / f0 * light, pull * light
-        # velocity below + shear (eta - a) + slope [(eta^2 - a^2) / 2 - centre (eta - a)], integrated over the cell
-        inside = below * wide + 0.5 * shear * wide * wide
-        inside += slope * (((b**3 - a**3) / 3.0 - a * a * wide) * 0.5 - 0.5 * centre * wide * wide)
+        inside, below = _across_cell(edges, m, centre, (below, speed / f0 * light, pull * light))
         flow[m] = mass * inside
         total += flow[m]
-        driven += wide * 0.5 * (a + b)
-        below += shear * wide + slope * (0.5 * (b * b - a * a) - centre * wide)
+        driven += (edges[m + 1] - edges[m]) * 0.5 * (edges[m] + edges[m + 1])
     # averages over the face differ in the second order: what is left goes with the shear
     missing = work.flow_x[i, j] - total
     for m in range(cells):
@@ -139,14 +133,21 @@ def _side_shares(cross: CrossFilm, i: int, j: int, shares: FloatArray) -> None:
     for m in range(cells):
         light = cross.fluidity[i, j, m] + cross.fluidity[i + 1, j, m]
         light += cross.fluidity[i, j + 1, m] + cross.fluidity[i + 1, j + 1, m]
-        a, b = edges[m], edges[m + 1]
-        wide = b - a
-        inside = below * wide + light * (((b**3 - a**3) / 3.0 - a * a * wide) * 0.5 - 0.5 * centre * wide * wide)
-        below += light * (0.5 * (b * b - a * a) - centre * wide)
-        shares[m] = inside
-        total += inside
+        shares[m], below = _across_cell(edges, m, centre, (below, 0.0, light))
+        total += shares[m]
     for m in range(cells):
         shares[m] /= total
+
+
+@inner
+def _across_cell(edges: FloatArray, m: int, centre: float, profile: tuple[float, float, float]) -> tuple[float, float]:
+    """Integral over a cell of below + shear (eta - a) + slope [(eta^2 - a^2) / 2 - centre (eta - a)]; its end."""
+    below, shear, slope = profile
+    a, b = edges[m], edges[m + 1]
+    wide = b - a
+    inside = below * wide + 0.5 * shear * wide * wide
+    inside += slope * (((b**3 - a**3) / 3.0 - a * a * wide) * 0.5 - 0.5 * centre * wide * wide)
+    return inside, below + shear * wide + slope * (0.5 * (b * b - a * a) - centre * wide)
 
 
 class _Space(NamedTuple):

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid, FilmWork, OilConstants
 from model.film.slopes import change_by_oil
 from model.film.turbulence import ACROSS, ALONG, excess, still_shares
 from rigdata.arrays import FloatArray
@@ -99,7 +99,7 @@ def cross_film(work: FilmWork, temperature: float, cells: int = _CELLS) -> Cross
 def set_cross_viscosity(
     cross: CrossFilm,
     work: FilmWork,
-    oil: tuple[float, float, float, float],
+    oil: OilConstants,
     turbulent: tuple[float, float] = (0.0, 0.0),
 ) -> None:
     """Viscosities of the cells, and what the pressure solution needs of them.
@@ -135,14 +135,12 @@ def _set_eddies(cross: CrossFilm, i: int, j: int, reynolds: float, by_heat: floa
         away = 0.5 * (edges[m + 1] + edges[m]) - centre
         calm += wide * light * (away * away + wide * wide / 12.0)
         swirled += wide * light * sheared * (away * away + wide * wide / 12.0)
-    cross.driven[i, j, 0] = calm / swirled / (1.0 + excess(reynolds, ALONG[0], ALONG[1])[0] / 12.0)
-    cross.driven[i, j, 1] = calm / swirled / (1.0 + excess(reynolds, ACROSS[0], ACROSS[1])[0] / 12.0)
+    cross.driven[i, j, 0] = calm / swirled / (1.0 + excess(reynolds, ALONG)[0] / 12.0)
+    cross.driven[i, j, 1] = calm / swirled / (1.0 + excess(reynolds, ACROSS)[0] / 12.0)
 
 
 @inner
-def _integrals(
-    cross: CrossFilm, i: int, j: int, oil: tuple[float, float, float, float]
-) -> tuple[float, float, float, float]:
+def _integrals(cross: CrossFilm, i: int, j: int, oil: OilConstants) -> tuple[float, float, float, float]:
     """Mean temperature, f0, e and f2 at a node; its cells' fluidity is set, at the eddies that there are."""
     edges = cross.edges
     mean, f0, f1, f2 = 0.0, 0.0, 0.0, 0.0
@@ -170,7 +168,7 @@ def cross_pressure_change(
     work: FilmWork,
     cross: CrossFilm,
     speed: float,
-    oil: tuple[float, float, float, float],
+    oil: OilConstants,
     change: FloatArray,
 ) -> FloatArray:
     """Change of the pressure that new temperatures across the film will make.

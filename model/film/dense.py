@@ -1,4 +1,4 @@
-"""Small dense systems: Gauss' elimination, and the combination of a few vectors that comes nearest to another."""
+"""Small dense systems: Gauss' elimination, the combination of vectors nearest to another, Anderson's mixing."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import numpy as np
 
 from model.compilation import inner
 from rigdata.arrays import FloatArray
+
+#: Differences that Anderson's mixing keeps.
+DEPTH = 4
 
 
 @inner
@@ -62,3 +65,14 @@ def product(one: FloatArray, other: FloatArray) -> float:
     for q in range(len(one)):
         total += one[q] * other[q]
     return total
+
+
+@inner
+def mixed(images: FloatArray, residuals: FloatArray, count: int) -> FloatArray:
+    """Next state of a fixed-point iteration: gives (n,)."""
+    k = count - 1
+    last, weights = images[k].copy(), np.empty((DEPTH, 1))
+    if k > 0 and nearest(residuals[k] - residuals[:k], k, residuals[k], 1e-10, weights):
+        for i in range(k):
+            last -= weights[i, 0] * (images[k] - images[i])
+    return last

@@ -47,8 +47,9 @@ def heat_sources(
     dissipate(grid, work, running.speed, made, loss)
     for i in range(made.shape[0]):
         for j in range(made.shape[1]):
-            fewer = kept * running.oil[1] * loss[i, j]
-            made[i, j] = kept * (made[i, j] + work.gained[i, j]) + fewer * work.temperature[i, j]
+            sheared, pressed = made[i, j], loss[i, j]
+            fewer = kept * running.oil[1] * max(sheared - pressed, 0.0)
+            made[i, j] = kept * (sheared + pressed + work.gained[i, j]) + fewer * work.temperature[i, j]
             loss[i, j] = work.exchange[i, j] + fewer
 
 
@@ -165,19 +166,18 @@ def warm(
 
 
 @inner
-def dissipate(grid: FilmGrid, work: FilmWork, speed: float, dissipated: FloatArray, less: FloatArray) -> None:
-    """Heat made per station of length dx and control-volume height [W], full film; shape (nt + 1, nz + 1).
+def dissipate(grid: FilmGrid, work: FilmWork, speed: float, sheared: FloatArray, pressed: FloatArray) -> None:
+    """Heat made by shear and by pressure per station of length dx and control-volume height [W], full film.
 
-    `less`: how much less of it for every unit by which the viscosity falls, as a share.
+    Where the viscosity falls by a share, there is less of the one by it and more of the other; (nt + 1, nz + 1).
     """
     h, mu = work.thickness, work.viscosity
     for i in range(h.shape[0]):
         for j in range(h.shape[1]):
             downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
-            shear = mu[i, j] * speed**2 / h[i, j]
-            pressed = h[i, j] ** 3 / (12.0 * mu[i, j]) * (downstream + sideways)
             station = grid.dx * grid.height[j]
-            dissipated[i, j], less[i, j] = (shear + pressed) * station, max(shear - pressed, 0.0) * station
+            sheared[i, j] = mu[i, j] * speed**2 / h[i, j] * station
+            pressed[i, j] = h[i, j] ** 3 / (12.0 * mu[i, j]) * (downstream + sideways) * station
 
 
 @inner

@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.energy import march, slope_products
+from model.film.energy import dissipate, march, slope_products
 from model.film.matrix import substitute
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
 from model.film.oil_state import Running
 from model.film.reynolds import conductances
 from model.film.slopes import flow_changes, force_of, keep_ruptured, net_inflow
+from model.interpolation import largest
 from rigdata.arrays import ComplexArray, FloatArray
 
 #: Turns of pressure and heat, and the change of temperature at which they end, as a share of the temperature.
@@ -38,16 +39,18 @@ class _Change(NamedTuple):
 
 
 @compiled
-def heat_impedance(
-    grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], running: Running, omega: float
-) -> ComplexArray:
+def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Running, omega: float) -> ComplexArray:
     """What the temperature that follows adds to a film's impedance."""
     conductance = conductances(grid, work, wedge)
     shape, unknowns = work.pressure.shape, work.unknown.shape[0]
     width = shape[1] - 1 - grid.first
     out = np.zeros((2, 2), dtype=np.complex128)
-    loss = _local_loss(grid, work, running, omega)
     nothing = np.zeros(shape, dtype=np.complex128)
+    sheared, pressed = np.empty(shape), np.empty(shape)
+    dissipate(grid, work, running.speed, sheared, pressed)
+    # what a kelvin at a node stores and makes less [W/K]
+    stored = 1j * omega * running.heat[0] * grid.dx * grid.height * work.density * work.thickness
+    loss = stored + running.oil[1] * (sheared - pressed) + work.exchange
     for axis in range(2):
         thicker, pressure = -grid.cos if axis == 0 else -grid.sin, nothing.copy()
         warmer, answer = nothing, np.zeros(unknowns, dtype=np.complex128)
@@ -56,10 +59,11 @@ def heat_impedance(
             for k in range(unknowns):
                 frozen = work.slopes[k, axis] + 1j * omega * work.slopes[k, 2 + axis]
                 pressure[k // width + 1, k % width + grid.first] = frozen + answer[k]
-            gained = _gain(grid, work, running, conductance, _Change(thicker, warmer, pressure))
+            change = _Change(thicker, warmer, pressure)
+            gained = _gain(grid, work, running, conductance, change, (sheared, pressed))
             fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
             march(grid, work, running, loss, fields, gained)
-            asked, size = _largest(fields[0] - warmer), _largest(fields[0])
+            asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(grid, work, running, conductance, _Change(0.0 * thicker, warmer, nothing), omega, answer)
             if asked < _SETTLED * size:
@@ -72,34 +76,11 @@ def heat_impedance(
 
 
 @inner
-def _largest(values: ComplexArray) -> float:
-    largest = 1e-300
-    for value in values.ravel():
-        largest = max(largest, abs(value))
-    return largest
-
-
-@inner
-def _local_loss(grid: FilmGrid, work: FilmWork, running: Running, omega: float) -> ComplexArray:
-    """What a kelvin at a node stores and makes less, per station [W/K]."""
-    p, h, mu = work.pressure, work.thickness, work.viscosity
-    speed, oil, heat = running
-    out = np.empty(p.shape, dtype=np.complex128)
-    for i in range(p.shape[0]):
-        for j in range(p.shape[1]):
-            along, across = slope_products(grid, p, p, i, j)
-            shear, pressed = mu[i, j] * speed**2 / h[i, j], h[i, j] ** 3 / (12.0 * mu[i, j]) * (along + across)
-            stored = 1j * omega * work.density[i, j] * heat[0] * h[i, j]
-            out[i, j] = (stored + oil[1] * (shear - pressed)) * grid.dx * grid.height[j] + work.exchange[i, j]
-    return out
-
-
-@inner
 def _pressure(
     grid: FilmGrid,
     work: FilmWork,
     running: Running,
-    conductance: tuple[FloatArray, FloatArray],
+    conductance: Faces,
     change: _Change,
     omega: float,
     answer: ComplexArray,
@@ -120,7 +101,7 @@ def _pressure(
 
 @inner
 def _flows(
-    grid: FilmGrid, work: FilmWork, running: Running, conductance: tuple[FloatArray, FloatArray], change: _Change
+    grid: FilmGrid, work: FilmWork, running: Running, conductance: Faces, change: _Change
 ) -> tuple[ComplexArray, ComplexArray]:
     """Change of the mass flows through the faces along, (nt, nz + 1, 1), and across, (nt + 1, nz, 1) [kg/s/m]."""
     gx, gz = conductance
@@ -139,13 +120,18 @@ def _flows(
 
 @inner
 def _gain(
-    grid: FilmGrid, work: FilmWork, running: Running, conductance: tuple[FloatArray, FloatArray], change: _Change
+    grid: FilmGrid,
+    work: FilmWork,
+    running: Running,
+    conductance: Faces,
+    change: _Change,
+    dissipated: tuple[FloatArray, FloatArray],
 ) -> ComplexArray:
     """Change of the heat that the oil gains between stations at its old temperature, (1, nt, nz + 1) [W/m]."""
     t, flow_z, heat, thicker = work.temperature, work.flow_z, running.heat, change.thicker
     nt, nz = work.flow_x.shape[0], flow_z.shape[1]
     gained = np.empty((1, nt, nz + 1), dtype=np.complex128)
-    made = _made(grid, work, running.speed, change)
+    made = _made(grid, work, dissipated, change)
     along, across = _flows(grid, work, running, conductance, change)
     for i in range(nt):
         for j in range(nz + 1):
@@ -167,15 +153,14 @@ def _gain(
 
 
 @inner
-def _made(grid: FilmGrid, work: FilmWork, speed: float, change: _Change) -> ComplexArray:
+def _made(grid: FilmGrid, work: FilmWork, heat: tuple[FloatArray, FloatArray], change: _Change) -> ComplexArray:
     """Change of the heat made at every station, at the old temperature, (nt + 1, nz + 1) [W/m]."""
     p, h, mu = work.pressure, work.thickness, work.viscosity
+    sheared, pressed = heat
     made = np.empty(p.shape, dtype=np.complex128)
     for i in range(p.shape[0]):
         for j in range(p.shape[1]):
-            along, across = slope_products(grid, p, p, i, j)
-            turned_along, turned_across = slope_products(grid, p, change.pressure, i, j)
-            share, wide = change.thicker[i] / h[i, j], h[i, j] ** 3 / (12.0 * mu[i, j])
-            steeper = 3.0 * share * (along + across) + 2.0 * (turned_along + turned_across)
-            made[i, j] = (wide * steeper - mu[i, j] * speed**2 / h[i, j] * share) * grid.dx * grid.height[j]
+            along, across = slope_products(grid, p, change.pressure, i, j)
+            turned = h[i, j] ** 3 / (6.0 * mu[i, j]) * (along + across) * grid.dx * grid.height[j]
+            made[i, j] = turned + change.thicker[i] / h[i, j] * (3.0 * pressed[i, j] - sheared[i, j])
     return made

@@ -124,45 +124,23 @@ def _for_any_width(make: Any) -> Any:
     six, four, other = make(6), make(4), make(None)
 
     @inner
-    def substitute_any(band: FloatArray, x: FloatArray) -> None:
+    def for_any_width(band: FloatArray, *right: FloatArray) -> None:
         if band.shape[1] == 7:
-            six(band, x)
+            six(band, *right)
         elif band.shape[1] == 5:
-            four(band, x)
+            four(band, *right)
         else:
-            other(band, x)
+            other(band, *right)
 
-    return substitute_any
+    return for_any_width
 
 
-_factorise_6, _factorise_4, _factorise = _factoriser(6), _factoriser(4), _factoriser(None)
+#: L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]; `band` (n, width + 1).
+factorise = _for_any_width(_factoriser)
 #: Solve for one right-hand side in place, with the factor from `factorise`: `band` (n, width + 1), `x` (n,).
 substitute = _for_any_width(_substitution)
 #: The same for the four derivatives side by side, `x` (n, 4): the inner loop fills a vector register.
 substitute_four = _for_any_width(_substitution_of_four)
-
-
-@inner
-def factorise(band: FloatArray) -> None:
-    """L D L^T in place: band[k, 0] = D, band[k, r] = L[k + r, k]; `band` (n, width + 1)."""
-    if band.shape[1] == 7:
-        _factorise_6(band)
-    elif band.shape[1] == 5:
-        _factorise_4(band)
-    else:
-        _factorise(band)
-
-
-@inner
-def add_diagonal(band: FloatArray, diagonal: FloatArray, first: int) -> None:
-    """Add to the diagonal, mesh shape (nt + 1, nz + 1), before factorising.
-
-    `band` (n, width + 1), `diagonal` (nt + 1, nz + 1) [kg/s/Pa].
-    """
-    nt, nz = diagonal.shape[0] - 1, diagonal.shape[1] - 1
-    for i in range(1, nt):
-        for j in range(first, nz):
-            band[(i - 1) * (nz - first) + j - first, 0] += diagonal[i, j]
 
 
 @inner

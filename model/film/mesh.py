@@ -10,6 +10,13 @@ import numpy as np
 from model.errors import OptionError
 from rigdata.arrays import BoolArray, FloatArray
 
+#: Cp, a and b [m].
+Wedge = tuple[float, float, float]
+#: mu_40, kappa, rho_40, alpha_v.
+OilConstants = tuple[float, float, float, float]
+#: Values at the faces along the arc, (nt, nz + 1), and across, (nt + 1, nz).
+Faces = tuple[FloatArray, FloatArray]
+
 
 class FilmGrid(NamedTuple):
     """Mesh of one film; `nt` intervals along the arc, `nz` across (half width if symmetric)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from model.compilation import inner
 from model.film.cavitation import solve_film_jfo
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import FilmGrid, FilmWork, Wedge
 from model.film.reynolds import FilmForces, solve_film
 
 _JFO, _TURBULENT = range(2)
@@ -17,7 +17,7 @@ def solve_by(
     model: int | None,
     grid: FilmGrid,
     work: FilmWork,
-    wedge: tuple[float, float, float],
+    wedge: Wedge,
     speed: float,
     sharp: bool,
     supplied: float,

@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.film.matrix import add_diagonal, assemble, factorise, substitute
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.matrix import assemble, factorise, substitute
+from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
 from model.film.oil_state import face_height
-from model.film.slopes import derivatives, rupture_line
+from model.film.slopes import derivatives, poiseuille_inflow, rupture_line
 from model.film.turbulence import heat_beyond, resist
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -62,7 +62,7 @@ class FilmForces(NamedTuple):
 def solve_film(
     grid: FilmGrid,
     work: FilmWork,
-    wedge: tuple[float, float, float],
+    wedge: Wedge,
     speed: float,
     sharp: bool,
     turbulent: bool | None = None,
@@ -107,9 +107,8 @@ def solve_film(
     weight = grid.area
     if steps > 0:
         if sharp:
-            diagonal, weight = rupture_line(grid, work, gx, gz, source)
             assemble(work.band, gx, gz, work.ruptured, grid.first)
-            add_diagonal(work.band, diagonal, grid.first)
+            weight = rupture_line(grid, work, (gx, gz), source)
             factorise(work.band)
         derivatives(grid, work, wedge, (gx, gz), powers)
         if turbulent is not None:
@@ -119,7 +118,7 @@ def solve_film(
 
 
 @inner
-def _thickness(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float]) -> float:
+def _thickness(grid: FilmGrid, work: FilmWork, wedge: Wedge) -> float:
     h = work.thickness
     low = np.inf
     for i in range(h.shape[0]):
@@ -131,7 +130,7 @@ def _thickness(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float]
 
 
 @compiled
-def conductances(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float]) -> tuple[FloatArray, FloatArray]:
+def conductances(grid: FilmGrid, work: FilmWork, wedge: Wedge) -> Faces:
     """Rho h^3 / (12 mu) times face length over distance, at the faces along and across.
 
     Gives gx (nt, nz + 1), gz (nt + 1, nz) [kg/s/Pa].
@@ -155,7 +154,7 @@ def conductances(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, floa
 
 
 @inner
-def _source(grid: FilmGrid, work: FilmWork, wedge: tuple[float, float, float], speed: float) -> FloatArray:
+def _source(grid: FilmGrid, work: FilmWork, wedge: Wedge, speed: float) -> FloatArray:
     """Couette inflow minus outflow of each control volume (the right-hand side f of A p = f)."""
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
     source = np.zeros((nt + 1, nz + 1))
@@ -205,10 +204,9 @@ def _update_active_set(
     for i in range(1, nt):
         for j in range(first, nz):
             if ruptured[i, j]:
-                inflow = gx[i - 1, j] * p[i - 1, j] + gx[i, j] * p[i + 1, j] + gz[i, j] * p[i, j + 1]
-                if j > 0:
-                    inflow += gz[i, j - 1] * p[i, j - 1]
-                if source[i, j] + inflow > 0.0:  # more flows in than out: the film reforms here
+                if (
+                    source[i, j] + poiseuille_inflow(p, (gx, gz), i, j) > 0.0
+                ):  # more flows in than out: the film reforms here
                     ruptured[i, j] = False
                     changed += 1
             elif p[i, j] < 0.0:

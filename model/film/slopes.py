@@ -12,7 +12,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.matrix import substitute, substitute_four, substitute_many
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import Faces, FilmGrid, FilmWork, OilConstants, Wedge
 from model.film.oil_state import face_height
 from rigdata.arrays import FloatArray
 
@@ -44,55 +44,52 @@ def keep_ruptured(work: FilmWork, first: int, inflow: FloatArray) -> None:
 
 
 @inner
-def rupture_line(
-    grid: FilmGrid, work: FilmWork, gx: FloatArray, gz: FloatArray, source: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Where between two nodes the film ruptures, as changes of the wet nodes' diagonal and area.
+def poiseuille_inflow(p: FloatArray, conductance: Faces, i: int, j: int) -> float:
+    """What the pressure of its neighbours drives into the control volume of a node without pressure."""
+    gx, gz = conductance
+    inflow = gx[i - 1, j] * p[i - 1, j] + gx[i, j] * p[i + 1, j] + gz[i, j] * p[i, j + 1]
+    if j > 0:
+        inflow += gz[i, j - 1] * p[i, j - 1]
+    return inflow
+
+
+@inner
+def rupture_line(grid: FilmGrid, work: FilmWork, conductance: Faces, source: FloatArray) -> FloatArray:
+    """Where between two nodes the film ruptures, as changes of the wet nodes' diagonal in the matrix and of their area.
 
     A dry node is reached by the share `wet` of the flow that would wet it; the pressure rises as the square of
     the distance from the rupture line, so that the line lies (0.5 + wet) steps from the last wet node. A linear
     profile that vanishes there has (wet - 0.5) / (wet + 0.5) of the wet node's value at the dry node.
 
-    `gx` (nt, nz + 1) [kg/s/Pa], `gz` (nt + 1, nz) [kg/s/Pa], `source` (nt + 1, nz + 1) [kg/s]; gives diagonal (nt + 1,
-    nz + 1) [kg/s/Pa], area (nt + 1, nz + 1) [m^2].
+    `source` (nt + 1, nz + 1) [kg/s]; gives area (nt + 1, nz + 1) [m^2].
     """
-    nt, nz = gx.shape[0], gz.shape[1]
-    p, ruptured = work.pressure, work.ruptured
-    diagonal = np.zeros((nt + 1, nz + 1))
-    area = np.empty((nt + 1, nz + 1))
-    for i in range(nt + 1):
-        for j in range(nz + 1):
-            area[i, j] = grid.area[i, j]
+    gx, ruptured, area = conductance[0], work.ruptured, grid.area.copy()
+    nt, nz = gx.shape[0], gx.shape[1] - 1
     for i in range(1, nt):
         for j in range(grid.first, nz):
             if not ruptured[i, j] or source[i, j] >= 0.0:
                 continue
-            inflow = gx[i - 1, j] * p[i - 1, j] + gx[i, j] * p[i + 1, j] + gz[i, j] * p[i, j + 1]
-            if j > 0:
-                inflow += gz[i, j - 1] * p[i, j - 1]
-            wet = min(1.0, inflow / -source[i, j])
+            wet = min(1.0, poiseuille_inflow(work.pressure, conductance, i, j) / -source[i, j])
             ghost = (wet - 0.5) / (wet + 0.5)
             for side in range(-1, 2, 2):
                 m = i + side
                 if 0 < m < nt and not ruptured[m, j]:
-                    diagonal[m, j] -= (gx[i - 1, j] if side < 0 else gx[i, j]) * ghost
+                    leak = (gx[i - 1, j] if side < 0 else gx[i, j]) * ghost
+                    work.band[(m - 1) * (nz - grid.first) + j - grid.first, 0] -= leak
                     area[m, j] *= 1.0 + 0.5 * (wet - 0.5)
-    return diagonal, area
+    return area
 
 
 @inner
-def derivatives(
-    grid: FilmGrid,
-    work: FilmWork,
-    wedge: tuple[float, float, float],
-    conductance: tuple[FloatArray, FloatArray],
-    powers: tuple[FloatArray, FloatArray] | None,
-) -> None:
-    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; then the mass flows.
+def face_slopes(
+    grid: FilmGrid, work: FilmWork, wedge: Wedge, conductance: Faces, powers: Faces | None
+) -> tuple[FloatArray, FloatArray]:
+    """Change of the flows through the faces by a and b at the present pressure, (nt, nz + 1, 2), (nt + 1, nz, 2).
 
-    Conductances grow with these powers of the film thickness along and across; without them, laminar, with the third.
+    From what the journal drags along, in `work.flow_x`, it also makes the mass flows. Conductances grow with these
+    powers of the film thickness along and across; without them, laminar, with the third.
     """
-    p, rhs, h = work.pressure, work.slopes, work.thickness
+    p, h = work.pressure, work.thickness
     gx, gz = conductance
     nt, nz = gx.shape[0], gz.shape[1]
     along, across = np.empty((nt, nz + 1, 2)), np.empty((nt + 1, nz, 2))
@@ -110,6 +107,14 @@ def derivatives(
             work.flow_z[i, j] = -poiseuille
             slope = -_power(powers, 1, i, j) * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
             across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+    return along, across
+
+
+@inner
+def derivatives(grid: FilmGrid, work: FilmWork, wedge: Wedge, conductance: Faces, powers: Faces | None) -> None:
+    """Derivatives of the pressure by a, b, da/dt, db/dt, into `work.slopes`; and the mass flows, see `face_slopes`."""
+    rhs, nt, nz = work.slopes, work.flow_x.shape[0], work.flow_z.shape[1]
+    along, across = face_slopes(grid, work, wedge, conductance, powers)
     net_inflow(along, across, grid.first, rhs)
     for i in range(1, nt):
         for j in range(grid.first, nz):
@@ -121,14 +126,14 @@ def derivatives(
 
 
 @inner
-def _power(powers: tuple[FloatArray, FloatArray] | None, side: int, i: int, j: int) -> float:
+def _power(powers: Faces | None, side: int, i: int, j: int) -> float:
     if powers is None:
         return 3.0
     return powers[side][i, j]
 
 
 @compiled
-def shape_slopes(grid: FilmGrid, work: FilmWork, conductance: tuple[FloatArray, FloatArray], shapes: Any) -> Any:
+def shape_slopes(grid: FilmGrid, work: FilmWork, conductance: Faces, shapes: Any) -> Any:
     """Derivatives of the pressure by the amplitudes of shapes that are added to the film thickness.
 
     `shapes` (nt + 1, nz + 1, m) [m], real or complex; gives (unknowns, m) [Pa per unit].
@@ -177,9 +182,7 @@ def squeeze_slopes(grid: FilmGrid, work: FilmWork, shapes: Any) -> Any:
 
 
 @inner
-def pressure_change(
-    grid: FilmGrid, work: FilmWork, speed: float, oil: tuple[float, float, float, float], change: FloatArray
-) -> FloatArray:
+def pressure_change(grid: FilmGrid, work: FilmWork, speed: float, oil: OilConstants, change: FloatArray) -> FloatArray:
     """Change of the pressure that the film's new temperature will make, to first order.
 
     `change` (unknowns,) [Pa]; gives (2,) [N].

@@ -28,7 +28,7 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.energy import slope_products
-from model.film.mesh import FilmGrid, FilmWork
+from model.film.mesh import Faces, FilmGrid, FilmWork, Wedge
 from model.film.oil_state import face_height
 from rigdata.arrays import FloatArray
 
@@ -41,10 +41,11 @@ _KARMAN, _SUBLAYER, _POINTS = 0.4, 10.7, 8
 
 
 @compiled
-def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, float]:
+def excess(reynolds: float, law: tuple[float, float]) -> tuple[float, float]:
     """What turbulence adds to a laminar coefficient, factor Re^exponent where it is whole, and d / d ln Re of it."""
     if not reynolds > _TRANSITION[0]:
         return 0.0, 0.0
+    factor, exponent = law
     share = min(1.0, (reynolds - _TRANSITION[0]) / (_TRANSITION[1] - _TRANSITION[0]))
     developed = factor * reynolds**exponent
     comes = share * share * (3.0 - 2.0 * share)
@@ -55,10 +56,10 @@ def excess(reynolds: float, factor: float, exponent: float) -> tuple[float, floa
 @inner
 def still_shares(reynolds: float, cell: tuple[float, float], prandtl: float) -> tuple[float, float]:
     """Mean of mu / (mu + mu_t) over a cell between two heights, as shares of the film, and the same of conductivity."""
-    developed = excess(reynolds, 1.0, 0.0)[0]
+    developed = excess(reynolds, (1.0, 0.0))[0]
     if developed == 0.0:
         return 1.0, 1.0
-    at_wall = math.sqrt(reynolds * (1.0 + excess(reynolds, SHEAR[0], SHEAR[1])[0]))
+    at_wall = math.sqrt(reynolds * (1.0 + excess(reynolds, SHEAR)[0]))
     sheared, warmed = 0.0, 0.0
     for k in range(_POINTS):
         height = cell[0] + (k + 0.5) / _POINTS * (cell[1] - cell[0])
@@ -73,10 +74,10 @@ def still_shares(reynolds: float, cell: tuple[float, float], prandtl: float) -> 
 def resist(
     grid: FilmGrid,
     work: FilmWork,
-    wedge: tuple[float, float, float],
+    wedge: Wedge,
     speed: float,
-    conductance: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
+    conductance: Faces,
+) -> Faces:
     """Lower the conductances by 12 / k; returns with which power of h they grow, 3 - dln k / dln Re."""
     gx, gz = conductance
     px, pz = np.empty(gx.shape), np.empty(gz.shape)
@@ -97,7 +98,7 @@ def resist(
 @inner
 def _resisted(reynolds: float, law: tuple[float, float]) -> tuple[float, float]:
     """Share of the laminar conductance that is left, 12 / k, and the power of h with which it grows."""
-    more, rate = excess(reynolds, law[0], law[1])
+    more, rate = excess(reynolds, law)
     return 12.0 / (12.0 + more), 3.0 - rate / (12.0 + more)
 
 
@@ -108,9 +109,9 @@ def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     for i in range(h.shape[0]):
         for j in range(h.shape[1]):
             reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
-            along, across = excess(reynolds, ALONG[0], ALONG[1])[0], excess(reynolds, ACROSS[0], ACROSS[1])[0]
+            along, across = excess(reynolds, ALONG)[0], excess(reynolds, ACROSS)[0]
             downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
-            shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR[0], SHEAR[1])[0]
+            shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR)[0]
             less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways
             pressed = -(h[i, j] ** 3) / (12.0 * mu[i, j]) * less
             work.gained[i, j] = (shear + pressed) * grid.dx * grid.height[j]
@@ -119,4 +120,4 @@ def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
 def shear_factor(work: FilmWork, speed: float) -> FloatArray:
     """C of the shear on the journal, (nt + 1, nz + 1)."""
     reynolds = work.density * speed * work.thickness / work.viscosity
-    return np.asarray(1.0 + np.vectorize(lambda re: excess(re, *SHEAR)[0])(reynolds))
+    return np.asarray(1.0 + np.vectorize(lambda re: excess(re, SHEAR)[0])(reynolds))

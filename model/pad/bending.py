@@ -4,7 +4,7 @@ A thin film is softer than its pad: followed one step behind, the deformation ov
 shapes in which a pad gives way most therefore take part in the Newton step: with h = ... + sum_m c_m phi_m and the
 pad's answer c = B p, the film's derivatives by c, (a, b) close the loop pad by pad, and leave an effective force and
 stiffness for the journal. What remains, and what heat does, contracts by itself. A pad that tilts along the shaft
-(`model.statics.axial_tilt`) has one shape more, which the film's moment finds.
+(`model.statics.pad_film.axial_shape`) has one shape more, which the film's moment finds.
 
 All deformations are relative to the rigid pad held at its pivot face; tilt and pivot deflection are the equilibrium's
 business. Positive is outward: the film grows thicker by it.

@@ -21,7 +21,7 @@ import numpy as np
 from model.film.cross_energy import cross_operator
 from model.film.cross_film import CrossOperator, cross_pressure_change
 from model.film.cross_march import conduct, face_temperature, march_cross, station_heat
-from model.film.edge_flows import edge_flows
+from model.film.oil_state import edge_flows
 from model.pad.bending import PadDeformation
 from model.statics.compiled.case import BOUNDLESS, HEATING_STEP, Case
 from model.statics.compiled.heat import balance_heat

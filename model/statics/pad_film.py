@@ -10,7 +10,7 @@ import numpy as np
 
 from model.bearing import Oil, Pad
 from model.film.cross_film import CrossFilm, cross_film
-from model.film.mesh import FilmGrid, FilmWork, film_grid, film_works
+from model.film.mesh import FilmGrid, FilmWork, OilConstants, film_grid, film_works
 from model.film.oil_state import Running
 from model.film.resting import RestingFilm
 from model.film.reynolds import FilmForces
@@ -130,11 +130,30 @@ def _grids(
     return grids, stacked_grids(grids)
 
 
+def axial_shape(grid: FilmGrid) -> FloatArray:
+    """What a unit of axial tilt adds to the film thickness, (nt + 1, nz + 1) [m/rad].
+
+    A ball in its socket turns about any axis. Turned by psi (the pad's end at positive z outward) it adds psi z
+    cos(alpha); a shaft that leans by its slope towards a pad takes just as much away there, so that a pad which
+    nothing holds lies as along an aligned shaft. What is left, slope z sin(alpha), the pad would have to follow by
+    turning about the line of its load: the stops that keep it in its place hold that. Its axial tilt is where the
+    film's moment about the pivot, the integral of p z cos(alpha) dA, is what flexure, rolling or friction of the
+    pivot hold.
+    """
+    return np.outer(grid.cos, grid.z)
+
+
+def aligned_tilt(setup: Setup, pivot_angle: float) -> float:
+    """Axial tilt at which a pad lies along the shaft [rad]."""
+    angle, toward = setup.misalignment
+    return angle * math.cos(pivot_angle - toward)
+
+
 def rupture_of(setup: Setup) -> str:
     """Name of the model of films that rupture, see `model.film.models`."""
     return setup.options.cavitation if setup.options.turbulence == "none" else "turbulent"
 
 
-def oil_constants(oil: Oil) -> tuple[float, float, float, float]:
+def oil_constants(oil: Oil) -> OilConstants:
     """What the compiled viscosity and density need: mu_40, kappa, rho_40, alpha_v."""
     return oil.viscosity_40, oil.viscosity_exponent, oil.density_40, oil.thermal_expansion

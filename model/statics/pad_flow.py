@@ -1,4 +1,4 @@
-"""What enters and leaves the film of a pad: flows, side leakage, temperatures."""
+"""What enters and leaves the film of a pad: flows, side leakage, temperatures; what its shear costs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from model.bearing import Oil
-from model.film.edge_flows import edge_flows
 from model.film.mesh import FilmWork
+from model.film.oil_state import edge_flows
+from model.film.turbulence import shear_factor
 from model.statics.pad_film import PadFilm
 from rigdata.arrays import BoolArray, FloatArray
 
@@ -36,7 +37,7 @@ def pad_flow(film: PadFilm, oil: Oil) -> PadFlow:
     return PadFlow(
         entering / float(oil.density(film.inlet)),
         leaving / float(oil.density(outlet)),
-        side_flow(film) / float(oil.density(sides)),
+        (entering - leaving) / float(oil.density(sides)),
         film.inlet,
         outlet,
     )
@@ -71,14 +72,6 @@ def starved(films: Sequence[PadFilm]) -> list[int]:
         if asked > (1.0 + _PLENTY) * film.supplied * length:
             short.append(film.number)
     return short
-
-
-def side_flow(film: PadFilm) -> float:
-    """What leaves over both sides [kg/s]."""
-    if film.forces is None:
-        return 0.0 if film.resting is not None else math.nan
-    sides: float = edge_flows(film.grid, film.work, _limit(film))[1]
-    return sides
 
 
 def _side_temperature(film: PadFilm) -> float:
@@ -118,3 +111,30 @@ def striation(work: FilmWork) -> FloatArray:
             behind = share[i - 1] * np.minimum(1.0, h[i - 1] / h[i])
             share[i] = np.where(ruptured[i], behind, 1.0)
     return share
+
+
+def power_loss(films: Sequence[PadFilm], surface_speed: float, turbulent: bool = False) -> float:
+    """Work the journal does on all films [W]: wall shear mu U / h + h/2 dp/dx, times U, over the full film.
+
+    Where the film is ruptured only its striated share shears; that share is h_rupture / h, taken from the film
+    thickness at the line's rupture. NaN where a film is lost.
+    """
+    total = 0.0
+    for film in films:
+        if film.idle:
+            total += film.resting.power if film.resting is not None else 0.0
+            continue
+        work, grid = film.work, film.grid
+        if not work.thickness.min() > 0:  # a lost film, of a prediction that did not converge
+            return math.nan
+        shearing = work.viscosity if film.cross is None else film.cross.shear
+        couette = shearing * surface_speed**2 / work.thickness
+        if turbulent and film.cross is None:
+            couette = couette * shear_factor(work, surface_speed)
+        total += float((grid.area * couette * striation(work)).sum())
+        slope = (work.pressure[1:] - work.pressure[:-1]) / grid.dx
+        dragged = work.thickness * work.drag
+        middle = 0.5 * (dragged[1:] + dragged[:-1])
+        weight = 0.5 * (grid.area[1:] + grid.area[:-1])
+        total += float((0.5 * surface_speed * middle * slope * weight).sum())
+    return total

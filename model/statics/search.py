@@ -21,7 +21,6 @@ from model.pad.bending import SHAPES
 from model.pad.pivot import OTHER
 from model.pivots import ask_laws, encoded
 from model.setup import Setup
-from model.statics.axial_tilt import aligned_tilt, axial_shape
 from model.statics.compiled.case import ALONE, COUPLED, ISOTHERMAL, Problem
 from model.statics.compiled.iteration import (
     ASKS_HEAT,
@@ -42,13 +41,13 @@ from model.statics.compiled.iteration import (
     iterate,
     vector_size,
 )
-from model.statics.compiled.place import is_doubtful, is_stable, let_idle, rescue
+from model.statics.compiled.place import is_doubtful, is_stable, let_idle, place, rescue
 from model.statics.compiled.stack import BACKFLOW, GROWN, JOURNAL, PadStack, PadState
 from model.statics.compiled.start import first_position, pivot_curve
 from model.statics.conditions import status_of
 from model.statics.cross_heat import settle_cross_temperatures
 from model.statics.equilibrium import Begun, Equilibrium
-from model.statics.pad_film import pad_films
+from model.statics.pad_film import aligned_tilt, axial_shape, pad_films
 from model.statics.pad_flow import through_flow
 from model.statics.physics import bodies_of, case_of, couples_heat
 from rigdata.arrays import BoolArray, FloatArray
@@ -191,17 +190,14 @@ class Search:
     def load_pads(self, loaded: BoolArray) -> None:
         """Put pads on their loaded attitudes for the journal's position, their films as warm as they are there."""
         pads, state = self.pads, self.state
-        reach, sideways = pads.preload + pads.frame[:, 0] @ state.position, pads.frame[:, 1] @ state.position
-        state.idle[loaded] = self.works.ruptured[loaded] = False
+        reach = pads.preload + pads.frame[:, 0] @ state.position
         for m in np.flatnonzero(loaded).tolist():
-            curve = pads.attitudes[m, :, : pads.rows[m]]
-            at = max(reach[m], curve[0, 0])  # at its fold where it has none there
-            state.deflection[m] = at - np.interp(at, curve[0], curve[1])
-            state.tilt[m] = (np.interp(at, curve[0], curve[2]) - sideways[m]) / pads.pivot_radius[m]
+            place(pads, self.works, state, m)
             if self.case.thermal == ISOTHERMAL:
                 continue
+            curve = pads.attitudes[m, 0, : pads.rows[m]]
             (low, rises), film, temperature = self.rises[m], self.films[m], self.works.temperature[m]
-            point = np.interp(at, curve[0], np.arange(curve.shape[1]))
+            point = np.interp(reach[m], curve, np.arange(len(curve)))
             if np.isnan(point):  # a search that has run away: its status says so
                 continue
             row = min(int((low + point) / BETWEEN), len(rises) - 2)

@@ -17,7 +17,7 @@ from model.pad.bending import force_weights
 from model.predict import predict, predict_setup
 from model.prediction import Prediction
 from model.setup import Mesh
-from model.statics.axial_tilt import axial_shape
+from model.statics.pad_film import axial_shape
 
 DOWN, SPEED, ANGLE = -math.pi / 2, 2 * math.pi * 22, 6e-4
 FOLLOWING = Options(axial_tilt=True)

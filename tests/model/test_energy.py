@@ -69,8 +69,9 @@ def test_heat_made_leaves_with_the_oil():
         grid, work, temperature = full_film((40 * scale, 4 * scale))
         made = heat_made(grid, work)
         errors.append(abs(enthalpy_out(grid, work, temperature) / made - 1.0))
-        stations, less = np.empty_like(work.pressure), np.empty_like(work.pressure)
-        dissipate(grid, work, SURFACE, stations, less)
+        sheared, pressed = np.empty_like(work.pressure), np.empty_like(work.pressure)
+        dissipate(grid, work, SURFACE, sheared, pressed)
+        stations = sheared + pressed
         stations[[0, -1]] *= 0.5  # half stations at both ends
         assert enthalpy_out(grid, work, temperature) == pytest.approx(stations.sum(), rel=2e-5)
     assert errors[1] < 1e-3

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from model.bearing import Bearing, Oil, Pad, Pivot
+from model.film.dense import DEPTH, mixed
 from model.measured_pivot import FormulaPivot, MeasuredPivot
 from model.pad.pivot import OTHER, compliance, deflection
 from model.pivots import RIGID_PIVOT, ScaledPivot, ask_laws, constant_pivot, encoded, formula_pivot
 from model.predict import predict
-from model.statics.compiled.anderson import DEPTH, mixed
 
 CURVE = MeasuredPivot(np.array([0.0, 500.0, 2000.0, 6000.0]), np.array([0.0, 2e-6, 5e-6, 1e-5]))
 

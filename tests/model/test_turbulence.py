@@ -45,14 +45,14 @@ def test_constants_are_the_published_ones():
 
 
 def test_turbulence_comes_in_between_500_and_1000():
-    assert excess(499.0, *ALONG) == (0.0, 0.0)
+    assert excess(499.0, ALONG) == (0.0, 0.0)
     for reynolds in (1000.0, 5e4):
-        more, rate = excess(reynolds, *ALONG)
+        more, rate = excess(reynolds, ALONG)
         assert more == pytest.approx(0.0136 * reynolds**0.9, rel=1e-12)
         assert rate == pytest.approx(0.9 * more, rel=1e-12)
     for reynolds in (600.0, 750.0, 990.0, 3000.0):  # the slope by ln Re is one
-        ends = [excess(reynolds * math.exp(step), *ALONG)[0] for step in (1e-5, -1e-5)]
-        assert excess(reynolds, *ALONG)[1] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-5)
+        ends = [excess(reynolds * math.exp(step), ALONG)[0] for step in (1e-5, -1e-5)]
+        assert excess(reynolds, ALONG)[1] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-5)
 
 
 def test_thick_oil_is_laminar(rocker):

@@ -51,40 +51,38 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
     n, load = len(state.tilt), case.load
     size = max(math.hypot(load[0], load[1]), 1.0)
     worst = 0.0
-    missing = load.copy()
-    jacobian = np.zeros((2, 2))
-    jacobian[0, 0] = jacobian[1, 1] = 1.0  # N/m: a pad that only touches leaves a direction free
-    state.moves[:] = 0.0
-    by_shift, shift = np.zeros((n, 2, 2)), np.empty(2)
+    system = np.zeros((2, 3))  #: Per metre of the journal's move along x and y: force; and the load that is missing.
+    system[0, 0] = system[1, 1] = 1.0  # N/m: a pad that only touches leaves a direction free
+    system[:, 2] = load
+    follow = np.zeros((n, 2, 3))  # of tilt and deflection by the same, and by themselves
     for m in range(n):
         if not state.solved[m]:
             continue
         frame, pad = pads.frame[m], _equations(case, pads, state, m)
         k, arm = pad.stiffness, pad.radius
-        # with the journal at rest: what the pad does by itself
-        tilt, give = _pad_moves(pad, -pad.moment, pad.missing)
-        state.moves[m, 0], state.moves[m, 1] = tilt, give
-        radial, tangential = _force_change(k, -give, arm * tilt)
-        radial, tangential = radial + pad.force[0], tangential + pad.force[1]
-        for i in range(2):
-            missing[i] -= frame[0, i] * radial + frame[1, i] * tangential
-        # per metre of the journal's move: the film changes by it, and by how the pad follows
-        for axis in range(2):
-            da, db = frame[0, axis], frame[1, axis]
+        for column in range(3):
+            # the film changes by the journal's move, and by how the pad follows; the last is the pad by itself
+            da, db = (frame[0, column], frame[1, column]) if column < 2 else (0.0, 0.0)
             radial, tangential = _force_change(k, da, db)
-            tilt, give = _pad_moves(pad, -(tangential + pad.hold[1] * radial), pad.compliance * radial)
-            by_shift[m, 0, axis], by_shift[m, 1, axis] = tilt, give
+            moment, give = -(tangential + pad.hold[1] * radial), pad.compliance * radial
+            if column == 2:
+                moment, give = -pad.moment, pad.missing
+            tilt, give = _pad_moves(pad, moment, give)
+            follow[m, 0, column], follow[m, 1, column] = tilt, give
             radial, tangential = _force_change(k, da - give, db + arm * tilt)
+            if column == 2:
+                radial, tangential = -radial - pad.force[0], -tangential - pad.force[1]
             for i in range(2):
-                jacobian[i, axis] += frame[0, i] * radial + frame[1, i] * tangential
+                system[i, column] += frame[0, i] * radial + frame[1, i] * tangential
         worst = max(worst, max(abs(pad.moment), abs(pad.missing * k[0, 0])) / size)
-    worst = max(worst, math.hypot(missing[0], missing[1]) / size)
-    determinant = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
-    shift[0] = (missing[0] * jacobian[1, 1] - jacobian[0, 1] * missing[1]) / determinant
-    shift[1] = (jacobian[0, 0] * missing[1] - jacobian[1, 0] * missing[0]) / determinant
+    worst = max(worst, math.hypot(system[0, 2], system[1, 2]) / size)
+    determinant = system[0, 0] * system[1, 1] - system[0, 1] * system[1, 0]
+    shift = np.empty(2)
+    shift[0] = (system[0, 2] * system[1, 1] - system[0, 1] * system[1, 2]) / determinant
+    shift[1] = (system[0, 0] * system[1, 2] - system[1, 0] * system[0, 2]) / determinant
     for m in range(n):
         for q in range(2):
-            state.moves[m, q] += by_shift[m, q, 0] * shift[0] + by_shift[m, q, 1] * shift[1]
+            state.moves[m, q] = follow[m, q, 2] + follow[m, q, 0] * shift[0] + follow[m, q, 1] * shift[1]
         if case.hold.slip > 0.0 and state.tilt[m] * (state.tilt[m] + state.moves[m, 0]) < 0.0:
             state.moves[m, 0] = -state.tilt[m]  # the friction turns round there
     return worst, shift

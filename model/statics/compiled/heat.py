@@ -22,9 +22,9 @@ import numpy as np
 
 from model.compilation import compiled, inner
 from model.film.dense import nearest, product, solve
-from model.film.edge_flows import edge_flows
 from model.film.energy import between, heat_sources, heat_step, march, warm
 from model.film.mesh import FilmGrid, FilmWork
+from model.film.oil_state import edge_flows
 from model.film.resting import resting_film
 from model.interpolation import largest
 from model.statics.compiled.case import BOUNDLESS, HEAT_PER_FORCE, HEATING_STEP, Problem, rigid_approach

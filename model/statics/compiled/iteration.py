@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from model.compilation import compiled, inner
-from model.statics.compiled.anderson import DEPTH, mixed
+from model.film.dense import DEPTH, mixed
 from model.statics.compiled.case import ACROSS, ALONE, BOUNDLESS, COUPLED, HEAT_PER_FORCE, ISOTHERMAL, Case, Problem
 from model.statics.compiled.elimination import newton
 from model.statics.compiled.heat import exchange_heat, heat_films

@@ -9,6 +9,7 @@ pads counts.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -18,7 +19,7 @@ from model.interpolation import least, row_below
 from model.pad.pivot import deflection
 from model.statics.compiled.case import rigid_approach
 from model.statics.compiled.stack import PadStack
-from rigdata.arrays import BoolArray, FloatArray, IntArray
+from rigdata.arrays import BoolArray, FloatArray
 
 #: Share of the clearance over which a curve falls to 1/e beyond its fold.
 _TAIL = 2e-3
@@ -63,68 +64,35 @@ def pivot_curve(
     return count - low
 
 
-@compiled
 def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolArray, BoolArray]:
     """Journal (2,) [m], which pads carry there, and which do in another equilibrium (none: there is no other).
 
     `load` (2,) [N].
     """
-    n = len(pads.rows)
     loaded = pads.rows >= 2
-    position = np.zeros(2)
-    _stand(load, pads, loaded, position)
-    doubtful, count = np.empty(n, dtype=np.int64), 0
-    size = math.hypot(load[0], load[1])
-    for m in range(n):
-        beyond = pads.attitudes[m, 0, 0] - rigid_approach(pads, position, m)
-        if loaded[m] and beyond > 0.0:
-            loaded[m] = False
-            if _pushes(pads, m, position)[0] > _NOTHING * size and count < _MOST_DOUBTFUL:
-                doubtful[count] = m
-                count += 1
-    other = np.zeros(n, dtype=np.bool_)
-    if count > 0:
-        position, loaded, other = _most_loaded(load, pads, (loaded, doubtful[:count], position))
-    return position, loaded, other
+    position, other = np.zeros(2), np.zeros(len(loaded), dtype=np.bool_)
+    stand_on_curves(load, pads, loaded, position)
+    beyond = _beyond(pads, position)
+    push = pads.attitudes[:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads.clearance), 0.0, 60.0))
+    certain = loaded & ~(beyond > 0.0)
+    doubtful = np.flatnonzero(loaded & ~certain & (push > _NOTHING * math.hypot(*load)))[:_MOST_DOUBTFUL]
+    for size in range(len(doubtful), -1 if len(doubtful) else 0, -1):
+        found = []
+        for chosen in itertools.combinations(doubtful, size):  # of alike sets the one that idles the last pads first
+            mask, place = certain.copy(), position.copy()
+            mask[list(chosen)] = True
+            good = stand_on_curves(load, pads, mask, place)
+            if good and not (_beyond(pads, place) > _FOLD * pads.clearance)[mask].any():
+                found.append((place, mask))
+        if found:
+            return *found[0], found[1][1] if len(found) > 1 else other
+    return position, certain, other
 
 
-@inner
-def _most_loaded(
-    load: FloatArray, pads: PadStack, found: tuple[BoolArray, IntArray, FloatArray]
-) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Of pads near their folds, those that carry: the set with the most of them in which all are above their folds."""
-    certain, doubtful, start = found
-    count = len(doubtful)
-    best, answer, chosen, other = -1, start.copy(), certain.copy(), np.zeros(len(certain), dtype=np.bool_)
-    for size in range(count, -1, -1):
-        for code in range(2**count):
-            # the first pads count highest, so that of alike sets that one comes first which idles the last pads
-            number = 2**count - 1 - code
-            if _bits(number) != size:
-                continue
-            mask, position = certain.copy(), start.copy()
-            for k in range(count):
-                mask[doubtful[k]] = number // 2 ** (count - 1 - k) % 2 == 1
-            good = _stand(load, pads, mask, position)
-            for m in range(len(mask)):
-                if mask[m] and rigid_approach(pads, position, m) < pads.attitudes[m, 0, 0] - _FOLD * pads.clearance[m]:
-                    good = False
-            if good and best < 0:
-                best, answer, chosen = size, position, mask
-            elif good and best == size:
-                return answer, chosen, mask
-        if best >= 0:
-            return answer, chosen, other
-    return answer, chosen, other
-
-
-@inner
-def _bits(number: int) -> int:
-    count = 0
-    while number > 0:
-        count += number % 2
-        number //= 2
-    return count
+def _beyond(pads: PadStack, position: FloatArray) -> FloatArray:
+    """How far pads stand beyond their folds at a position, (n,) [m]."""
+    reach = pads.preload + pads.frame[:, 0] @ position
+    return np.asarray(pads.attitudes[:, 0, 0] - reach)
 
 
 @inner
@@ -157,8 +125,8 @@ def _missing(
     return fx, fy
 
 
-@inner
-def _stand(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray) -> bool:
+@compiled
+def stand_on_curves(load: FloatArray, pads: PadStack, loaded: BoolArray, position: FloatArray) -> bool:
     """Move the journal to where a set of pads carries the load, by Newton's steps down the energy; False if nowhere."""
     room, stiff, largest = math.inf, 0.0, 0.0
     for m in range(len(loaded)):
