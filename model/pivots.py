@@ -129,10 +129,13 @@ def _encoded(laws: tuple[PivotLaw, ...]) -> tuple[FloatArray, FloatArray]:
         while type(law) is ScaledPivot:
             factor, law = factor * law.stiffness_factor, law.law
         # a law derived from one that compiled searches know may deflect otherwise
-        known = type(law) in (FormulaPivot, MeasuredPivot)
-        row[:] = law.numbers if known else (OTHER, 0.0, 0.0, 1.0)
-        row[3] = factor if known else 1.0
-        curves.append(law.curve if known else np.zeros((5, 1)))
+        if isinstance(law, (FormulaPivot, MeasuredPivot)) and type(law) in (FormulaPivot, MeasuredPivot):
+            row[:] = law.numbers
+            row[3] = factor
+            curves.append(law.curve)
+        else:
+            row[:] = OTHER, 0.0, 0.0, 1.0
+            curves.append(np.zeros((5, 1)))
     table = np.zeros((len(laws), 5, max(c.shape[1] for c in curves)))
     for padded, curve in zip(table, curves, strict=True):
         padded[:, : curve.shape[1]] = curve

@@ -121,7 +121,7 @@ class Prediction:
 
     def _repr_html_(self) -> str:
         """Coefficients over the excitation frequency, for a notebook."""
-        return f"<p>{self}</p>{self._scaled().to_html(index=False, float_format='%.4g')}"
+        return f"<p>{self}</p>{self._scaled().to_html(index=False, float_format='{:.4g}'.format)}"
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per excitation frequency: point, K, C, position, conditions; SI, names as in prediction.csv."""

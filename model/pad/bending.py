@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -85,9 +86,7 @@ def _pad_deformation(geometry: PadGeometry, angles: bytes, zs: bytes, areas: byt
     )
 
 
-def film_maps(
-    face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def film_maps(face: tuple[Line, Line], film: tuple[Line, Line], even: bool | None) -> tuple[Any, Any, Any]:
     """Gather, project and coarse on raveled fields: (face, film), (film, face), (coarse, film).
 
     The film's pressure is bilinear on its grid, the pad's displacement quadratic on its elements. Loads are integrals
@@ -103,7 +102,7 @@ def film_maps(
     return gather, project, coarse
 
 
-def _axis_maps(face: Line, film: Line, even: bool | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any]:
     """Maps of two bases on the same interval, or of one on 0 <= z <= L/2 and a film's even or odd part on -L/2..L/2."""
     merged = np.unique(np.concatenate((face.breaks, film.breaks if even is None else np.abs(film.breaks))))
     distinct = np.concatenate(([True], np.diff(merged) > 1e-12 * (merged[-1] - merged[0])))

@@ -273,7 +273,8 @@ def pad_operators(
 
     `cooled`: interpolated between a few convections, so that the first time costs more and every other nothing.
     """
-    convections, weights = (geometry.back_convection,), np.ones(1)
+    convections: tuple[float, ...] = (geometry.back_convection,)
+    weights = np.ones(1)
     if cooled and geometry.back_convection <= LARGEST:
         convections, weights = _between(geometry)
     at = operators_at(replace(geometry, back_convection=0.0), density, even, convections)

@@ -76,11 +76,12 @@ def settle_cross_temperatures(
         if m in answers:
             weights = np.array([1.0, inlet, journal])
             state.heating[m] = _warm(films[m], answers[m], weights, limits)
-            more = cross_pressure_change(
-                films[m].grid, films[m].work, films[m].cross, case.running.speed, case.running.oil, state.shift[m]
-            )
+            film, running = films[m], case.running
+            assert film.cross is not None
+            shift = state.shift[m]
+            more = cross_pressure_change(film.grid, film.work, film.cross, running.speed, running.oil, shift)
             state.corrected[m] = state.force[m] + more
-        change = float(np.maximum(change, max(abs(hotter), state.heating[m])))  # a NaN is not to be lost
+        change = float(np.max([change, abs(hotter), state.heating[m]]))  # a NaN is not to be lost
     state.figures[JOURNAL] = journal
     return change
 
