@@ -206,6 +206,22 @@ class EffectKind:
         return out
 
 
+def effect_on(
+    side: Side,
+    *parameters: Parameter,
+    source: str,
+    per_pad: Parameter | None = None,
+    obstacle: Callable[[Bearing], str] | None = None,
+    **words: str,
+) -> Callable[[Callable[..., Setup]], EffectKind]:
+    """Make a function an `EffectKind` of its name; `words` are those of `EffectWords`."""
+
+    def kind(apply: Callable[..., Setup]) -> EffectKind:
+        return EffectKind(apply.__name__, side, parameters, apply, source, per_pad, obstacle, EffectWords(**words))
+
+    return kind
+
+
 def _number(value: Any, parameter: Parameter, place: str) -> float:
     if isinstance(value, str):
         try:

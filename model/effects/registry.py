@@ -1,54 +1,32 @@
-"""Which effects there are: those of `effects.toml`, and those that a user registers."""
+"""Which effects there are: those of the files beside this one, and those that a user registers."""
 
 from __future__ import annotations
 
 import functools
+import importlib
 import importlib.util
-import tomllib
-from collections.abc import Callable
+import pkgutil
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from types import ModuleType
 
-from model.bearing import Bearing
-from model.effects import bundled
-from model.effects.kind import DIRECTION, PAD, EffectError, EffectKind, EffectWords, Parameter
+from model.effects.kind import EffectError, EffectKind
 from rigdata.near_names import hint
 
 _registered: dict[str, EffectKind] = {}
-#: Parameters that rows of the table name.
-_SHARED = {"pad": PAD, "direction": DIRECTION}
 
 
 @functools.cache
 def _bundled() -> dict[str, EffectKind]:
-    rows = tomllib.loads(Path(__file__).with_name("effects.toml").read_text(encoding="utf-8"))
-    return {name: _kind(name, rows[name]) for name in sorted(rows)}
+    kinds: dict[str, EffectKind] = {}
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        for kind in _defined(importlib.import_module(f"model.effects.{module.name}")):
+            kinds[kind.name] = kind
+    return dict(sorted(kinds.items()))
 
 
-def _kind(name: str, row: dict[str, Any]) -> EffectKind:
-    """An effect of its row in `effects.toml` and its function in `model.effects.bundled`."""
-    words = EffectWords(row["finding"], row["physics"], row["on_the_rig"], row["check"])
-    parameters = [_SHARED[p] if isinstance(p, str) else _parameter(p) for p in row.get("parameters", ())]
-    per_pad = _parameter(row["per_pad"]) if "per_pad" in row else None
-    obstacle = _only_on(row["pivots"], row["otherwise"]) if "pivots" in row else None
-    apply = getattr(bundled, name)
-    return EffectKind(name, row["side"], tuple(parameters), apply, row["source"], per_pad, obstacle, words)
-
-
-def _parameter(row: dict[str, Any]) -> Parameter:
-    return Parameter(**row | {"options": tuple(row.get("options", ()))})
-
-
-def _only_on(kinds: list[str], otherwise: str) -> Callable[[Bearing], str]:
-    """Which pivots have what an effect acts on: rockers roll, spheres slide, knife edges only tilt."""
-
-    def obstacle(bearing: Bearing) -> str:
-        if not bearing.like_pivots:
-            return "its pivots differ from pad to pad, and the model holds the tilt of all pads alike."
-        return "" if bearing.pivot.kind in kinds else otherwise
-
-    return obstacle
+def _defined(module: ModuleType) -> tuple[EffectKind, ...]:
+    return tuple(dict.fromkeys(v for v in vars(module).values() if isinstance(v, EffectKind)))
 
 
 def known_effects() -> dict[str, EffectKind]:
@@ -106,8 +84,7 @@ def load_library(path: str | Path) -> tuple[EffectKind, ...]:
         spec.loader.exec_module(module)
     except Exception as error:
         raise EffectError(f"{path}: fails with {type(error).__name__}: {error}. Mend it.") from error
-    defined = dict.fromkeys(v for v in vars(module).values() if isinstance(v, EffectKind))
-    kinds = tuple(k for k in defined if known_effects().get(k.name) is not k)
+    kinds = tuple(k for k in _defined(module) if known_effects().get(k.name) is not k)
     if not kinds:
         raise EffectError(f"{path}: defines no effect. Make an EffectKind with a name of its own.")
     return tuple(register(kind) for kind in kinds)
