@@ -30,7 +30,8 @@ from model.effects import Effect, apply_effects
 from model.pivots import pivot_laws
 from model.predict import predict
 from model.setup import Setup
-from model.static_tests import locus, polygon_sides
+from model.static_tests import polygon_sides
+from tests.rigs.sweeps import sweep
 from tests.studies.results import table, write_section
 
 FloatArray = NDArray[np.float64]
@@ -102,9 +103,13 @@ def growth(table: FloatArray) -> FloatArray:
 @functools.cache
 def locus_sizes() -> tuple[float, float]:
     """Mean distance of the locus from the bearing centre with Kirk's and the measured pivots, rocker, 5 kN [m]."""
-    directions = np.linspace(-math.pi, math.pi, 20, endpoint=False)
-    kirks, softs = (locus(setup("rocker", s), 5000.0, directions, 2 * math.pi * 20.0) for s in (False, True))
-    return float(np.hypot(*kirks.T).mean()), float(np.hypot(*softs.T).mean())
+    directions = np.linspace(-math.pi, math.pi, 20, endpoint=False).tolist()
+    points = [(5000.0, direction, 2 * math.pi * 20.0, np.array([EXCITATION])) for direction in directions]
+    sizes = []
+    for soft in (False, True):
+        positions = np.array([p.position for p in sweep(setup("rocker", soft), points)])
+        sizes.append(float(np.hypot(*positions.T).mean()))
+    return sizes[0], sizes[1]
 
 
 def give(name: str, soft: bool, load: float, pad: int = 1) -> float:
@@ -128,7 +133,7 @@ def pivot_claims() -> list[Claim]:
     ball = [w / give("spherical", False, w) / 1e9 for w in (1000.0, 8000.0)]
     wider = {}
     for push in (200.0, 600.0):
-        sides = [polygon_sides(setup(n, True), push).pushed for n in ("rocker", "spherical")]
+        sides = [polygon_sides(setup(n, True), push)[0] for n in ("rocker", "spherical")]
         wider[push] = float((sides[1] - sides[0]).mean())
     small, large = locus_sizes()
     return [

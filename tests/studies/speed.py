@@ -29,7 +29,6 @@ from model.bearing_file import load_bearing
 from model.pivots import pivot_laws
 from model.predict import predict_setup
 from model.setup import Setup
-from model.static_tests import locus, sweep
 
 bearing = load_bearing("model/bearings/rocker.toml")
 down, speed, lines = -math.pi / 2, 138.23, 2 * math.pi * np.array([10.0, 20.0, 25.0, 40.0, 50.0])
@@ -51,10 +50,19 @@ def new_geometry():
     predict_setup(setup_of(bearing=other), 5000.0, down, speed, lines)
 
 
+def sweep(setup, points, lines):
+    start = None
+    for load, direction in points:
+        start = predict_setup(setup, load, direction, speed, lines, start).equilibrium
+
+
 def loads():
     for pivots in ("rigid", "kirk", 5e8):
-        points = [(float(w), down, speed, lines) for w in np.linspace(2500.0, 8750.0, 6)]
-        sweep(setup_of(pivots=pivots), points)
+        sweep(setup_of(pivots=pivots), [(load, down) for load in np.linspace(2500.0, 8750.0, 6).tolist()], lines)
+
+
+def locus():
+    sweep(setup_of(), [(5000.0, direction) for direction in np.linspace(-3.0, 3.0, 20).tolist()], np.array([speed]))
 
 
 actions = {
@@ -64,7 +72,7 @@ actions = {
 actions["point, adiabatic, carry-over 0.8, 5 frequencies"] = carrying_over
 actions["first point of a new geometry, adiabatic"] = new_geometry
 actions["adiabatic, 6 loads x 5 frequencies x 3 pivots"] = loads
-actions["adiabatic, locus of 20 directions"] = lambda: locus(setup_of(), 5000.0, np.linspace(-3.0, 3.0, 20), speed)
+actions["adiabatic, locus of 20 directions"] = locus
 if "first" in sys.argv:
     actions = {"point, adiabatic": actions["point, adiabatic, 5 frequencies"]}
 times = {}
