@@ -204,8 +204,8 @@ def pad_matrices(setup: Setup, films: Sequence[PadFilm]) -> list[PadMatrices]:
                 stiffness=moments.T @ film.forces.stiffness @ frame,
                 damping=moments.T @ film.forces.damping @ frame,
                 pad_mass=np.array([[pad.moment_of_inertia, coupling], [coupling, pad.mass]]),
-                pad_damping=np.diag([0.0, setup.pivot_damping]),
-                pad_stiffness=np.diag([hold.stiffness + friction[0], pivot]),
+                pad_damping=np.array([[0.0, 0.0], [0.0, setup.pivot_damping]]),
+                pad_stiffness=np.array([[hold.stiffness + friction[0], 0.0], [0.0, pivot]]),
                 friction=friction,
             )
         )
@@ -262,9 +262,12 @@ def _impedances(
         z = z + np.array(added)
     stiffness = np.array([p.pad_stiffness for p in pads])
     rigid = np.isinf(stiffness[:, 1, 1])
-    z[rigid, :, 3], z[rigid, :, :, 3], stiffness[rigid, 1, 1] = 0.0, 0.0, 1.0
-    mass, damping = np.array([p.pad_mass for p in pads]), np.array([p.pad_damping for p in pads])
-    mass[rigid, 1], mass[rigid, :, 1], damping[rigid, 1] = 0.0, 0.0, 0.0
+    mass = np.array([p.pad_mass for p in pads])
+    damping = np.array([p.pad_damping for p in pads])
+    if rigid.any():
+        z[rigid, :, 3] = z[rigid, :, :, 3] = 0.0
+        mass[rigid, 1] = mass[rigid, :, 1] = 0.0
+        stiffness[rigid, 1, 1], damping[rigid, 1] = 1.0, 0.0
     pivot = stiffness[:, None] - s**2 * mass[:, None] + 1j * s * damping[:, None]
     return z, z[..., 2:, 2:] + pivot
 

@@ -73,8 +73,10 @@ def first_position(load: FloatArray, pads: PadStack) -> tuple[FloatArray, BoolAr
     position, other = np.zeros(2), np.zeros(len(loaded), dtype=np.bool_)
     stand_on_curves(load, pads, loaded, position)
     beyond = _beyond(pads, position)
-    push = pads.attitudes[:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads.clearance), 0.0, 60.0))
     certain = loaded & ~(beyond > 0.0)
+    if not (loaded & ~certain).any():
+        return position, loaded, other
+    push = pads.attitudes[:, 3, 0] * np.exp(-np.clip(beyond / (_TAIL * pads.clearance), 0.0, 60.0))
     doubtful = np.flatnonzero(loaded & ~certain & (push > _NOTHING * math.hypot(*load)))[:_MOST_DOUBTFUL]
     for size in range(len(doubtful), -1 if len(doubtful) else 0, -1):
         found = []
