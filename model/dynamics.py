@@ -71,7 +71,8 @@ def flexing_impedance(
     still, moving = film.work.slopes[:, :2], film.work.slopes[:, 2:4]
     if axial is not None:
         more = bend.slopes(axial.shape[:, :, None])
-        still, moving = np.hstack([still, more[0]]), np.hstack([moving, more[1]])
+        still = np.hstack([still, more[0]])
+        moving = np.hstack([moving, more[1]])
     out = np.empty((len(omega), 2, 2), dtype=np.complex128)
     for k, w in enumerate(omega.tolist()):
         rigid = still + 1j * w * moving
@@ -109,7 +110,8 @@ class _Bend:
         assert body is not None
         still, moving = self._softest
         closed = np.eye(len(body.response)) - factor * (body.response @ (still + 1j * omega * moving))
-        pressure, bent = rigid, np.zeros((*self.film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
+        pressure = rigid
+        bent = np.zeros((*self.film.work.pressure.shape, rigid.shape[1]), dtype=np.complex128)
         for _ in range(_MOST_TURNS):
             wanted = factor * (body.compliance @ _everywhere(self.film, pressure))
             missing = wanted - bent.reshape(wanted.shape)
@@ -161,7 +163,8 @@ def friction_impedance(pad_impedance: ComplexArray, drive: FloatArray, stick: An
     for _ in range(_HALVINGS):
         middle = np.sqrt(low * high)
         short = np.abs(pad_impedance + describing(middle, stick, slip)) * middle < drive
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
+        low = np.where(short, middle, low)
+        high = np.where(short, high, middle)
     return np.where(held, stick + 0.0j, describing(high, stick, slip))
 
 
@@ -307,7 +310,9 @@ def _following_shape(setup: Setup, equilibrium: Equilibrium, film: PadFilm, omeg
 def _axial_tilt(setup: Setup, film: PadFilm) -> AxialTilt:
     """A pad's freedom to tilt along the shaft, a sector of a ring about the axis across it through its pivot."""
     assert film.forces is not None
-    pad, grid, shape = film.pad, film.grid, axial_shape(film.grid)
+    pad = film.pad
+    grid = film.grid
+    shape = axial_shape(film.grid)
     hold = tilt_hold(setup, film.axial_tilt, float(film.forces.force[0]))
     weights = (grid.area * (shape - hold.arm * grid.cos[:, None]))[1:-1, grid.first : -1].ravel()
     inner, outer = _radii(setup, film)

@@ -73,7 +73,8 @@ class MeasuredPivot(_Law):
     curve: FloatArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        load, points = np.asarray(self.load, float), np.asarray(self.deflection_points, float)
+        load = np.asarray(self.load, float)
+        points = np.asarray(self.deflection_points, float)
         if load.ndim != 1 or load.shape != points.shape or len(load) < 2:
             raise _PivotCurveError(f"load and deflection must be 1-D and alike, got {load.shape} and {points.shape}")
         if not (np.all(np.isfinite(load)) and np.all(np.isfinite(points))):
@@ -85,7 +86,8 @@ class MeasuredPivot(_Law):
         if not np.all((slopes > 1e-100) & (slopes < 1e100)):
             raise _PivotCurveError("a pivot curve must have slopes that are numbers")
         if load[0] != 0.0 or points[0] != 0.0:
-            load, points = np.concatenate([[0.0], load]), np.concatenate([[0.0], points])
+            load = np.concatenate([[0.0], load])
+            points = np.concatenate([[0.0], points])
             if load[1] <= 0 or points[1] <= 0:
                 raise _PivotCurveError("a pivot curve must start at or above zero load and deflection")
         object.__setattr__(self, "load", load)

@@ -147,7 +147,8 @@ def ask_laws(laws: Sequence[PivotLaw], rows: FloatArray, loads: FloatArray) -> N
     for law, row, load in zip(laws, rows, loads.tolist(), strict=True):
         if row[0] == OTHER:
             # a Hertzian pivot has no stiffness at zero
-            row[1], row[2] = law.deflection(max(load, 0.0)), 1.0 / law.stiffness(max(load, 1e-6))
+            row[1] = law.deflection(max(load, 0.0))
+            row[2] = 1.0 / law.stiffness(max(load, 1e-6))
 
 
 @lru_cache(maxsize=64)
@@ -231,7 +232,8 @@ def load_pivots(path: str | Path, pads: int | None = None) -> tuple[PivotLaw, ..
     text = read_page(path, BearingError, kind, missing, 20)
     data = read_table(text, path.name, "tpjb-pivots/1", BearingError)
     _refuse_unknown(data, _FILE_KEYS, path.name)
-    tables, housing = data.get("pads"), data.get("includes_housing", True)
+    tables = data.get("pads")
+    housing = data.get("includes_housing", True)
     if not isinstance(tables, list) or not tables:
         raise BearingError(f"{path.name}: no [[pads]] table. Write it anew with `tpjb pivot CAMPAIGN`.")
     if not isinstance(housing, bool):

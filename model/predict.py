@@ -107,7 +107,8 @@ def predict(
             f"speed must be positive [rad/s], got {speed_si!r}; `rotation` says which way the shaft turns"
         )
     omega = speed_si if excitation is None else _in_si(excitation, "speed", "excitation")
-    force, direction = _number(load, "force", "load"), _number(load_direction, "angle", "load_direction")
+    force = _number(load, "force", "load")
+    direction = _number(load_direction, "angle", "load_direction")
     spin = -speed_si if rotation == ROTATIONS[1] else speed_si
     return predict_setup(setup, force, direction, spin, omega, start.equilibrium if start is not None else None)
 

@@ -14,7 +14,8 @@ from rigdata.arrays import FloatArray
 
 def dry_curve(setup: Setup, pad: int, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Force [N] and displacement [m] along a pad's direction as cells and probes read a dry test: `load` (n,) [N]."""
-    law, angle = setup.pivots[pad - 1], setup.bearing.pads[pad - 1].pivot_angle
+    law = setup.pivots[pad - 1]
+    angle = setup.bearing.pads[pad - 1].pivot_angle
     normal = np.array([np.cos(angle), np.sin(angle)])
     give = np.array([law.deflection(w) for w in load.tolist()]) + (normal @ setup.structure @ normal) * load
     displacement = normal @ setup.instruments.displacement_map(0.0).real @ normal

@@ -79,7 +79,8 @@ def tilt_hold(setup: Setup, tilt: float, load: float) -> TiltHold:
 def rolling_radius(pivot: Pivot) -> float:
     """R_H R_b / (R_H - R_b): how far the contact moves per radian of tilt [m]; zero for a knife edge."""
     if pivot.kind == "rocker":
-        seat, back = 0.5 * pivot.housing_diameter, 0.5 * pivot.pivot_diameter
+        seat = 0.5 * pivot.housing_diameter
+        back = 0.5 * pivot.pivot_diameter
         return seat * back / (seat - back)
     return 0.5 * pivot.sphere_diameter if pivot.kind == "spherical" else 0.0
 

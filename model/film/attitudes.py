@@ -97,7 +97,8 @@ def _attitudes(ends: tuple[float, float], radius: float, length: float, heat: He
     isothermal = math.isinf(heat.capacity)
     oil = (1.0, heat.exponent, 1.0, heat.expansion)
     running = Running(1.0, oil, (1.0 if isothermal else heat.capacity, heat.conduction))
-    numbers, rises = np.zeros((2 * _ROWS, 3)), np.zeros((2 * _ROWS, *shape))
+    numbers = np.zeros((2 * _ROWS, 3))
+    rises = np.zeros((2 * _ROWS, *shape))
     low, high = walk(grid, work, running, (isothermal, depth * radius**2 * length), (numbers, rises))
     numbers[low - 1] = 0.0  # a parallel film
     if not isothermal:
@@ -221,7 +222,9 @@ def _balance(
         moment, load, warmer, hottest = forces.force[1], forces.force[0], 0.0, 0.0
         if not isothermal:
             warmer, _, radial, tangential = heat_step(grid, work, running, (40.0, 1.0, 30.0), shift)
-            moment, load, hottest = moment + tangential, load + radial, work.temperature[-1, 0] - 40.0
+            moment = moment + tangential
+            load = load + radial
+            hottest = work.temperature[-1, 0] - 40.0
         slope = room * room * (forces.stiffness[1, 0] - wedge * forces.stiffness[1, 1])
         move = -moment / slope if slope < 0.0 else np.copysign(0.1 * (1.0 + curvature), moment)
         settled = warmer < max(0.3, 0.01 * hottest)

@@ -109,7 +109,8 @@ def _displaced(grid: FilmGrid, work: FilmWork, wedge: Wedge, faces: FaceFlows, x
     along, across = face_slopes(grid, work, wedge, (faces.along, faces.across), None)
     for j in range(len(faces.follows)):
         if work.ruptured[0, j]:  # the supply follows the gap at the edge itself
-            along[0, j, 0], along[0, j, 1] = -faces.follows[j] * grid.cos[0], -faces.follows[j] * grid.sin[0]
+            along[0, j, 0] = -faces.follows[j] * grid.cos[0]
+            along[0, j, 1] = -faces.follows[j] * grid.sin[0]
     net_inflow(along, across, grid.first, rhs)
 
 
@@ -166,7 +167,9 @@ def solve_film_jfo(
     x = np.empty((work.unknown.shape[0], 1))
     steps = _pivot(grid, work, faces, x)
     _read(work, x, grid.first)
-    force, stiffness, damping = np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
+    force = np.zeros(2)
+    stiffness = np.zeros((2, 2))
+    damping = np.zeros((2, 2))
     if steps > 0:
         weight, slopes = _jfo_slopes(grid, work, wedge, faces, x, sharp)
         _leave_behind(grid, work, faces, slopes)

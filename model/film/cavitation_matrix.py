@@ -92,7 +92,9 @@ def assemble_columns(band: FloatArray, faces: FaceFlows, ruptured: BoolArray, fi
 @inner
 def substitute_columns(band: FloatArray, x: FloatArray) -> None:
     """Solve for the right-hand sides (n, m) in place, with the factor from `factorise_general`."""
-    n, width, count = band.shape[0], band.shape[1] // 2, x.shape[1]
+    n = band.shape[0]
+    width = band.shape[1] // 2
+    count = x.shape[1]
     for k in range(n):
         for r in range(1, min(width, n - 1 - k) + 1):
             factor = band[k + r, width - r]

@@ -43,7 +43,9 @@ def cross_operator(
     operator: CrossOperator,
 ) -> float:
     """Set up and factorise the heat balances of a film."""
-    nt, lines, cells = work.flow_x.shape[0], work.flow_x.shape[1], len(cross.edges) - 1
+    nt = work.flow_x.shape[0]
+    lines = work.flow_x.shape[1]
+    cells = len(cross.edges) - 1
     n = lines * cells
     factor, before, journal, dissipation, carried, flows = operator
     factor[:] = 0.0
@@ -238,7 +240,8 @@ def _upward(flows: FloatArray, sideways: FloatArray, first: int, i: int, j: int,
     for turn in range(2):
         running = 0.0
         for m in range(cells):
-            behind, ahead = flows[max(i - 1, 0), j, m], flows[min(i + 1, nt - 1), j, m]
+            behind = flows[max(i - 1, 0), j, m]
+            ahead = flows[min(i + 1, nt - 1), j, m]
             gain = 0.5 * (behind - ahead) if 0 < i < nt - 1 else behind - ahead
             if not edge:
                 gain += sideways[j, m] - sideways[j + 1, m]
@@ -278,7 +281,9 @@ def _dissipation(
 ) -> None:
     """Heat made in the cells of a station, per length dx and control-volume height [W], full film."""
     p, edges = work.pressure, cross.edges
-    nt, nz, cells = work.flow_x.shape[0], work.flow_z.shape[1], len(cross.edges) - 1
+    nt = work.flow_x.shape[0]
+    nz = work.flow_z.shape[1]
+    cells = len(cross.edges) - 1
     behind, ahead = max(i - 1, 0), min(i + 1, nt)
     for j in range(nz + 1):
         h = work.thickness[i, j]
@@ -290,7 +295,8 @@ def _dissipation(
         else:
             across = (p[i, j + 1] - p[i, j - 1]) / (grid.dz[j] + grid.dz[j - 1]) * h
         along, aside = cross.driven[i, j, 0], cross.driven[i, j, 1]
-        drag, driven = speed * cross.shear[i, j] / h, along * slope * slope + aside * across * across
+        drag = speed * cross.shear[i, j] / h
+        driven = along * slope * slope + aside * across * across
         station = h * grid.dx * grid.height[j]
         for m in range(cells):
             wide = edges[m + 1] - edges[m]

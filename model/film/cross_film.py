@@ -130,7 +130,8 @@ def _set_eddies(cross: CrossFilm, i: int, j: int, reynolds: float, by_heat: floa
         fluidity = cross.fluidity[i, j, m]
         light = fluidity / (1.0 - fluidity * cross.eddy[i, j, m])
         sheared, warmed = still_shares(reynolds, (edges[m], edges[m + 1]), by_heat / light)
-        cross.eddy[i, j, m], cross.mixing[i, j, m] = (1.0 / sheared - 1.0) / light, 1.0 / warmed
+        cross.eddy[i, j, m] = (1.0 / sheared - 1.0) / light
+        cross.mixing[i, j, m] = 1.0 / warmed
         wide = edges[m + 1] - edges[m]
         away = 0.5 * (edges[m + 1] + edges[m]) - centre
         calm += wide * light * (away * away + wide * wide / 12.0)

@@ -75,7 +75,8 @@ def face_temperature(
     `edges` (cells + 1,), `taken` (nt + 1, nz + 1) [W/m^2], `face` (nt + 1, nz + 1) [degC].
     """
     cells = len(edges) - 1
-    first_centre, second_centre = 0.5 * (edges[0] + edges[1]), 0.5 * (edges[1] + edges[2])
+    first_centre = 0.5 * (edges[0] + edges[1])
+    second_centre = 0.5 * (edges[1] + edges[2])
     for i in range(face.shape[0]):
         for j in range(face.shape[1]):
             slope = heat_flow[i, j] * work.thickness[i, j] / conductivity
@@ -112,10 +113,17 @@ def conduct(
     """
     flux, to_coarse, guess = pad
     rhs = np.dot(to_coarse, missing.copy().ravel())
-    limit, size, shape = tolerance * tolerance * np.dot(rhs, rhs), rhs.size, missing.shape
-    steps, images, faces = np.empty((_STEPS, size)), np.empty((_STEPS, size)), np.empty((_STEPS, *shape))
-    fields, heat_flow = np.empty((_STEPS, *answer[0].shape)), np.empty(_STEPS)
-    weights, residual, count = np.empty((_STEPS, 1)), rhs.copy(), 0
+    limit = tolerance * tolerance * np.dot(rhs, rhs)
+    size = rhs.size
+    shape = missing.shape
+    steps = np.empty((_STEPS, size))
+    images = np.empty((_STEPS, size))
+    faces = np.empty((_STEPS, *shape))
+    fields = np.empty((_STEPS, *answer[0].shape))
+    heat_flow = np.empty(_STEPS)
+    weights = np.empty((_STEPS, 1))
+    residual = rhs.copy()
+    count = 0
     for k in range(_STEPS):
         steps[k] = np.dot(guess, residual)
         steps[k] /= np.sqrt(np.dot(steps[k], steps[k]))

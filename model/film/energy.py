@@ -32,7 +32,8 @@ def solve_energy(grid: FilmGrid, work: FilmWork, inlet: float, running: Running,
     """March the film temperature from the leading edge: `temperature` (nt + 1, nz + 1) [degC]."""
     rows, columns = temperature.shape
     fields = temperature.reshape((1, rows, columns))
-    loss, sources = np.empty((rows, columns)), np.empty((1, rows, columns))
+    loss = np.empty((rows, columns))
+    sources = np.empty((1, rows, columns))
     heat_sources(grid, work, running, 1.0, sources[0], loss)
     for j in range(columns):
         temperature[0, j] = inlet
@@ -75,7 +76,8 @@ def march(grid: FilmGrid, work: FilmWork, running: Running, loss: Any, fields: A
     conduct = np.empty(nz)
     for j in range(nz):
         conduct[j] = 0.25 * running.heat[1] * grid.dx / grid.dz[j]
-    main, rhs = np.zeros(nz + 1, dtype=loss.dtype), np.zeros((nz + 1, count), dtype=fields.dtype)
+    main = np.zeros(nz + 1, dtype=loss.dtype)
+    rhs = np.zeros((nz + 1, count), dtype=fields.dtype)
     line = (np.zeros(nz + 1), main, np.zeros(nz + 1), rhs)
     return _march_lines(grid, work, running, (loss, fields, sources), line, conduct)
 
@@ -116,7 +118,9 @@ def _march_lines(
                 if j == 0 and grid.first == 1:
                     high = -0.25 * specific * max(-north, 0.0)
             advect = specific * flow
-            lower[j], main[j], upper[j] = low, advect - low - high + 0.5 * loss[i + 1, j], high
+            lower[j] = low
+            main[j] = advect - low - high + 0.5 * loss[i + 1, j]
+            upper[j] = high
             for m in range(rhs.shape[1]):
                 t = fields[m]
                 value = (advect + low + high - 0.5 * loss[i, j]) * t[i, j]
@@ -192,11 +196,15 @@ def slope_products(grid: FilmGrid, p: Any, q: Any, i: int, j: int) -> Any:
         product += ((p[i + 1, j] - p[i, j]) / grid.dx) * ((q[i + 1, j] - q[i, j]) / grid.dx)
         sides += 1
     if j == nz:
-        wide, low, high = grid.dz[nz - 1], nz - 1, nz
+        wide = grid.dz[nz - 1]
+        low = nz - 1
+        high = nz
     elif j == 0:
         wide, low, high = grid.dz[0], 0, grid.first  # at a line of symmetry there is no slope
     else:
-        wide, low, high = grid.dz[j] + grid.dz[j - 1], j - 1, j + 1
+        wide = grid.dz[j] + grid.dz[j - 1]
+        low = j - 1
+        high = j + 1
     return product / sides, ((p[i, high] - p[i, low]) / wide) * ((q[i, high] - q[i, low]) / wide)
 
 

@@ -63,7 +63,8 @@ def heat_impedance(grid: FilmGrid, work: FilmWork, wedge: Wedge, running: Runnin
             gained = _gain(grid, work, running, conductance, change, (sheared, pressed))
             fields = np.zeros((1, shape[0], shape[1]), dtype=np.complex128)
             march(grid, work, running, loss, fields, gained)
-            asked, size = largest((fields[0] - warmer).ravel()), largest(fields[0].ravel())
+            asked = largest((fields[0] - warmer).ravel())
+            size = largest(fields[0].ravel())
             warmer = fields[0]
             _pressure(grid, work, running, conductance, _Change(0.0 * thicker, warmer, nothing), omega, answer)
             if asked < _SETTLED * size:
@@ -140,7 +141,8 @@ def _gain(
                 line = j + side
                 if not 0 <= line <= nz:
                     continue
-                face, edge = min(j, line), j == (nz if side < 0 else 0) and (side < 0 or grid.first == 1)
+                face = min(j, line)
+                edge = j == (nz if side < 0 else 0) and (side < 0 or grid.first == 1)
                 out = side * 0.5 * (flow_z[i, face] + flow_z[i + 1, face])
                 changed = side * 0.125 * heat[0] * (across[i, face, 0] + across[i + 1, face, 0])
                 if not edge:

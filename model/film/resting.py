@@ -34,7 +34,8 @@ class RestingFilm(NamedTuple):
 def resting_film(grid: FilmGrid, wedge: tuple[float, float], running: Running, inlet: float) -> RestingFilm:
     """Film of an idle pad for (Cp, a); infinite heat capacity: as cold as its inlet."""
     oil, speed = running.oil, running.speed
-    density, entering = oil[2] * (1.0 + oil[3] * (40.0 - inlet)), oil[0] * np.exp(oil[1] * (40.0 - inlet))
+    density = oil[2] * (1.0 + oil[3] * (40.0 - inlet))
+    entering = oil[0] * np.exp(oil[1] * (40.0 - inlet))
     # the grid may hold one half
     length = (grid.z[-1] - grid.z[0]) * (2.0 if grid.first == 0 else 1.0)
     leading = wedge[0] - wedge[1] * grid.cos[0]

@@ -63,7 +63,9 @@ def rupture_line(grid: FilmGrid, work: FilmWork, conductance: Faces, source: Flo
 
     `source` (nt + 1, nz + 1) [kg/s]; gives area (nt + 1, nz + 1) [m^2].
     """
-    gx, ruptured, area = conductance[0], work.ruptured, grid.area.copy()
+    gx = conductance[0]
+    ruptured = work.ruptured
+    area = grid.area.copy()
     nt, nz = gx.shape[0], gx.shape[1] - 1
     for i in range(1, nt):
         for j in range(grid.first, nz):
@@ -100,13 +102,15 @@ def face_slopes(
             slope = work.flow_x[i, j] - _power(powers, 0, i, j) * poiseuille
             slope /= face_height(grid, work, wedge, i, j)
             work.flow_x[i, j] -= poiseuille
-            along[i, j, 0], along[i, j, 1] = -slope * grid.cos_face[i], -slope * grid.sin_face[i]
+            along[i, j, 0] = -slope * grid.cos_face[i]
+            along[i, j, 1] = -slope * grid.sin_face[i]
     for i in range(nt + 1):
         for j in range(nz):
             poiseuille = gz[i, j] * (p[i, j + 1] - p[i, j])
             work.flow_z[i, j] = -poiseuille
             slope = -_power(powers, 1, i, j) * poiseuille / (0.5 * (h[i, j] + h[i, j + 1]))
-            across[i, j, 0], across[i, j, 1] = -slope * grid.cos[i], -slope * grid.sin[i]
+            across[i, j, 0] = -slope * grid.cos[i]
+            across[i, j, 1] = -slope * grid.sin[i]
     return along, across
 
 
@@ -120,7 +124,8 @@ def derivatives(grid: FilmGrid, work: FilmWork, wedge: Wedge, conductance: Faces
         for j in range(grid.first, nz):
             k = (i - 1) * (nz - grid.first) + j - grid.first
             squeeze = work.density[i, j] * grid.dx * grid.height[j]
-            rhs[k, 2], rhs[k, 3] = squeeze * grid.cos[i], squeeze * grid.sin[i]
+            rhs[k, 2] = squeeze * grid.cos[i]
+            rhs[k, 3] = squeeze * grid.sin[i]
     keep_ruptured(work, grid.first, rhs)
     substitute_four(work.band, rhs)
 
@@ -188,7 +193,8 @@ def pressure_change(grid: FilmGrid, work: FilmWork, speed: float, oil: OilConsta
     `change` (unknowns,) [Pa]; gives (2,) [N].
     """
     rows, columns = work.temperature.shape
-    lighter, denser = np.empty((rows, columns)), np.empty((rows, columns))
+    lighter = np.empty((rows, columns))
+    denser = np.empty((rows, columns))
     for i in range(rows):
         for j in range(columns):
             t, density = work.temperature[i, j], work.density[i, j]
@@ -222,7 +228,8 @@ def flow_changes(
     """
     h, light = work.thickness, work.density / work.viscosity
     nt, nz = work.flow_x.shape[0], work.flow_z.shape[1]
-    along, across = np.empty((nt, nz + 1, 1), dtype=lighter.dtype), np.empty((nt + 1, nz, 1), dtype=lighter.dtype)
+    along = np.empty((nt, nz + 1, 1), dtype=lighter.dtype)
+    across = np.empty((nt + 1, nz, 1), dtype=lighter.dtype)
     for i in range(nt):
         for j in range(nz + 1):
             thick = h[i, j] + h[i + 1, j]

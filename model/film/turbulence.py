@@ -109,7 +109,8 @@ def heat_beyond(grid: FilmGrid, work: FilmWork, speed: float) -> None:
     for i in range(h.shape[0]):
         for j in range(h.shape[1]):
             reynolds = work.density[i, j] * speed * h[i, j] / mu[i, j]
-            along, across = excess(reynolds, ALONG)[0], excess(reynolds, ACROSS)[0]
+            along = excess(reynolds, ALONG)[0]
+            across = excess(reynolds, ACROSS)[0]
             downstream, sideways = slope_products(grid, work.pressure, work.pressure, i, j)
             shear = mu[i, j] * speed**2 / h[i, j] * excess(reynolds, SHEAR)[0]
             less = along / (12.0 + along) * downstream + across / (12.0 + across) * sideways

@@ -97,7 +97,8 @@ def film_maps(face: tuple[Line, Line], film: tuple[Line, Line], even: bool | Non
 
     `even` is None for a film on the half length, else the part of a full one.
     """
-    along, across = _axis_maps(face[0], film[0], None), _axis_maps(face[1], film[1], even)
+    along = _axis_maps(face[0], film[0], None)
+    across = _axis_maps(face[1], film[1], even)
     gather, project, coarse = (np.kron(*pair) for pair in zip(along, across, strict=True))
     return gather, project, coarse
 
@@ -110,7 +111,8 @@ def _axis_maps(face: Line, film: Line, even: bool | None) -> tuple[Any, Any, Any
     points, weights = gauss_rule(np.clip(merged[distinct], *face.breaks[[0, -1]]), face.degree + 1)
     values, halves = film.tabulate(points), 1.0
     if even is not None:
-        values, halves = 0.5 * (values + (1.0 if even else -1.0) * film.tabulate(-points)), 2.0
+        values = 0.5 * (values + (1.0 if even else -1.0) * film.tabulate(-points))
+        halves = 2.0
     weighted, corners = weights[:, None] * values, Line(face.breaks, 1)
     gather = face.tabulate(points).T @ weighted
     project = np.linalg.solve(film.matrix(0, 0), halves * gather.T)

@@ -84,7 +84,8 @@ class ElasticSector:
         """
         theta = self.mesh.theta
         sections = self._sections()
-        section, arcs = np.stack(list(sections.values())), np.stack([theta.matrix(*key) for key in sections])
+        section = np.stack(list(sections.values()))
+        arcs = np.stack([theta.matrix(*key) for key in sections])
         free = ~self.fixed.reshape(theta.n_nodes, -1)
         for i in range(theta.n_nodes):
             row = {}
@@ -326,7 +327,8 @@ def _solve(
     spread = np.asarray(np.kron(Line(theta.breaks, 1).tabulate(theta.nodes), Line(z.breaks, 1).tabulate(z.nodes)))
     n_temperatures = spread.shape[1]
     shape = (theta.n_nodes, mesh.r.n_nodes, z.n_nodes, len(convections), n_temperatures)
-    field, flux = np.empty(shape), np.empty((len(convections), mesh.n_surface, n_temperatures))
+    field = np.empty(shape)
+    flux = np.empty((len(convections), mesh.n_surface, n_temperatures))
     for k, convection in enumerate(convections):
         field[:, :, :, k], heat = conduct(mesh, convection, spread, even)
         flux[k] = _flux(mesh, heat) / geometry.inner_radius

@@ -54,13 +54,16 @@ def settle_cross_temperatures(
     As `exchange_heat` of `model.statics.compiled.heat`.
     """
     n, limits = len(films), (relaxation, HEATING_STEP)
-    flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    flows = np.empty((n, 2))
+    outlets = np.zeros((n, 3))
+    taken = np.zeros((n, 3))
     answers: dict[int, CrossAnswer] = {}
     journal, around = float(state.figures[JOURNAL]), float(state.inlet.mean())  # what the grooves hold, on the mean
     start = journal if math.isfinite(journal) else case.supply
     for m, film in enumerate(films):
         if not state.solved[m]:  # an idle pad passes its inlet on, somewhat warmer
-            flows[m], outlets[m] = state.resting[m, 1], (state.resting[m, 2] - state.inlet[m], 1.0, 0.0)
+            flows[m] = state.resting[m, 1]
+            outlets[m] = (state.resting[m, 2] - state.inlet[m], 1.0, 0.0)
             continue
         entering, sides = edge_flows(film.grid, film.work, math.inf)
         flows[m] = entering, entering - sides

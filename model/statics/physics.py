@@ -30,7 +30,8 @@ def couples_heat(setup: Setup) -> bool:
 def case_of(setup: Setup, load: FloatArray, surface_speed: float, heat: float) -> Case:
     """The numbers of a search; `heat` is the share of the heat that the films keep."""
     oil, growth, length = setup.bearing.oil, setup.growth, setup.bearing.length
-    kept, supply = (1.0 - setup.heat_loss) * heat, float(setup.inlet_temperature)
+    kept = (1.0 - setup.heat_loss) * heat
+    supply = float(setup.inlet_temperature)
     thermal = ISOTHERMAL if setup.thermal == "isothermal" else ALONE
     if couples_heat(setup):
         thermal = ACROSS if setup.thermal == "thd" else COUPLED

@@ -103,7 +103,9 @@ class Search:
         )  # fmt: skip
 
     def _state(self) -> PadState:
-        n, works, crosses = len(self.films), self.works, self.crosses
+        n = len(self.films)
+        works = self.works
+        crosses = self.crosses
         bends = self.setup.flexible_pads or self.case.axial
         shape = works.extra.shape
         faces, warmth = (works.temperature,) * 2 if crosses is None else (crosses.face, crosses.temperature)
@@ -255,7 +257,8 @@ class Search:
             if known and as_curves_say and state.idle[m] != other.idle:
                 continue  # the neighbour's pad does as its curve says: so does this one
             state.idle[m] = other.idle
-            state.tilt[m], state.deflection[m] = other.tilt + shift.tilt[m], other.deflection + shift.deflection[m]
+            state.tilt[m] = other.tilt + shift.tilt[m]
+            state.deflection[m] = other.deflection + shift.deflection[m]
             if coupled:  # elsewhere the inlet is the supply of this set-up, whatever the neighbour drank
                 state.inlet[m] = other.inlet
             if self.case.thermal != ISOTHERMAL:
@@ -320,7 +323,8 @@ class Search:
         """What a temperature that follows adds to a film's stiffness, (2, 2) [N/m]."""
         if self.case.thermal not in (ALONE, COUPLED):
             return np.zeros((2, 2))
-        film, wedge = self.films[m], (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
+        film = self.films[m]
+        wedge = (float(self.pads.clearance[m]), *self.state.wedge[m].tolist())
         running = film.running(self.surface_speed, self.setup.bearing.oil)
         return np.asarray(heat_impedance(film.grid, film.work, wedge, running, 0.0).real)
 
@@ -333,9 +337,12 @@ class Search:
         """Leave the films where the arrays stand."""
         state, grown_by = self.state, self.setup.growth is not None
         for m, film in enumerate(self.films):
-            film.tilt, film.deflection = float(state.tilt[m]), float(state.deflection[m])
-            film.idle, film.axial_tilt = bool(state.idle[m]), float(state.axial[m])
-            film.inlet, film.supplied = float(state.inlet[m]), float(state.supplied[m])
+            film.tilt = float(state.tilt[m])
+            film.deflection = float(state.deflection[m])
+            film.idle = bool(state.idle[m])
+            film.axial_tilt = float(state.axial[m])
+            film.inlet = float(state.inlet[m])
+            film.supplied = float(state.supplied[m])
             film.forces = film.resting = None
             if self.setup.flexible_pads:
                 film.bent = state.bent[m]

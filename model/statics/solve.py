@@ -114,7 +114,9 @@ def _settled(search: Search, result: Equilibrium, held: frozenset[int] = frozens
             # where its own film carries nothing, those of pads with the same curve that stand farther off do not either
             refused.update(m for m in doubtful if search.rises[m] is search.rises[pad])
         if other.converged and not other.films[pad].idle and (fewer or not _left_above(trial, other, near)):
-            search, result, above = trial, other, trial.margins()
+            search = trial
+            result = other
+            above = trial.margins()
     return _named(search, result, near, held)
 
 

@@ -71,7 +71,8 @@ def _ask_bodies(bodies: BodyStack, works: FilmWork, state: PadState, supply: flo
     """Deformation (pads, nodes) that pressure and temperature ask for; pads of one shape in one product [m]."""
     count = len(state.tilt)
     unknowns, coarse = works.unknown.shape[1], bodies.lighter.shape[1]
-    rise, given = np.zeros((count, state.bent[0].size)), np.zeros((count, unknowns + coarse))
+    rise = np.zeros((count, state.bent[0].size))
+    given = np.zeros((count, unknowns + coarse))
     for m in range(count):
         if state.solved[m]:
             rise[m] = state.faces[m].reshape(-1) - supply
@@ -107,7 +108,8 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
     state, case = problem.state, problem.case
     bends = len(bodies.shapes) > 0
     body, bending = (bodies.which[m], bodies.shapes.shape[3]) if bends else (0, 0)
-    count, unknowns = bending + (1 if case.axial else 0), len(work.unknown)
+    count = bending + (1 if case.axial else 0)
+    unknowns = len(work.unknown)
     rows, columns = work.pressure.shape
     shapes = np.empty((rows, columns, count))
     response = np.empty((count, unknowns))
@@ -144,7 +146,8 @@ def _close_loop(bodies: BodyStack, problem: Problem, m: int, change: FloatArray)
             state.felt_stiffness[m, axis, 1] += felt[axis, r] * right[r, 2]
     for r in range(bending):
         state.amplitude[m, r] = right[r]
-    mismatch, flat = state.mismatch[m].reshape(-1), shapes.reshape((len(change), count))
+    mismatch = state.mismatch[m].reshape(-1)
+    flat = shapes.reshape((len(change), count))
     for q in range(len(change)):
         mismatch[q] = change[q]
         for r in range(bending):

@@ -37,7 +37,8 @@ def _equations(case: Case, pads: PadStack, state: PadState, m: int) -> _PadEquat
     load, stiffness, radius = state.felt[m, 0], state.felt_stiffness[m], pads.pivot_radius[m]
     # a journal that grows comes nearer, all but at the pads' ends as if it were pushed
     closing = case.closing * state.figures[GROWING]
-    radial, tangential = load + closing * stiffness[0, 0], state.felt[m, 1] + closing * stiffness[1, 0]
+    radial = load + closing * stiffness[0, 0]
+    tangential = state.felt[m, 1] + closing * stiffness[1, 0]
     moment, hold, arm, _ = held_moment(case.hold, state.tilt[m], load)
     missing = deflection(pads.laws[m], pads.curves[m], max(load, 0.0)) - state.deflection[m]
     give = compliance(pads.laws[m], pads.curves[m], max(load, 1e-6))
@@ -64,14 +65,16 @@ def newton(case: Case, pads: PadStack, state: PadState) -> tuple[float, FloatArr
             # the film changes by the journal's move, and by how the pad follows; the last is the pad by itself
             da, db = (frame[0, column], frame[1, column]) if column < 2 else (0.0, 0.0)
             radial, tangential = _force_change(k, da, db)
-            moment, give = -(tangential + pad.hold[1] * radial), pad.compliance * radial
+            moment = -(tangential + pad.hold[1] * radial)
+            give = pad.compliance * radial
             if column == 2:
                 moment, give = -pad.moment, pad.missing
             tilt, give = _pad_moves(pad, moment, give)
             follow[m, 0, column], follow[m, 1, column] = tilt, give
             radial, tangential = _force_change(k, da - give, db + arm * tilt)
             if column == 2:
-                radial, tangential = -radial - pad.force[0], -tangential - pad.force[1]
+                radial = -radial - pad.force[0]
+                tangential = -tangential - pad.force[1]
             for i in range(2):
                 system[i, column] += frame[0, i] * radial + frame[1, i] * tangential
         worst = max(worst, max(abs(pad.moment), abs(pad.missing * k[0, 0])) / size)
@@ -102,7 +105,8 @@ def _pad_moves(pad: _PadEquations, moment: float, give: float) -> tuple[float, f
     """
     k, arm, soft = pad.stiffness, pad.radius, pad.compliance
     hold, by_load = pad.hold
-    m11, m12 = (k[1, 1] + by_load * k[0, 1]) * arm + hold, -(k[1, 0] + by_load * k[0, 0])
+    m11 = (k[1, 1] + by_load * k[0, 1]) * arm + hold
+    m12 = -(k[1, 0] + by_load * k[0, 0])
     m21, m22 = -soft * k[0, 1] * arm, 1.0 + soft * k[0, 0]
     determinant = m11 * m22 - m12 * m21
     return (moment * m22 - m12 * give) / determinant, (m11 * give - m21 * moment) / determinant

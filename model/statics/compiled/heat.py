@@ -77,10 +77,14 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
     grids, _, pads, works, state, case = problem
     n, fields = len(state.tilt), 3 if case.journal else 2
     answers = np.zeros((n, fields, works.temperature.shape[1], works.temperature.shape[2]))
-    flows, outlets, taken = np.empty((n, 2)), np.zeros((n, 3)), np.zeros((n, 3))
+    flows = np.empty((n, 2))
+    outlets = np.zeros((n, 3))
+    taken = np.zeros((n, 3))
     for m in range(n):
         if not state.solved[m]:
-            flows[m], outlets[m, 0], outlets[m, 1] = state.resting[m, 1], state.resting[m, 2] - state.inlet[m], 1.0
+            flows[m] = state.resting[m, 1]
+            outlets[m, 0] = state.resting[m, 2] - state.inlet[m]
+            outlets[m, 1] = 1.0
             continue
         _answer(bodies, problem, m, answers[m])
         entering, sides = edge_flows(grid_of(grids, m), work_of(works, m), state.supplied[m])
@@ -104,7 +108,8 @@ def exchange_heat(bodies: BodyStack, problem: Problem, relaxation: float) -> flo
         found = warm(grid_of(grids, m), work_of(works, m), case.running, asked, limits, state.shift[m])
         hotter, radial, tangential = found
         state.heating[m] = hotter
-        state.corrected[m, 0], state.corrected[m, 1] = state.force[m, 0] + radial, state.force[m, 1] + tangential
+        state.corrected[m, 0] = state.force[m, 0] + radial
+        state.corrected[m, 1] = state.force[m, 1] + tangential
         if not change >= hotter:
             change = hotter
     if case.journal:
@@ -118,10 +123,13 @@ def _answer(bodies: BodyStack, problem: Problem, m: int, fields: FloatArray) -> 
 
     A hotter film makes less heat: that counts as a loss, beside what the journal takes.
     """
-    grid, work, case = grid_of(problem.grids, m), work_of(problem.works, m), problem.case
+    grid = grid_of(problem.grids, m)
+    work = work_of(problem.works, m)
+    case = problem.case
     figures = problem.state.figures
     count, rows, columns = fields.shape
-    sources, loss = np.zeros((count, rows, columns)), np.empty((rows, columns))
+    sources = np.zeros((count, rows, columns))
+    loss = np.empty((rows, columns))
     for i in range(rows):
         for j in range(columns):
             station = grid.dx * grid.height[j]
@@ -167,7 +175,8 @@ def _conduct(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, fiel
 def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> FloatArray:
     """What a pad takes from its film at every station, (nt + 1, nz + 1) [W], for the rise (nodes,) of its face [K]."""
     to_coarse, flux = bodies.to_coarse[bodies.which[m]], bodies.flux[bodies.which[m]]
-    coarse, heat = np.zeros(to_coarse.shape[0]), np.zeros((len(grid.angle), len(grid.height)))
+    coarse = np.zeros(to_coarse.shape[0])
+    heat = np.zeros((len(grid.angle), len(grid.height)))
     for c in range(len(coarse)):
         for q in range(len(rise)):
             coarse[c] += to_coarse[c, q] * rise[q]
@@ -183,11 +192,14 @@ def _into_pad(grid: FilmGrid, bodies: BodyStack, m: int, rise: FloatArray) -> Fl
 def _krylov(bodies: BodyStack, problem: Problem, m: int, loss: FloatArray, right: FloatArray) -> FloatArray:
     """Solve (I + A^-1 F) T = T_alone, (nodes,), by GMRES; NaN where it grows beyond `BOUNDLESS`."""
     grid, work = grid_of(problem.grids, m), work_of(problem.works, m)
-    size, answer = math.sqrt(product(right, right)), np.zeros(len(right))
+    size = math.sqrt(product(right, right))
+    answer = np.zeros(len(right))
     if not size > 0.0:
         return answer
-    basis, images = np.zeros((_KRYLOV_STEPS, len(right))), np.zeros((_KRYLOV_STEPS, len(right)))
-    taken, fields = np.zeros((1, loss.shape[0], loss.shape[1])), np.zeros((1, loss.shape[0], loss.shape[1]))
+    basis = np.zeros((_KRYLOV_STEPS, len(right)))
+    images = np.zeros((_KRYLOV_STEPS, len(right)))
+    taken = np.zeros((1, loss.shape[0], loss.shape[1]))
+    fields = np.zeros((1, loss.shape[0], loss.shape[1]))
     weights = np.zeros((_KRYLOV_STEPS, 1))
     basis[0] = right / size
     for k in range(_KRYLOV_STEPS):
@@ -254,7 +266,8 @@ def balance_heat(
     flows, outlets, taken = answers
     n = len(order)
     shares = _mixing_shares(order, flows, mixing)
-    matrix, right = np.zeros((n + 1, n + 1)), np.full((n + 1, 1), supply)
+    matrix = np.zeros((n + 1, n + 1))
+    right = np.full((n + 1, 1), supply)
     fresh, own = 0.0, 0.0
     for k in range(n):
         m, after = order[k], order[(k + 1) % n]

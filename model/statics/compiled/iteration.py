@@ -207,13 +207,17 @@ def vector_size(state: PadState, case: Case) -> int:
 def _write_vector(problem: Problem, out: FloatArray) -> None:
     """Journal, pads, temperatures and deformations as one vector, in micrometres and kelvins."""
     _, _, pads, _, state, case = problem
-    out[0], out[1] = state.position[0] / _MICROMETRE, state.position[1] / _MICROMETRE
+    out[0] = state.position[0] / _MICROMETRE
+    out[1] = state.position[1] / _MICROMETRE
     out[2] = state.figures[GROWN]
     warm = 3 + state.warmth.shape[1]
     bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
     for m in range(len(state.tilt)):
-        part, unit = _part(state, out, m), pads.pivot_radius[m] / _MICROMETRE
-        part[0], part[1], part[2] = state.tilt[m] * unit, state.deflection[m] / _MICROMETRE, state.axial[m] * unit
+        part = _part(state, out, m)
+        unit = pads.pivot_radius[m] / _MICROMETRE
+        part[0] = state.tilt[m] * unit
+        part[1] = state.deflection[m] / _MICROMETRE
+        part[2] = state.axial[m] * unit
         part[3:bent] = 0.0
         if not state.idle[m]:
             part[3:warm] = state.warmth[m]
@@ -231,15 +235,18 @@ def _part(state: PadState, vector: FloatArray, m: int) -> FloatArray:
 def _read_vector(problem: Problem, vector: FloatArray) -> None:
     """Undo `_write_vector`."""
     grids, _, pads, works, state, case = problem
-    state.position[0], state.position[1] = vector[0] * _MICROMETRE, vector[1] * _MICROMETRE
+    state.position[0] = vector[0] * _MICROMETRE
+    state.position[1] = vector[1] * _MICROMETRE
     closing = case.closing * (vector[2] - state.figures[GROWN])
     state.figures[GROWN] = vector[2]
     warm = 3 + state.warmth.shape[1]
     bent = warm + (state.faces[0].size if case.thermal == ACROSS else 0)
     for m in range(len(state.tilt)):
-        part, unit = _part(state, vector, m), _MICROMETRE / pads.pivot_radius[m]
+        part = _part(state, vector, m)
+        unit = _MICROMETRE / pads.pivot_radius[m]
         pads.clearance[m] -= closing
-        state.tilt[m], state.deflection[m] = part[0] * unit, part[1] * _MICROMETRE
+        state.tilt[m] = part[0] * unit
+        state.deflection[m] = part[1] * _MICROMETRE
         more = part[2] * unit - state.axial[m]
         state.axial[m] += more
         if not state.idle[m]:

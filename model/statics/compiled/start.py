@@ -60,7 +60,8 @@ def pivot_curve(
     for k in range(low, count):
         share = 1.0 / (1.0 + curvature[k])
         out[0, k - low], out[1, k - low] = reach[k], clearance * curvature[k] * share
-        out[2, k - low], out[3, k - low] = clearance * wedge[k] * share, load[k] * unit
+        out[2, k - low] = clearance * wedge[k] * share
+        out[3, k - low] = load[k] * unit
     return count - low
 
 
@@ -100,7 +101,9 @@ def _beyond(pads: PadStack, position: FloatArray) -> FloatArray:
 @inner
 def _pushes(pads: PadStack, m: int, position: FloatArray) -> tuple[float, float]:
     """Load of a pad's curve at a position [N], and its slope [N/m]."""
-    reach, table, load = rigid_approach(pads, position, m), pads.attitudes[m, 0], pads.attitudes[m, 3]
+    reach = rigid_approach(pads, position, m)
+    table = pads.attitudes[m, 0]
+    load = pads.attitudes[m, 3]
     if reach < table[0]:
         tail = _TAIL * pads.clearance[m]
         push = load[0] * math.exp(max((reach - table[0]) / tail, -60.0))
@@ -120,7 +123,8 @@ def _missing(
     for m in range(len(loaded)):
         if loaded[m]:
             push, slope = _pushes(pads, m, position)
-            fx, fy = fx - pads.frame[m, 0, 0] * push, fy - pads.frame[m, 0, 1] * push
+            fx = fx - pads.frame[m, 0, 0] * push
+            fy = fy - pads.frame[m, 0, 1] * push
             for i in range(2):
                 for j in range(2):
                     slopes[i, j] += slope * pads.frame[m, 0, i] * pads.frame[m, 0, j]
@@ -141,7 +145,8 @@ def stand_on_curves(load: FloatArray, pads: PadStack, loaded: BoolArray, positio
     room = max(room, 0.05 * least(pads.clearance))
     size = math.hypot(load[0], load[1])
     if position[0] == 0.0 and position[1] == 0.0 and size > 0.0:
-        position[0], position[1] = 0.4 * room * load[0] / size, 0.4 * room * load[1] / size
+        position[0] = 0.4 * room * load[0] / size
+        position[1] = 0.4 * room * load[1] / size
     slopes, trial = np.empty((2, 2)), np.empty(2)
     fx, fy = _missing(load, pads, loaded, position, slopes)
     if size == 0.0:
@@ -153,14 +158,18 @@ def stand_on_curves(load: FloatArray, pads: PadStack, loaded: BoolArray, positio
         if math.hypot(fx, fy) < _GOOD_ENOUGH * size:
             return True
         soft = 1e-9 * stiff  # nothing carries in some direction: go where the load pushes
-        jxx, jyy, jxy = slopes[0, 0] + soft, slopes[1, 1] + soft, slopes[0, 1]
+        jxx = slopes[0, 0] + soft
+        jyy = slopes[1, 1] + soft
+        jxy = slopes[0, 1]
         det = jxx * jyy - jxy * jxy
-        mx, my = (fx * jyy - jxy * fy) / det, (jxx * fy - jxy * fx) / det
+        mx = (fx * jyy - jxy * fy) / det
+        my = (jxx * fy - jxy * fx) / det
         share = min(1.0, 0.2 * room / max(math.hypot(mx, my), 1e-30))
         mx, my = share * mx, share * my
         for halving in range(12):
             # along a step down a convex energy its slope rises: far enough is where it is past its zero, not far past
-            trial[0], trial[1] = position[0] + mx * 0.5**halving, position[1] + my * 0.5**halving
+            trial[0] = position[0] + mx * 0.5**halving
+            trial[1] = position[1] + my * 0.5**halving
             gx, gy = _missing(load, pads, loaded, trial, slopes)
             if gx * mx + gy * my > -0.5 * (fx * mx + fy * my) or halving == 11:
                 break

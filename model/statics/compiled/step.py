@@ -113,7 +113,8 @@ def move(problem: Problem, shift: FloatArray, damping: float) -> bool:
     grids, _, pads, works, state, case = problem
     scale = min(damping, _LONGEST_STEP * least(pads.clearance) / max(math.hypot(shift[0], shift[1]), 1e-30))
     extra, bending = np.empty((0, 0)), state.bent.size > 0
-    closing, axial = case.closing * state.figures[GROWING], np.zeros(len(state.tilt))
+    closing = case.closing * state.figures[GROWING]
+    axial = np.zeros(len(state.tilt))
     for m in range(len(state.tilt)):
         if state.solved[m]:
             frame, moves = pads.frame[m], state.moves[m]
