@@ -18,9 +18,8 @@ def named(kind: str, pads: Sequence[int] = (), number: float | str = 0.0) -> Con
     """Name a condition: pads count from 1."""
     severity, detail = KINDS[kind]
     joint = " and " if kind in ("pads {pads} overlap", "pads {pads} touch") else ", "
-    listed = joint.join(map(str, pads))
-    words = (text.format(pads=listed, number=number) for text in (kind, detail))
-    return Condition(next(words), severity, next(words), tuple(pads))
+    places = {"pads": joint.join(map(str, pads)), "number": number}
+    return Condition(kind.format(**places), severity, detail.format(**places), tuple(pads))
 
 
 def pads_of(kind: str, conditions: Iterable[Condition]) -> tuple[int, ...]:

@@ -65,8 +65,6 @@ class MeasuredPivot(_Law):
 
     load: FloatArray  #: (n,) [N], and (n,) [m]: strictly increasing, from (0, 0).
     deflection_points: FloatArray
-    valid_from: float = 0.0
-    valid_to: float = math.inf
     name: str = "measured"
     includes_housing: bool = True
     #: (5, n): Loads, and from each on the cubic's coefficients, highest power first.
