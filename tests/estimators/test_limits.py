@@ -361,11 +361,11 @@ def test_too_few_runs_and_windows_without_weight_tell_nothing():
 
 def test_a_slope_is_pointed_out_beyond_chance_and_one_per_cent():
     limit = float(student_t.isf(SIGNIFICANCE / 2, 4))
-    assert AmplitudeSlope(0.0101 + limit * 0.01, 0.01, 6).significant
-    assert not AmplitudeSlope(0.99 * limit * 0.01, 0.01, 6).significant
-    assert AmplitudeSlope(-1.01 * limit * 0.01, 0.01, 6).significant
-    assert not AmplitudeSlope(0.99 * NOTABLE, 1e-9, 6).significant
-    assert AmplitudeSlope(1.01 * NOTABLE, 1e-9, 2).significant
+    assert AmplitudeSlope(0.0101 + limit * 0.01, 0.01, 6).condition()
+    assert not AmplitudeSlope(0.99 * limit * 0.01, 0.01, 6).condition()
+    assert AmplitudeSlope(-1.01 * limit * 0.01, 0.01, 6).condition()
+    assert not AmplitudeSlope(0.99 * NOTABLE, 1e-9, 6).condition()
+    assert AmplitudeSlope(1.01 * NOTABLE, 1e-9, 2).condition()
     assert AmplitudeSlope(0.001, 1e-9, 6).condition() == ()
     (said,) = AmplitudeSlope(-0.123, 0.004, 6).condition()
     assert said == "nonlinear-amplitude"

@@ -111,13 +111,9 @@ def run_spectra(
     )
     if period is not None:
         return spectra
-    phasors, command = transformed(clean.each(lambda rows: rows * _from_middle(clean)))
+    time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
+    phasors, command = transformed(clean.each(lambda rows: rows * time))
     return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
-
-
-def _from_middle(samples: Samples) -> FloatArray:
-    """Time from the middle of the record, (n,) [s]."""
-    return np.asarray((np.arange(samples.length) - 0.5 * (samples.length - 1)) / samples.rate)
 
 
 def _motion(samples: Samples) -> tuple[float, float, float]:

@@ -127,7 +127,8 @@ def _explanations(runs: PointRuns, run: int, others: Sequence[int]) -> Iterator[
     if stiffness is None or dynamic is None:
         return
     static = static_difference(runs, run, others, stiffness)
-    for channel, pattern in enumerate(_patterns(runs, run, stiffness)):
+    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
+    for channel, pattern in enumerate(map(_stacked, forces.T)):
         shown = evidence([dynamic], [pattern])
         if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
             continue
@@ -152,12 +153,6 @@ def _levers(runs: PointRuns, run: int, channel: int, part: float) -> list[tuple[
         return [(mean, 0.0)]
     lever = mean - runs.centre[channel]
     return [(mean, 0.0), (lever, abs(_LEVER_KNOWN * lever * part)) if np.isfinite(lever) else (0.0, _ANYTHING)]
-
-
-def _patterns(runs: PointRuns, run: int, stiffness: ComplexArray) -> list[FloatArray]:
-    """What every channel contributes to force minus H times displacement, as `_stacked`."""
-    forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]
-    return [_stacked(force) for force in forces.T]
 
 
 def dynamic_difference(runs: PointRuns, run: int, others: Sequence[int], stiffness: ComplexArray) -> Difference | None:

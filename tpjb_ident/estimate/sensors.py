@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigdata.arrays import BoolArray, FloatArray
+from rigdata.arrays import BoolArray, ComplexArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.campaign import Campaign
 from tpjb_ident.estimate.blocks import QUANTITIES, Blocks, Rig, RigStiffness, Sensor, vector
@@ -102,8 +102,11 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, r
     d, force, a = square * d[known], square * force[known], a[known]
     power = np.maximum(np.sum(np.abs(d) ** 2, axis=0), 1e-300)
     quotient, h = np.sum(d.conj() * a, axis=0) / power, np.sum(d.conj() * force, axis=0) / power
-    size = np.maximum(np.abs(h), 1e-300)
-    springs = np.maximum(-(quotient * h.conj()).real / size**2, 0.0)
-    shaft = np.clip(((quotient - 1) * h.conj()).real / size**2, 0.0, _SHAFT / size)
-    standing, floating = np.abs(quotient + springs * h), np.abs(quotient - 1 - shaft * h)
+    standing, floating = _rest(-quotient, h, np.inf), _rest(quotient - 1, h, _SHAFT)
     return "floating" if floating.max() < _FLOATS and floating.sum() < standing.sum() else "cells"
+
+
+def _rest(share: ComplexArray, h: ComplexArray, most: float) -> FloatArray:
+    """What a compliance times h (2,), nought to `most`, leaves of a share of the motion (2,)."""
+    along = h / np.maximum(np.abs(h), 1e-300)
+    return np.abs(share - np.clip((share * along.conj()).real, 0.0, most) * along)

@@ -142,7 +142,9 @@ class Solver:
             last = step(sums, self.shared.prior(), self.own.prior())
             change = self._move(last)
             if count in _HOUSING_STEPS:
-                self.housing_noise = housing_noise(self.rig, self.blocks, self.u, self._housing_misfit())
+                m = self.blocks.z.shape[1]
+                misfit = [state.reading(self.rig, blocks)[:, m:] for _, blocks, state in self._states()]
+                self.housing_noise = housing_noise(self.rig, self.blocks, self.u, np.concatenate(misfit))
             if self.scatter.follows and count < _SCATTER_STEPS:
                 self.scatter = self._scatter(fit, count)
             elif count > 3 and change < _CONVERGED:
@@ -158,11 +160,6 @@ class Solver:
 
     def _scatter(self, fit: Residuals, count: int) -> Scatter:
         return self.scatter.updated(self.group, fit, self.answered, count)
-
-    def _housing_misfit(self) -> ComplexArray:
-        """What the housing's equations leave at the fitted motion, (n, 2)."""
-        m = self.blocks.z.shape[1]
-        return np.concatenate([state.reading(self.rig, blocks)[:, m:] for _, blocks, state in self._states()])
 
     def _states(self) -> Iterator[tuple[slice, Blocks, State]]:
         """Places of some blocks at a time, the blocks, and the last iterate for them."""

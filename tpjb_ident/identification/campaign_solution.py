@@ -88,7 +88,7 @@ def solve_campaign(
         bent = np.array([change.share for change in film])
         blocks = campaign_blocks(points, means, loads.misses, bent, temperatures)
         rig = campaign_rig(campaign, sensors, blocks, loads.common, bare)
-        start = _starts(rig, points, means)
+        start = np.array([point.start for point in means]) - rig.bare.at(np.array([data.omega for data in points]))
         solution = solver(rig, blocks, start, rates).run()
         return CampaignSolution(rig, task, blocks, means, loads, film, start, solution, np.zeros_like(blocks.z))
 
@@ -112,12 +112,6 @@ def solve_campaign(
 def _film(data: PointData, point: PointMeans) -> FilmChange:
     lines = [digest.harmonics[line] for digest, line in zip(data.digests, data.lines) if digest.harmonics]
     return film_change([line for line in lines if line is not None], point.start)
-
-
-def _starts(rig: Rig, points: Sequence[PointData], means: Sequence[PointMeans]) -> ComplexArray:
-    """H of the film to start from at every point, (P, 2, 2) [N/m]."""
-    omega = np.array([data.omega for data in points])
-    return np.array([point.start for point in means]) - rig.bare.at(omega)
 
 
 def _mains(

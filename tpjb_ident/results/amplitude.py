@@ -26,24 +26,14 @@ class AmplitudeSlope:
     standard_error: float
     runs: int
 
-    @property
-    def significant(self) -> bool:
-        """Whether it is more than noise."""
-        dof = max(self.runs - 2, 1)
-        limit = -float(stdtrit(dof, SIGNIFICANCE / 2)) * self.standard_error
-        return abs(self.stiffening) > max(limit, NOTABLE)
-
     def condition(self) -> tuple[Condition, ...]:
-        """What to say about it in the point's quality."""
-        if not self.significant:
+        """What to say about it in the point's quality, where it is more than noise."""
+        limit = -float(stdtrit(max(self.runs - 2, 1), SIGNIFICANCE / 2)) * self.standard_error
+        if abs(self.stiffening) <= max(limit, NOTABLE):
             return ()
-        return (
-            Condition(
-                "nonlinear-amplitude",
-                f"h changes by {100 * self.stiffening:+.1f} % when the amplitude doubles "
-                f"(standard error {100 * self.standard_error:.1f} %)",
-            ),
-        )
+        change, error = 100 * self.stiffening, 100 * self.standard_error
+        text = f"h changes by {change:+.1f} % when the amplitude doubles (standard error {error:.1f} %)"
+        return (Condition("nonlinear-amplitude", text),)
 
 
 def amplitude_slope(data: PointData, h: ComplexArray, weights: FloatArray) -> AmplitudeSlope | None:

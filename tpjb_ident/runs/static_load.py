@@ -200,7 +200,7 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
-    if len(y) < _MIN_RUNS or (np.ptp(np.abs(x)) < _MIN_RANGE * np.abs(x).max() and _one_direction(x)):
+    if len(y) < _MIN_RUNS or (np.abs(x - x[0]) < _MIN_RANGE * np.abs(x).max()).all():
         return CellZero()
     size = np.abs(x)
     design = np.stack([x, np.ones_like(x)], axis=1) / size[:, None]
@@ -217,7 +217,3 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     there = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
     allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
     return CellZero(zero, error) if there and allowed else CellZero()
-
-
-def _one_direction(set_points: ComplexArray) -> bool:
-    return bool(np.abs(set_points / np.abs(set_points) - set_points[0] / abs(set_points[0])).max() < _MIN_RANGE)
