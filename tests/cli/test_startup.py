@@ -11,6 +11,7 @@ import pytest
 SCRIPT = """
 import os, signal, sys, time, weakref
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background of a shell has interrupts ignored
+signal.signal(signal.SIGALRM, signal.SIG_IGN)  # as some parents leave it
 from tpjb_ident.runtime import interrupts
 
 class Lock:

@@ -175,7 +175,7 @@ def test_what_is_damaged_in_most_runs_is_no_accident(spoilt, tmp_path, command, 
 def test_pivot_goes_on_without_a_damaged_run_and_says_which_pad_has_no_curve(spoilt, tmp_path, name):
     told = tpjb("pivot", spoilt(name, "p-2-up"), "--out", tmp_path / "out")
     assert told.exit_code == 3, told.output
-    assert "pad 2: has no curve" in told.output
+    assert "pad #2: has no curve" in told.output
     assert told.output.count("p-2-up") >= 1
     assert sorted(set(pd.read_csv(tmp_path / "out" / "pivot_curves.csv")["pad"])) == [1, 3, 4, 5]
 

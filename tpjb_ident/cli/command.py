@@ -162,8 +162,8 @@ class Command(Terminal):
 
         save_panels(panels, self.folder / "figures")
 
-    def judge(self, parts: Mapping[str, Sequence[Condition]]) -> None:
-        """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust."""
+    def judge(self, parts: Mapping[str, Sequence[Condition]], missing: Sequence[str] = ()) -> None:
+        """Note the conditions of named parts, each once; end with exit code 3 if one forbids trust, or parts miss."""
         places: dict[str, list[str]] = {}
         for name, conditions in parts.items():
             for text in sentences(conditions):
@@ -172,8 +172,8 @@ class Command(Terminal):
         notes = {text: f"{', '.join(names)}: {text}" for text, names in places.items()}
         for note in notes.values():
             self.note(note)
-        if serious:
-            raise NotTrustedError("; ".join(notes[text] for text in dict.fromkeys(serious)))
+        if serious or missing:
+            raise NotTrustedError("; ".join([*(notes[text] for text in dict.fromkeys(serious)), *missing]))
 
     def wrote(self, *names: str) -> None:
         """Note files that are in the output folder now."""

@@ -15,7 +15,8 @@ from typing import Any
 
 #: s between two looks at what became of a signal
 _PAUSE = 0.1
-_KINDS = (signal.SIGINT, signal.SIGTERM, *((signal.SIGALRM,) if hasattr(signal, "SIGALRM") else ()))
+_STOPS = (signal.SIGINT, signal.SIGTERM)
+_KINDS = (*_STOPS, *((signal.SIGALRM,) if hasattr(signal, "SIGALRM") else ()))
 #: the number of the last signal that came
 _signalled = 0
 
@@ -24,8 +25,8 @@ def listen() -> None:
     """Let both signals raise KeyboardInterrupt, SIGTERM with its number: what was begun is cleared away in both."""
     sys.unraisablehook = _without_interrupts
     for number in _KINDS:
-        # a shell's job in the background ignores Ctrl-C
-        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+        # a shell's job in the background ignores Ctrl-C; whoever began this process may have left the timer ignored
+        if number not in _STOPS or signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _interrupt)
 
 
@@ -43,7 +44,7 @@ def heard() -> None:
 def stop_listening() -> None:
     """Leave the process to its end: a signal that comes once all is cleared away would replace its exit code."""
     heard()
-    for number in _KINDS:
+    for number in _STOPS:
         signal.signal(number, signal.SIG_IGN)
 
 
@@ -67,7 +68,7 @@ def interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
 
 def _interrupt(number: int, frame: Any) -> None:
     global _signalled
-    if number in (signal.SIGINT, signal.SIGTERM):
+    if number in _STOPS:
         _signalled = number
         _look_again(_PAUSE)
     elif interrupt_behind(sys.exc_info()[1]) is not None:  # what is being cleared away is not interrupted again

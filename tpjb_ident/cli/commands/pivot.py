@@ -6,7 +6,6 @@ from pathlib import Path
 
 from tpjb_ident.cli.command import Command, command
 from tpjb_ident.cli.options import DEMO
-from tpjb_ident.errors import NotTrustedError
 
 
 @command(f"tpjb pivot {DEMO}")
@@ -37,7 +36,6 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     c.next("compare" if source.of_kind("dynamic") else "check", campaign)
     for problem in bearing_problems(source, drawing):  # what is wrong with the probes is wrong with the curves
         c.warn(str(problem))
-    c.judge({f"pad #{curve.pad}": curve.status for curve in curves})
-    if without := sorted(tested - {curve.pad for curve in curves}):
-        pads = ", ".join(f"#{pad}" for pad in without)
-        raise NotTrustedError(f"pad {pads}: has no curve, its records were refused")
+    without = tested - {curve.pad for curve in curves}
+    refused = [f"pad #{pad}: has no curve, its records were refused" for pad in sorted(without)]
+    c.judge({f"pad #{curve.pad}": curve.status for curve in curves}, refused)
