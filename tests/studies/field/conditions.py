@@ -217,7 +217,7 @@ def good_bands() -> list[Condition]:
         rig("random, no command", without="CMD", limits=WIDER, **random),
         rig("random, cells at 320 Hz in columns of their own", ("L1", AT_320), **random),
         rig("multi-sine, cells and accelerometers at 320 Hz", ("L1 A1", AT_320), **tones),
-        rig("random, 1 % isolated bad readings in a probe", ("X1B", {"fault": FAULTS["few"]}), **random),
+        rig("random, 1 % bad readings in a probe", ("X1B", {"fault": FAULTS["few"]}), limits=WIDER, **random),
         rig("sweep with quiet parts", share=(0.15, 0.8), **{**BAND, "excitation": "sweep"}),
         rig("multi-sine", **tones),
         rig("multi-sine, one command at rest", idle, **{**tones, "directions": (0.0, 90.0)}),
