@@ -211,7 +211,7 @@ def wrapped(text: str, width: int) -> list[str]:
 def _titled_table(title: str, headings: list[str], rows: list[list[str]], words: list[int]) -> list[str]:
     """Lines of a title and its table; of one that is too wide, columns of one and the same number go to the title."""
     columns = list(range(len(headings)))
-    if rows and _total(_sizes([headings, *rows])) > _width():
+    if len(rows) > 1 and _total(_sizes([headings, *rows])) > _width():
         columns = [i for i in columns if i in words or len({row[i] for row in rows}) > 1]
         constant = sorted(set(range(len(headings))) - set(columns))
         title = "; ".join([title, *(f"{headings[i]} {rows[0][i].strip()}" for i in constant)])
