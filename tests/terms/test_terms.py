@@ -161,6 +161,18 @@ def test_wrong_accelerometers_stay_wrong_beside_cells_that_come_late(seed, wrong
     assert _WRONG in solved(learnt, blocks, truth).conditions()
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("wrong", [[-1.0, -1.0], [-1.0, 1.0]])
+def test_wrong_accelerometers_stay_wrong_where_a_negative_corner_of_the_cells_asks_for_theirs(seed, wrong):
+    rig, blocks, truth = made(Case(hertz=(25.0, 45.0), corner=1e-9, input_corner=1.0, noise=2e-4), seed)
+    z = blocks.z.copy()
+    z[:, rig.of("acceleration")] *= wrong
+    blocks = replace(blocks, z=z)
+    learnt = learnt_rig(rig, solved(rig, blocks, truth))
+    assert learnt.out_of_step
+    assert _WRONG in solved(learnt, blocks, truth).conditions()
+
+
 def test_a_delay_of_the_probes_is_considered_where_cells_carry_the_housing():
     case = Case(late={"displacement": 1e-4}, **stated(displacement={"delay_uncertainty": 1e-4}))
     rig, blocks, truth = made(case)

@@ -121,11 +121,13 @@ class Housing(Term):
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return ()
-        if self.rig.out_of_step:  # nothing else is wrong with them; the delay tells whether that stays
-            text = "" if self.rig.mount == "cells" else _otherwise(fitted, _OTHERWISE)
-            return (Condition("accelerometers-contradict-cells", text),) if text else ()
-        if self.rig.contradicted.get(self.name):
-            return self.rig.contradicted[self.name]
+        conditions = self._shown(fitted)
+        if self.rig.out_of_step:  # the delay tells whether it stays that they lead
+            return tuple(condition for condition in conditions if condition != OUT_OF_STEP)
+        return self.rig.contradicted.get(self.name) or conditions
+
+    def _shown(self, fitted: Fitted) -> tuple[Condition, ...]:
+        """What these numbers say of the accelerometers."""
         share = f"inertia is {100 * self._inertia:.2g} % of the force"
         if fitted.unexplained > _UNEXPLAINED and fitted.unexplained * self._inertia > HARMLESS:
             moves = "springs under it make of the cells' force" if self.rig.mount == "cells" else "the probes show"
