@@ -467,10 +467,10 @@ def test_what_a_band_s_motion_may_do_to_the_film_is_stated(kind, rms, peak, one_
 @pytest.mark.parametrize(
     ("names", "entries"),
     [
-        ("L1", {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}),
+        ("L1 CMD", {"rate": 320.0, "extra": ('sample_rate = "320 Hz"',)}),
         ("X1B", {"fault": lambda v, r, i: v + 12 * v.std() * (r.random(len(v)) < 0.01)}),
     ],
-    ids=["cells of a slower device", "single bad readings"],
+    ids=["cells and commands of a slower device", "single bad readings"],
 )
 def test_a_band_takes_slower_devices_and_single_bad_readings(tmp_path, kind, names, entries):
     rig = cf.Rig(excitation=kind, seconds=6.0, directions=(20.0, 110.0), repeats=2)

@@ -19,15 +19,17 @@ from rigdata.vector import inverse_directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
-from tpjb_ident.phasors.channel_times import DeviceReader, device_readers
+from tpjb_ident.phasors.channel_times import device_readers
 from tpjb_ident.phasors.run_data import QUANTITIES
 
 #: Share of a channel's samples that may be missing in stretches, bridged by straight lines,
 _MAX_LOST = 0.01
 #: and from which share on it is said.
 _TOLD_LOST = 1e-4
-#: Time stamps may stray this part of a sample from the even grid: more is a gap, and no rounding.
-_MAX_JITTER = 0.6
+#: Time stamps may stray this share of a sample from the even grid, beyond what their last digit rounds.
+_MAX_JITTER = 0.05
+#: Finest step of rounded time stamps that is looked for [s].
+_FINEST = 1e-7
 #: Half the length of the kernel [samples], and the shape of its Kaiser window: 1e-5 of a tone up to 0.4 of the rate.
 _TAPS, _KAISER, _REACH = 24, 9.0, 0.4
 #: Relative difference of rates up to which devices are alike but for their clocks.
@@ -90,60 +92,110 @@ def read_samples(
     """
     rate = run.sample_rate
     n = run.length if seconds is None else min(run.length, round(seconds * rate))
-    recorded, inside = _on_one_grid(run, n, highest)
-    channels, rows, lost = [], [], 0.0
+    recorded = _on_first_grid(run, n, highest)
+    inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
+    channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
+    single = len([channel for channel, _, _ in recorded if channel.quantity == "command"]) == 1
     for channel, values, at in recorded:
+        if channel.quantity == "command":
+            angle = run.excitation_direction if single else None
+            angle = float(channel.axis or 0.0) if angle is None else angle
+            readings = _at(_bridged(run, channel, values), at)
+            command += np.outer([np.cos(angle), np.sin(angle)], readings - readings.mean())
+            continue
         values = values if run.excitation_kind == "impact" else without_glitches(values)  # a blow is sudden itself
         if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
             continue
         channels.append(channel)
         rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
         lost = max(lost, float((~np.isfinite(values)).mean()))
-    command = _command(run, n)
-    command = None if command is None else command[:, inside]
     told = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
-    return Samples(rate, tuple(channels), np.array(rows)[:, inside], command, told if lost > _TOLD_LOST else ())
+    driven = command[:, inside] if command.any() else None
+    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, told if lost > _TOLD_LOST else ())
 
 
-def _on_one_grid(run: Run, n: int, highest: float) -> tuple[list[tuple[Channel, FloatArray, FloatArray]], BoolArray]:
-    """Channels with their readings and the places [samples] of the first one's times, and where all have some (n,)."""
+def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, FloatArray, FloatArray]]:
+    """Channels with their readings and the places [samples] among them of the first device's times, (n,) each."""
     readers = device_readers(run)
-    recorded, inside, start = [], np.ones(n, dtype=bool), 0.0
     for reader in readers:
-        if highest >= _REACH * reader.rate:
-            text = f"are sampled at {reader.rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
-            place = f"channels {', '.join(c.name for c in reader.channels)}"
-            raise refuse(run.file, place, text, "Sample faster, or excite lower frequencies", run.id)
-        part = reader.read(0, min(reader.length, int(np.ceil(n / run.sample_rate * reader.rate))))
-        begin = 0.0
-        if part.time is not None:
-            _refuse_uneven(run, part.time, reader.rate)
-            begin = float(part.time[0])
-        start = begin if reader is readers[0] else start
-        at = np.arange(float(n))
-        if reader.length != readers[0].length or abs(reader.rate / readers[0].rate - 1) > _ALIKE:
-            _refuse_blows(run, reader)
-            at = (at / run.sample_rate + start - begin) * reader.rate
-            inside &= (at >= _TAPS) & (at <= part.rows.shape[1] - 1 - _TAPS)
+        if not reader.shows(np.array(highest)):
+            text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
+            raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
+
+    def is_alike(length: int, rate: float) -> bool:
+        return length == readers[0].length and abs(rate / readers[0].rate - 1) <= _ALIKE
+
+    parts = [r.read(0, n if is_alike(r.length, r.rate) else r.length) for r in readers]
+    begin = _begin(run, parts[0].time, readers[0].rate)
+
+    def places(length: int, rate: float, name: str, time: FloatArray | None) -> FloatArray:
+        own = _begin(run, time, rate)
+        if is_alike(length, rate):
+            return np.arange(float(n))
+        _refuse_unlike(run, name, rate, highest)
+        return (np.arange(float(n)) / run.sample_rate + begin - own) * rate
+
+    recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
+    for reader, part in zip(readers, parts):
+        at = places(reader.length, reader.rate, reader.channels[0].name, part.time)
         recorded += [(channel, values, at) for channel, values in zip(reader.channels, part.rows)]
     recorded.sort(key=lambda record: QUANTITIES.index(record[0].quantity))
-    return recorded, inside
+    for channel in run.channels.values():
+        if channel.quantity == "command":
+            record = run.record(channel.name)
+            at = places(len(record), record.rate, channel.name, record.time)
+            stop = n if is_alike(len(record), record.rate) else len(record)
+            recorded.append((channel, np.asarray(record.values)[:stop], at))
+    return recorded
 
 
-def _refuse_blows(run: Run, reader: DeviceReader) -> None:
-    """Refuse blows on a device of its own rate: they hold frequencies beyond the band, which fold back into it."""
+def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
+    """Time of a device's first sample [s], by all of its stamps; refused where these have gaps."""
+    if time is None or not np.isfinite(time).any():
+        return 0.0
+    _refuse_uneven(run, time, rate)
+    return float(np.nanmedian(time - np.arange(len(time)) / rate))
+
+
+def _has_neighbours(values: FloatArray, at: FloatArray) -> BoolArray:
+    """Which places (n,) have readings on either side, as far as the kernel reaches; of its own times every one."""
+    if _is_own(values, at):
+        return np.ones(len(at), dtype=bool)
+    return np.asarray((at >= _TAPS) & (at <= len(values) - 1 - _TAPS))
+
+
+def _is_own(values: FloatArray, at: FloatArray) -> bool:
+    return len(values) == len(at) and np.array_equal(at, np.arange(len(values)))
+
+
+def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
+    """Refuse a device of its own rate that is too slow for the kernel; blows hold what folds back into the band."""
     if run.excitation_kind == "impact":
-        text = f"is sampled at {reader.rate:.6g} Hz, the first one at {run.sample_rate:.6g} Hz; blows need one rate"
-        raise refuse(run.file, f"device of channel {reader.channels[0].name}", text, "Record all at one rate", run.id)
+        text = f"is sampled at {rate:.6g} Hz, the first one at {run.sample_rate:.6g} Hz; blows need one rate"
+        raise refuse(run.file, f"device of channel {name}", text, "Record all at one rate", run.id)
+    if highest >= _REACH * rate:
+        text = f"is sampled at {rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
+        raise refuse(run.file, f"device of channel {name}", text, "Sample faster, or excite lower frequencies", run.id)
 
 
 def _refuse_uneven(run: Run, time: FloatArray, rate: float) -> None:
     """Refuse time stamps with gaps."""
     place = np.flatnonzero(np.isfinite(time))
     off = time[place] * rate - place
-    if len(place) > 2 and np.abs(off - np.polyval(np.polyfit(place, off, 1), place)).max() > _MAX_JITTER:
+    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
+    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
         text = "the samples are not evenly spaced; a transform over a band needs an even grid"
         raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
+
+
+def _rounding(time: FloatArray) -> float:
+    """Step [s] to which time stamps are rounded, a power of ten; zero where none is seen."""
+    step = 0.1
+    while step > _FINEST:
+        if np.abs(time / step - np.round(time / step)).max() < 1e-4:
+            return step
+        step /= 10
+    return 0.0
 
 
 def without_glitches(values: FloatArray) -> FloatArray:
@@ -184,23 +236,10 @@ def _bridged(run: Run, channel: Channel, values: FloatArray) -> FloatArray:
 
 def _at(values: FloatArray, places: FloatArray) -> FloatArray:
     """A channel (n,) at places [samples] of its own grid."""
-    if len(values) == len(places) and np.array_equal(places, np.arange(len(values))):
+    if _is_own(values, places):
         return values
     mean = values.mean()
     return interpolated((values - mean)[None], places)[0] + mean
-
-
-def _command(run: Run, n: int) -> FloatArray | None:
-    """Command along X and Y: every channel along its axis, a single one along the run's excitation where stated."""
-    channels = [c for c in run.channels.values() if c.quantity == "command"]
-    total = np.zeros((2, n))
-    for channel in channels:
-        values = _bridged(run, channel, np.asarray(run.record(channel.name, 0, n).values))
-        angle = float(channel.axis or 0.0)
-        if len(channels) == 1 and run.excitation_direction is not None:
-            angle = run.excitation_direction
-        total += np.outer([np.cos(angle), np.sin(angle)], values - values.mean())
-    return total if total.any() else None
 
 
 def interpolated(rows: FloatArray, at: FloatArray) -> FloatArray:
