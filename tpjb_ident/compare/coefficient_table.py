@@ -28,7 +28,7 @@ _COEFFICIENT = re.compile(r"[A-Za-z]{1,5}_[A-Za-z_]*per_(?:m|in)(_se|_lo|_hi|)")
 #: Cells of columns that are not there.
 _DEFAULTS = {"rotation": ROTATIONS[0], "converged": True, "quality": "", "status": ""}
 #: Half of a 95 % interval in standard errors.
-_HALF = 1.96
+HALF = 1.96
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def read_rows(path: Path) -> pd.DataFrame:
     rows["excitation_Hz"] = rows["excitation_Hz"].fillna(rows["shaft_speed_Hz"])
     rows["static_load_direction_deg"] = rows["static_load_direction_deg"].fillna(-90.0)
     low, high = (rows[ends[k::2]].to_numpy(float) for k in (0, 1))
-    stated = (high - low) / (2 * _HALF)  # our own tables have both: the interval holds calibration too
+    stated = (high - low) / (2 * HALF)  # our own tables have both: the interval holds calibration too
     rows[ERRORS] = np.where(np.isnan(stated), rows[ERRORS], stated)
     flags = rows["quality"].where(rows["quality"] != "", rows["status"]) + "; " + assumed
     rows["status"] = flags.map(_flags)

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 from rigdata.arrays import FloatArray, IntArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, place_of, size, spinning, symbol
-from tpjb_ident.compare.coefficient_table import partners
+from tpjb_ident.compare.coefficient_table import HALF, partners
 from tpjb_ident.conditions import errors_in
 from tpjb_ident.rounding import counted, percent, with_interval
 from tpjb_ident.runtime.table_reader import read_table
@@ -40,8 +40,6 @@ _PIVOT_LOADS = 5
 _OF_INSTRUMENTS = ("calibration", "axis", "delay", "mass", "temperature")
 _CLEARANCE = "clearance_m"
 _LEVEL = 0.95
-#: Half of a 95 % interval in standard errors.
-_HALF = 1.96
 #: Columns of a value and its interval.
 _ENDS = ("", "_lo", "_hi")
 #: Degrees of freedom, by which the quantile that a table's interval was made with is read back.
@@ -171,12 +169,12 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
 def _variances(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray | float, FloatArray | float]:
     """Random and systematic variance of a quantity, and degrees of freedom of the random one."""
     if f"{name}_se_systematic" not in frame:  # its interval is all that is known
-        return ((frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float) / (2 * _HALF)) ** 2, 0.0, np.inf
+        return ((frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float) / (2 * HALF)) ** 2, 0.0, np.inf
     error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
     freedom: FloatArray | float = np.inf
     if f"{name}_random95" in frame:
         with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
-            quantile = np.nan_to_num(frame[f"{name}_random95"].to_numpy(float) / error, nan=_HALF)
+            quantile = np.nan_to_num(frame[f"{name}_random95"].to_numpy(float) / error, nan=HALF)
         freedom = np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
     return error**2, systematic**2, freedom
 
@@ -241,7 +239,7 @@ def _at_common_loads(*curves: pd.DataFrame) -> list[pd.DataFrame]:
         scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
         columns = {"pad": curve["pad"].iloc[0], "force_N": force, TANGENT: value}
         columns |= {f"{TANGENT}_lo": low_end, f"{TANGENT}_hi": high_end, f"{TANGENT}_se_systematic": scale * value}
-        frames.append(pd.DataFrame({**columns, f"{TANGENT}_se": (high_end - low_end) / (2 * _HALF)}))
+        frames.append(pd.DataFrame({**columns, f"{TANGENT}_se": (high_end - low_end) / (2 * HALF)}))
     return frames
 
 
@@ -253,7 +251,7 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
     frames = []
     for table in (a.clearance, b.clearance):
         frame = pads.merge(table)
-        half = _HALF * frame[f"{_CLEARANCE}_se"]
+        half = HALF * frame[f"{_CLEARANCE}_se"]
         ends = {f"{_CLEARANCE}_lo": frame[_CLEARANCE] - half, f"{_CLEARANCE}_hi": frame[_CLEARANCE] + half}
         frames.append(frame.assign(**ends, **{f"{_CLEARANCE}_se_systematic": 0.0}))
     judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE].to_numpy(), len(pads))
