@@ -483,6 +483,27 @@ def test_a_band_takes_slower_devices_and_single_bad_readings(tmp_path, kind, nam
     assert np.abs(off[:, [0, 3]] / h[:, [0, 3]]).max() < 0.12
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [(0.4, 1.0), (0.0, 0.55), (0.2, 0.8)])
+def test_a_multisine_that_starts_late_or_ends_early_is_taken_where_it_drives(tmp_path, share):
+    rig = cf.Rig(excitation="multisine", seconds=6.0, directions=(20.0, 110.0), repeats=2, share=share)
+    result = identify(load_campaign(cf.write_rig(tmp_path, rig)))
+    (band,) = result.bands
+    assert len(band.lines) == 80
+    assert not untrusted(band.quality)
+    off = (band.h - rig.film.h(band.frequencies, 5000.0)).reshape(-1, 4)
+    assert (np.abs(np.hstack([off.real, off.imag])) < band.half_width()).mean() > 0.88
+
+
+@pytest.mark.parametrize("band", [(8.0, 60.0), (25.0, 28.5)])
+def test_a_band_in_which_nothing_drives_gives_no_line_and_says_so(tmp_path, band):
+    rig = cf.Rig(excitation="multisine", band=band, seconds=6.0, directions=(20.0, 110.0), amplitude=1e-9)
+    result = tpjb("identify", cf.write_rig(tmp_path, rig), "--out", tmp_path / "out")
+    assert result.exit_code == 3, result.output
+    assert "excitation-too-weak" in result.output
+    assert pd.read_csv(tmp_path / "out" / "frf.csv").empty
+
+
 def test_blows_need_devices_of_one_rate(tmp_path):
     """What a blow holds beyond the band folds back into it where a device is slow."""
     rig = cf.Rig(excitation="impact", seconds=2.0, directions=(20.0, 110.0))

@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import map_coordinates, spline_filter1d
+from scipy.ndimage import map_coordinates, spline_filter1d, uniform_filter1d
 from scipy.signal import find_peaks
 from scipy.special import betainc, fdtri, gammaincc
 
-from rigdata.arrays import FloatArray, IntArray
-from tpjb_ident.bands.disturbing_lines import LEFT_OUT_OF_PERIOD, bins_taken, without_disturbances
+from rigdata.arrays import BoolArray, FloatArray, IntArray
+from tpjb_ident.bands.disturbing_lines import LEFT_OUT_OF_PERIOD, bins_taken
 from tpjb_ident.bands.samples import Samples, interpolated
 from tpjb_ident.phasors.lines import Line
 
@@ -41,40 +41,55 @@ _WINDOWED = 0.4
 _BESIDE = 4
 #: Phase [rad] by which the top of the band may run off over the record before it is resampled.
 _MAX_SLIP = 0.01
+#: Power within a band, over a cycle of its lowest frequency and of what is usual, below which nothing drives.
+_QUIET = 0.05
 
 
-def find_period(samples: Samples, band: tuple[float, float], lines: tuple[Line, ...], most: float) -> float | None:
+def driven_part(clean: Samples, band: tuple[float, float]) -> slice:
+    """Samples from where the drive of a band begins to where it ends, of a record without shaft and mains."""
+    frequency = np.fft.rfftfreq(2 * clean.length, 1 / clean.rate)
+    rows = _filtered(clean.signals(), (frequency > band[0]) & (frequency < band[1]))
+    power = uniform_filter1d(np.sum(rows**2, axis=0), int(clean.rate / band[0]))
+    driven = np.flatnonzero(power >= _QUIET * np.quantile(power, 0.9))
+    return slice(int(driven[0]), int(driven[-1]) + 1)
+
+
+def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ...], most: float) -> float | None:
     """Smallest period in samples of what excites the band, None where it does not repeat.
 
-    `lines` of shaft and mains take no part; `most` is the share of the power that may not repeat.
+    `lines` of shaft and mains are taken off; `most` is the share of the power that may not repeat.
     """
-    n, step = samples.length, samples.rate / samples.length
+    n, step = clean.length, clean.rate / clean.length
     frequency = np.asarray(0.5 * step * np.arange(n + 1), dtype=float)
     keep = (frequency > band[0] - 2 * step) & (frequency < band[1] + 2 * step) & ~bins_taken(frequency, lines, 1 / step)
-    clean = without_disturbances(samples, lines)
     window = np.hanning(n)  # under which the lines of an excitation end with the band
-    spectra = np.where(keep, np.fft.rfft(clean.signals() * window, 2 * n, axis=1), 0.0)
-    rows = np.fft.irfft(spectra, axis=1)[:, :n]
-    first = int(samples.rate / band[0])
-    finer = math.ceil(_POINTS * band[1] / samples.rate)
+    rows = _filtered(clean.signals() * window, keep)
+    first = int(clean.rate / band[0])
+    finer = math.ceil(_POINTS * band[1] / clean.rate)
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
     alike, power = (_correlation(*pair, finer) for pair in pairs)
     part = alike[::finer][first : n // _MIN_PERIODS + 1]
     lags = find_peaks(part, height=0.0)[0] + first
     if not len(lags):
         return None
-    periods, left = _combed((alike, power), lags, samples.rate / band[1], finer)
+    periods, left = _combed((alike, power), lags, clean.rate / band[1], finer)
     freedom = _WINDOWED * keep.sum() * (1 - periods / n)
     least = freedom[np.argmin(left)]
     more = np.maximum(freedom - least, 1.0)
     allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
     k = int(np.argmax(left <= left.min() * allowed))
     ratio = periods / periods[k]
-    other = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * samples.rate / band[1]
+    other = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * clean.rate / band[1]
     unclear = (freedom * np.log(left / left[k]) < math.log(_CLEAR))[other].any()
     if unclear or left[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
         return None
     return float(periods[k])
+
+
+def _filtered(rows: FloatArray, keep: BoolArray) -> FloatArray:
+    """Rows (k, n) of the frequencies to keep alone, (n + 1,) of them."""
+    n = rows.shape[1]
+    return np.fft.irfft(np.where(keep, np.fft.rfft(rows, 2 * n, axis=1), 0.0), axis=1)[:, :n]
 
 
 def _correlation(first: FloatArray, second: FloatArray, finer: int) -> FloatArray:

@@ -18,7 +18,7 @@ from tpjb_ident.bands.disturbing_lines import (
     find_disturbances,
     without_disturbances,
 )
-from tpjb_ident.bands.period import find_period, resampled
+from tpjb_ident.bands.period import driven_part, find_period, resampled
 from tpjb_ident.bands.samples import Samples, read_samples
 from tpjb_ident.conditions import merged
 from tpjb_ident.phasors.compensation import compensated, filled_channels, slower_condition
@@ -87,10 +87,10 @@ def run_spectra(
         samples = read_samples(run, seconds, fast, band[1])
         temperatures = mean_temperatures(run)
     lines = find_disturbances(samples, run.point.shaft_speed_hz, settings.lines.mains, band[1])
-    period = _period(run, samples, band, lines)
+    driven, period = _period(run, samples, band, lines)
     length, cut, width = samples.length, samples, LEFT_OUT
     if period is not None:
-        length, cut, width = round(period), resampled(samples, period, band[1]), LEFT_OUT_OF_PERIOD
+        length, cut, width = round(period), resampled(driven, period, band[1]), LEFT_OUT_OF_PERIOD
     clean = without_disturbances(cut, lines, None if period is None else length)
     places = _places(clean.rate, length, band)
 
@@ -126,16 +126,22 @@ def _motion(samples: Samples) -> tuple[float, float, float]:
     return float(np.sqrt(np.mean(size**2))), float(size.max()), one_sided
 
 
-def _period(run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]) -> float | None:
+def _period(
+    run: Run, samples: Samples, band: tuple[float, float], lines: tuple[Line, ...]
+) -> tuple[Samples, float | None]:
+    """The driven part of a record, and the period [samples] with which it repeats itself; None where it does not."""
     if run.excitation_kind not in OPEN_ENDS:
-        return None
+        return samples, None
     stated = run.excitation_kind == "multisine"
-    period = find_period(samples, band, lines, 1.0 if stated else _LEFT)
+    clean = without_disturbances(samples, lines)
+    part = driven_part(clean, band)
+    clean, driven = (record.each(lambda rows: rows[:, part]) for record in (clean, samples))
+    period = find_period(clean, band, lines, 1.0 if stated else _LEFT)
     if period is None and stated:
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)
-    return period
+    return driven, period
 
 
 def _places(rate: float, length: int, band: tuple[float, float]) -> IntArray:

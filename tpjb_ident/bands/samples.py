@@ -15,7 +15,7 @@ from rigdata.arrays import BoolArray, FloatArray
 from rigdata.calibration import Channel
 from rigdata.problem import refuse
 from rigdata.run import Run
-from rigdata.vector import inverse_directions
+from rigdata.vector import directions, inverse_directions
 from tpjb_ident.check.signals import is_spare
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.bad_samples import BAD_LIMIT, robust_deviation
@@ -95,13 +95,14 @@ def read_samples(
     recorded = _on_first_grid(run, n, highest)
     inside = np.all([_has_neighbours(values, at) for _, values, at in recorded], axis=0)
     channels, rows, lost, command = [], [], 0.0, np.zeros((2, n))
-    single = len([channel for channel, _, _ in recorded if channel.quantity == "command"]) == 1
+    single = len(run.of("command")) == 1
     for channel, values, at in recorded:
         if channel.quantity == "command":
-            angle = run.excitation_direction if single else None
-            angle = float(channel.axis or 0.0) if angle is None else angle
+            angle = channel.axis or 0.0
+            if single and run.excitation_direction is not None:
+                angle = run.excitation_direction
             readings = _at(_bridged(run, channel, values), at)
-            command += np.outer([np.cos(angle), np.sin(angle)], readings - readings.mean())
+            command += np.outer(directions(angle), readings - readings.mean())
             continue
         values = values if run.excitation_kind == "impact" else without_glitches(values)  # a blow is sudden itself
         if _lost(values) > _MAX_LOST and is_spare(channel, [c for c, _, _ in recorded]):
@@ -116,56 +117,43 @@ def read_samples(
 
 def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, FloatArray, FloatArray]]:
     """Channels with their readings and the places [samples] among them of the first device's times, (n,) each."""
-    readers = device_readers(run)
+    readers = device_readers(run, command=True)
+    recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
+    begins, places = [], np.arange(float(n))
     for reader in readers:
         if not reader.shows(np.array(highest)):
             text = f"the band reaches {highest:g} Hz, more than 0.45 of the sample rate of {reader.rate:g} Hz"
             raise refuse(run.file, "excitation_band", text, "Sample faster, or excite lower frequencies", run.id)
-
-    def is_alike(length: int, rate: float) -> bool:
-        return length == readers[0].length and abs(rate / readers[0].rate - 1) <= _ALIKE
-
-    parts = [r.read(0, n if is_alike(r.length, r.rate) else r.length) for r in readers]
-    begin = _begin(run, parts[0].time, readers[0].rate)
-
-    def places(length: int, rate: float, name: str, time: FloatArray | None) -> FloatArray:
-        own = _begin(run, time, rate)
-        if is_alike(length, rate):
-            return np.arange(float(n))
-        _refuse_unlike(run, name, rate, highest)
-        return (np.arange(float(n)) / run.sample_rate + begin - own) * rate
-
-    recorded: list[tuple[Channel, FloatArray, FloatArray]] = []
-    for reader, part in zip(readers, parts):
-        at = places(reader.length, reader.rate, reader.channels[0].name, part.time)
+        is_alike = reader.length == readers[0].length and abs(reader.rate / readers[0].rate - 1) <= _ALIKE
+        part = reader.read(0, n if is_alike else reader.length)
+        begins.append(_begin(run, part.time, reader.rate))
+        if not is_alike:
+            _refuse_unlike(run, reader.channels[0].name, reader.rate, highest)
+        at = places if is_alike else (places / run.sample_rate + begins[0] - begins[-1]) * reader.rate
         recorded += [(channel, values, at) for channel, values in zip(reader.channels, part.rows)]
-    recorded.sort(key=lambda record: QUANTITIES.index(record[0].quantity))
-    for channel in run.channels.values():
-        if channel.quantity == "command":
-            record = run.record(channel.name)
-            at = places(len(record), record.rate, channel.name, record.time)
-            stop = n if is_alike(len(record), record.rate) else len(record)
-            recorded.append((channel, np.asarray(record.values)[:stop], at))
-    return recorded
+    return sorted(recorded, key=lambda record: (*QUANTITIES, "command").index(record[0].quantity))
 
 
 def _begin(run: Run, time: FloatArray | None, rate: float) -> float:
     """Time of a device's first sample [s], by all of its stamps; refused where these have gaps."""
     if time is None or not np.isfinite(time).any():
         return 0.0
-    _refuse_uneven(run, time, rate)
-    return float(np.nanmedian(time - np.arange(len(time)) / rate))
+    place = np.flatnonzero(np.isfinite(time))
+    off = time[place] * rate - place
+    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
+    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
+        text = "the samples are not evenly spaced; a transform over a band needs an even grid"
+        raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
+    return float(np.median(off)) / rate
 
 
 def _has_neighbours(values: FloatArray, at: FloatArray) -> BoolArray:
     """Which places (n,) have readings on either side, as far as the kernel reaches; of its own times every one."""
-    if _is_own(values, at):
-        return np.ones(len(at), dtype=bool)
-    return np.asarray((at >= _TAPS) & (at <= len(values) - 1 - _TAPS))
+    return np.asarray(_is_own(values, at) | (at >= _TAPS) & (at <= len(values) - 1 - _TAPS))
 
 
 def _is_own(values: FloatArray, at: FloatArray) -> bool:
-    return len(values) == len(at) and np.array_equal(at, np.arange(len(values)))
+    return np.array_equal(at, np.arange(len(values)))
 
 
 def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
@@ -176,16 +164,6 @@ def _refuse_unlike(run: Run, name: str, rate: float, highest: float) -> None:
     if highest >= _REACH * rate:
         text = f"is sampled at {rate:.6g} Hz; a band up to {highest:g} Hz needs {highest / _REACH:.4g} Hz"
         raise refuse(run.file, f"device of channel {name}", text, "Sample faster, or excite lower frequencies", run.id)
-
-
-def _refuse_uneven(run: Run, time: FloatArray, rate: float) -> None:
-    """Refuse time stamps with gaps."""
-    place = np.flatnonzero(np.isfinite(time))
-    off = time[place] * rate - place
-    drift = np.polyval(np.polyfit(place, off, 1), place) if len(place) > 2 else off
-    if np.abs(off - drift).max() > _MAX_JITTER + 0.6 * rate * _rounding(time[place]):
-        text = "the samples are not evenly spaced; a transform over a band needs an even grid"
-        raise refuse(run.file, "time", text, "Resample the record, or export it without gaps", run.id)
 
 
 def _rounding(time: FloatArray) -> float:

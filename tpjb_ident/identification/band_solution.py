@@ -65,8 +65,8 @@ class BandSolution:
 def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[str, float]) -> BandSolution:
     """Solve all bands; `taken_off`: rates of clocks."""
     crude, condition = _crude(rig, data)
-    regular = data.driven & (condition < _ONE_LINE)
-    usable, used = regular & data.clear, regular
+    used = data.driven & (condition < _ONE_LINE)
+    usable = used & data.clear
     curve = _curve(data, used, crude, usable)
     bend = curve(data.band[data.line], data.omega) - curve(data.band, data.line_omega)[data.line]
     start = np.where(usable[data.line][:, None, None], crude[data.line] + bend, np.nan)

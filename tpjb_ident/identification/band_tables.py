@@ -105,7 +105,7 @@ def band_results(
     apart = real_numbers(solved.solutions[-1].part_h - solved.first.part_h) / np.sqrt(12)
     results = []
     for b, data in enumerate(solved.points):
-        changes = np.concatenate([solved.first.part.factors, apart[None]])[:, parts[b]]
+        changes = np.concatenate([solved.first.part.factors[:, parts[b]], apart[None, parts[b]]])
         models = _models(solved, b, points[b], changes) if points[b] else {}
         chosen = supported(models) if models else "raw H"
         period, width = data.spectra[0].period, data.plan.resolution

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rigdata.campaign import Campaign
@@ -23,10 +23,9 @@ from tpjb_ident.identification.settings import IdentifySettings
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.runs.checked_runs import campaign_verdicts, check_conditions
 from tpjb_ident.runs.excluded_runs import ExcludedRun, lost_points, named_runs, without_runs
+from tpjb_ident.runs.run_jobs import Progress
 from tpjb_ident.runs.static_load import static_loads
 from tpjb_ident.terms.registry import cell_stiffness
-
-Progress = Callable[[str, int, int], None]
 
 
 def identify_bands(

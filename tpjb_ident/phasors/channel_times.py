@@ -30,7 +30,7 @@ class DeviceReader:
 
     run: Run
     device: Device
-    channels: tuple[Channel, ...]  #: with a direction, of displacement, force, acceleration in this order
+    channels: tuple[Channel, ...]  #: of displacement, force, acceleration, command in this order
     tachometer: Channel | None
     rate: float
     length: int
@@ -70,10 +70,12 @@ class DeviceReader:
         return np.asarray(frequencies < 0.45 * self.rate)
 
 
-def device_readers(run: Run) -> tuple[DeviceReader, ...]:
-    """Devices of a run that have channels with a direction, that of the first displacement channel first."""
+def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
+    """Devices of a run that have channels with a direction, or a command if asked; that of the first probe first."""
     _check_directions(run)
     directed = {c.name: c for q in QUANTITIES for c in run.channels.values() if c.quantity == q and c.axis is not None}
+    if command:
+        directed |= {c.name: c for c in run.channels.values() if c.quantity == "command"}
     tachometers = run.of("speed")[:1]
     devices = run.devices
     for name in directed.keys() - {name for device in devices for name in device.channels}:
