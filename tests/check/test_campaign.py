@@ -92,11 +92,11 @@ def test_a_load_that_is_held_on_one_step_of_the_converter_is_not_clipped(kind, n
     assert statistics.clipped_share() > 0.05
     report = Reporter(replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), kind=kind))
     check_signal(report, probe, statistics, False, PROBES)
-    assert any("clipped" in f.key for f in report.found) is named
+    assert any("clipped" in f.key for f in report.findings) is named
     # a slow wave that meets a limit stands nowhere else
     wave = np.minimum(70.0 * np.sin(np.arange(2400) / 20.0), 60.0).round()
     check_signal(report, replace(probe, name="B"), seen(wave), False, PROBES)
-    assert any(f.key == "clipped B" for f in report.found)
+    assert any(f.key == "clipped B" for f in report.findings)
 
 
 def test_coarse_converters_repeat_readings_without_being_stuck():
@@ -179,8 +179,8 @@ def test_what_many_runs_share_is_told_once():
     findings = []
     for run in runs[:4]:
         report = Reporter(run)
-        report.say("dead X", "error", "channel X", "is dead", "Check it")
-        findings += report.found
+        report.note("dead X", "error", "channel X", "is dead", "Check it")
+        findings += report.findings
     findings.append(Finding(Problem("note", "f", "p", "other", "cure", "d-1"), "other"))
     merged = merge(findings, "c.h5", runs)
     assert [(p.run, p.file) for p in merged] == [(None, "c.h5"), ("d-1", "f")]
@@ -307,9 +307,9 @@ def test_what_one_of_many_static_runs_shows_stays_its_own():
             run = replace(run_of(HeldReader({}, 1000.0), {c.name: c for c in PROBES}), id=f"r{i}", kind=kind)
             made.append(Reporter(run))
             if i in concerned:
-                made[-1].say("signs A B", "error", "channels A and B", "go elsewhere", "Look", ["A", "B"])
+                made[-1].note("signs A B", "error", "channels A and B", "go elsewhere", "Look", ["A", "B"])
         reach(made)
-        return [len(report.found) for report in made]
+        return [len(report.findings) for report in made]
 
     assert reports(["clearance", "dynamic", "dynamic"], [0]) == [1, 1, 1]
     assert reports(["dry_pivot"] * 5 + ["dynamic"], [1]) == [0, 1, 0, 0, 0, 0]

@@ -157,8 +157,8 @@ def test_a_gain_below_one_per_cent_is_no_fault():
 
 def test_runs_that_are_known_to_differ_are_not_told_again():
     readings = spoilt(point(9), 2, 3, 1.05)
-    assert wrong_gains(readings, known=[2]) == {}
-    assert list(wrong_gains(spoilt(readings, 5, 0, 0.95, CENTRE[0]), known=[2])) == [5]
+    assert wrong_gains(readings, outliers=[2]) == {}
+    assert list(wrong_gains(spoilt(readings, 5, 0, 0.95, CENTRE[0]), outliers=[2])) == [5]
 
 
 def test_a_third_of_the_runs_at_most():
@@ -166,7 +166,7 @@ def test_a_third_of_the_runs_at_most():
     for run in (1, 4, 6):
         readings = spoilt(readings, run, 3, 1.04 if run != 4 else 0.95)
     assert sorted(wrong_gains(readings)) == [1, 4, 6]
-    assert wrong_gains(spoilt(point(6), 2, 3, 1.04), known=[0, 1]) == {}
+    assert wrong_gains(spoilt(point(6), 2, 3, 1.04), outliers=[0, 1]) == {}
     assert wrong_gains(spoilt(point(3), 2, 3, 1.04)) == {}
 
 
@@ -202,7 +202,7 @@ def test_a_difference_is_weighted_by_its_covariance():
     assert made.misfit(np.array([1.0, 1.0]), 1.0) == pytest.approx(4 / 3 / 2)
     assert evidence([made], [np.zeros(2)]) == Evidence()
     # two independent ones: the mean by information, and the freedom adds up
-    second = made._replace(rest=made.rest + 2)
+    second = made._replace(residual=made.residual + 2)
     both = evidence([made, second], [np.ones(2), np.ones(2)])
     assert both.part == pytest.approx(2.5)
     assert both.error == pytest.approx(math.sqrt(3 / 8))

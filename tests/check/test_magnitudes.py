@@ -46,7 +46,7 @@ def judged(check, sizes, *more):
     """Keys and severities of what one check says of the sizes of a run."""
     report = Reporter(sizes.run)
     check(report, *more or (sizes,))
-    return [(finding.key, finding.problem.severity) for finding in report.found]
+    return [(finding.key, finding.problem.severity) for finding in report.findings]
 
 
 def test_rigs_of_every_size_pass():
@@ -116,14 +116,14 @@ def test_check_and_identify_both_name_a_description_that_is_far_off(tmp_path, na
 def test_a_stator_heavier_than_its_loads_and_another_rate_are_named(campaign_of):
     campaign = load_campaign(campaign_of(rocker_rig(3, plan=replace(SMALL_PLAN, dry=(), locus=(), clearance=()))))
     observations = [observe(run) for run in campaign.runs]
-    count = sum(len(o.report.found) for o in observations)
+    count = sum(len(o.report.findings) for o in observations)
     check_magnitudes(observations, campaign.housing_mass)
-    assert sum(len(o.report.found) for o in observations) == count
+    assert sum(len(o.report.findings) for o in observations) == count
     check_magnitudes(observations, 1600.0)
-    assert {(o.report.found[-1].key, o.report.found[-1].problem.severity) for o in observations} == {
+    assert {(o.report.findings[-1].key, o.report.findings[-1].problem.severity) for o in observations} == {
         ("weight", "warning")
     }
     slow = replace(campaign.runs[0], reader=replace(campaign.runs[0].reader, stated_rate=4000.0))
     off = replace(observations[0], run=slow)
     check_magnitudes([off], 30.0)
-    assert off.report.found[-1].problem.what.startswith("the file shows 1000 Hz, the manifest states 4000 Hz")
+    assert off.report.findings[-1].problem.what.startswith("the file shows 1000 Hz, the manifest states 4000 Hz")

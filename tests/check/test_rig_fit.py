@@ -73,7 +73,7 @@ def found(case):
     fit = rig_fit(*case)
     assert fit is not None
     check_accelerometers(fit)
-    told = [(i, f.problem.what) for i, run in enumerate(case[1]) for f in run.report.found]
+    told = [(i, f.problem.what) for i, run in enumerate(case[1]) for f in run.report.findings]
     return {str(c): c.detail for c in fit.solution.conditions()}, told
 
 

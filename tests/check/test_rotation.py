@@ -27,7 +27,7 @@ def observations(request, campaign_of):
 
 def told(observations):
     check_rotation(observations)
-    return [f.problem for o in observations for f in o.report.found if f.key == "rotation"]
+    return [f.problem for o in observations for f in o.report.findings if f.key == "rotation"]
 
 
 def described_as(observation, rotation):

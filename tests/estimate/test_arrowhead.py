@@ -117,15 +117,15 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
     all_sums.add(point, np.ones(len(point)), r, J_h, border)
     joined = (np.concatenate([to_prior, distance.ravel()]), np.concatenate([precision, own.precision.ravel()]))
     bordered = step(all_sums, shared(*joined), Prior.none(POINTS))
-    np.testing.assert_array_equal(found.own.estimated.ravel(), bordered.estimated[PARAMETERS:])
-    assert found.own.estimated.sum() <= POINTS * (OWN - len(weak))
+    np.testing.assert_array_equal(found.by_point.estimated.ravel(), bordered.estimated[PARAMETERS:])
+    assert found.by_point.estimated.sum() <= POINTS * (OWN - len(weak))
     for value, other in (
         (found.h, bordered.h),
         (found.theta, bordered.theta[:PARAMETERS]),
-        (found.own.change.ravel(), bordered.theta[PARAMETERS:]),
-        (found.own.deviation.ravel(), bordered.deviation[PARAMETERS:]),
+        (found.by_point.change.ravel(), bordered.theta[PARAMETERS:]),
+        (found.by_point.deviation.ravel(), bordered.deviation[PARAMETERS:]),
         (found.deviation, bordered.deviation[:PARAMETERS]),
-        (found.given, bordered.given),
+        (found.conditional, bordered.conditional),
         (found.records, bordered.records),
         (found.factors(), bordered.factors()[:PARAMETERS]),
     ):
@@ -133,7 +133,7 @@ def test_parameters_of_single_points_are_those_of_a_border_that_holds_them_all(w
     own_factors = bordered.factors()[PARAMETERS:].reshape(POINTS, OWN, POINTS, NUMBERS)
     for k in range(OWN):
         share = np.einsum("rpa,rpb->pab", own_factors[:, k], own_factors[:, k])
-        np.testing.assert_allclose(found.own_share(np.arange(OWN) == np.full((POINTS, 1), k)), share, atol=1e-10)
+        np.testing.assert_allclose(found.point_share(np.arange(OWN) == np.full((POINTS, 1), k)), share, atol=1e-10)
 
 
 def test_always_means_always():

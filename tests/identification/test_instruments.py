@@ -83,7 +83,7 @@ def test_a_zero_of_the_cells_is_told_from_a_gain_by_the_loads():
     found = cell_zero(means, loads)
     assert abs(found.force - (120 - 300j)) < 40
     assert found.conditions() == ("cells-not-tared",)
-    assert cell_zero(means, loads, stated=5.0).force == 0  # a load that is really off
+    assert cell_zero(means, loads, uncertainty=5.0).force == 0  # a load that is really off
     assert cell_zero(1.01 * loads * (1 + 0.003 * rng.standard_normal(18)), loads).force == 0
     assert cell_zero(means[:6], loads[:6]).force == 0  # one load
 

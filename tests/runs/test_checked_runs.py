@@ -82,23 +82,23 @@ def test_kept_readings_are_those_of_the_file(campaign):
 def test_an_observation_that_was_kept_is_the_same(campaign):
     run = campaign.runs[2]
     seen = observe(run)
-    seen.report.say("x", "warning", "here", "is odd", "Look")
+    seen.report.note("x", "warning", "here", "is odd", "Look")
     arrays = {}
     again = unpacked(packed(seen, arrays), arrays, run)
     assert packed(again, {}) == packed(seen, {})
     assert again.channels == seen.channels
     assert again.shaft_force == pytest.approx(seen.shaft_force, nan_ok=True)
-    assert again.report.found == seen.report.found
+    assert again.report.findings == seen.report.findings
     np.testing.assert_array_equal(again.lines.phasor, seen.lines.phasor)
 
 
 def test_a_third_of_the_runs_share_a_finding(campaign):
     reports = [Reporter(run) for run in campaign.runs]
     for report in reports[:2]:
-        report.say("two", "error", "", "wrong", "")
+        report.note("two", "error", "", "wrong", "")
     for report in reports[2:5]:
-        report.say("three", "error", "", "wrong", "")
-        report.say("odd", "warning", "", "odd", "")
+        report.note("three", "error", "", "wrong", "")
+        report.note("odd", "warning", "", "odd", "")
     found = verdicts(reports)
     assert list(found.unusable) == [run.id for run in campaign.runs[:2]]
     assert list(found.shared) == list(found.doubtful) == [run.id for run in campaign.runs[2:5]]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray, IntArray
-from tpjb_ident.bands.responses import beside, end_columns, place_in_line
+from tpjb_ident.bands.responses import end_columns, orthogonal, place_in_line
 from tpjb_ident.bands.run_spectra import RunSpectra
 from tpjb_ident.estimators.r_matrix import complex_to_real_covariance
 
@@ -37,9 +37,9 @@ def classic_line(spectra: Sequence[RunSpectra], groups: Sequence[IntArray], ends
     """H1, H2, Hv and coherence over all rows of a line: periods, or bins of its groups."""
     S, n, freedom = np.zeros((4, 4), complex), 0, -2
     for bins in groups:
-        rows, taken = _rows(spectra, bins, ends)
+        rows, used = _rows(spectra, bins, ends)
         S += rows.T @ rows.conj()
-        n, freedom = n + len(rows), freedom + len(rows) - taken
+        n, freedom = n + len(rows), freedom + len(rows) - used
     size = np.sqrt(np.diag(S).real)
     if freedom < 1 or not (size > 0).all() or not np.linalg.cond(S[:2, :2] / np.outer(size, size)[:2, :2]) < _ONE_LINE:
         return ClassicLine({}, np.full((8, 8), np.nan), 1.0, np.full(2, np.nan), n)
@@ -64,4 +64,4 @@ def _rows(spectra: Sequence[RunSpectra], bins: IntArray, ends: bool) -> tuple[Co
     sloped = rows[:, :2] * np.tile(place, len(spectra))[:, None]
     leaked = end_columns(len(spectra), place)[:, : None if ends else 0]
     basis = np.linalg.qr(np.concatenate([sloped, leaked], axis=1))[0]
-    return beside(rows, basis), basis.shape[1]
+    return orthogonal(rows, basis), basis.shape[1]

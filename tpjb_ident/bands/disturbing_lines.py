@@ -40,8 +40,10 @@ def find_disturbances(samples: Samples, speed: float, mains: float, top: float) 
     settings = LineSettings(supply, harmonics, mains_harmonics=_MAINS_HARMONICS)
     resolved: list[Line] = []
     for line in strong_lines((), shaft, settings):
-        apart = all(abs(line.frequency - other.frequency) > samples.rate / samples.length for other in resolved)
-        if line.frequency < reach and apart:
+        is_resolved = all(
+            abs(line.frequency - neighbour.frequency) > samples.rate / samples.length for neighbour in resolved
+        )
+        if line.frequency < reach and is_resolved:
             resolved.append(line)
     return tuple(resolved)
 

@@ -61,9 +61,11 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     """
     n, step = clean.length, clean.rate / clean.length
     frequency = np.asarray(0.5 * step * np.arange(n + 1), dtype=float)
-    keep = (frequency > band[0] - 2 * step) & (frequency < band[1] + 2 * step) & ~bins_taken(frequency, lines, 1 / step)
+    inside = (
+        (frequency > band[0] - 2 * step) & (frequency < band[1] + 2 * step) & ~bins_taken(frequency, lines, 1 / step)
+    )
     window = np.hanning(n)  # under which the lines of an excitation end with the band
-    rows = _filtered(clean.signals() * window, keep)
+    rows = _filtered(clean.signals() * window, inside)
     first = int(clean.rate / band[0])
     finer = math.ceil(_POINTS * band[1] / clean.rate)
     pairs = (rows * window, rows * window), (rows**2, window[None] ** 2)
@@ -72,32 +74,32 @@ def find_period(clean: Samples, band: tuple[float, float], lines: tuple[Line, ..
     lags = find_peaks(part, height=0.0)[0] + first
     if not len(lags):
         return None
-    periods, left = _combed((alike, power), lags, clean.rate / band[1], finer)
-    freedom = _WINDOWED * keep.sum() * (1 - periods / n)
-    least = freedom[np.argmin(left)]
+    periods, remainder = _combed((alike, power), lags, clean.rate / band[1], finer)
+    freedom = _WINDOWED * inside.sum() * (1 - periods / n)
+    least = freedom[np.argmin(remainder)]
     more = np.maximum(freedom - least, 1.0)
     allowed = (least + more * fdtri(more, least, 1 - _CHANCE)) / (least + more)
-    k = int(np.argmax(left <= left.min() * allowed))
+    k = int(np.argmax(remainder <= remainder.min() * allowed))
     ratio = periods / periods[k]
-    other = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * clean.rate / band[1]
-    unclear = (freedom * np.log(left / left[k]) < math.log(_CLEAR))[other].any()
-    if unclear or left[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
+    foreign = np.abs(ratio - np.round(ratio)) * periods[k] > _ONE_LAG * clean.rate / band[1]
+    unclear = (freedom * np.log(remainder / remainder[k]) < math.log(_CLEAR))[foreign].any()
+    if unclear or remainder[k] > most or _chance_of_noise(clean, float(periods[k]), band, lines) > _CHANCE / len(part):
         return None
     return float(periods[k])
 
 
-def _filtered(rows: FloatArray, keep: BoolArray) -> FloatArray:
+def _filtered(rows: FloatArray, inside: BoolArray) -> FloatArray:
     """Rows (k, n) of the frequencies to keep alone, (n + 1,) of them."""
     n = rows.shape[1]
-    return np.fft.irfft(np.where(keep, np.fft.rfft(rows, 2 * n, axis=1), 0.0), axis=1)[:, :n]
+    return np.fft.irfft(np.where(inside, np.fft.rfft(rows, 2 * n, axis=1), 0.0), axis=1)[:, :n]
 
 
 def _correlation(first: FloatArray, second: FloatArray, finer: int) -> FloatArray:
     """Sum over rows (k, n) of their products at lags of both signs alike, `finer` of them a sample, (finer n,)."""
     n = first.shape[1]
     spectra = [np.fft.rfft(rows, 2 * n, axis=1) for rows in (first, second)]
-    whole = np.sum(spectra[0] * spectra[1].conj(), axis=0).real
-    return np.asarray(np.fft.irfft(whole, 2 * n * finer)[: n * finer])
+    product = np.sum(spectra[0] * spectra[1].conj(), axis=0).real
+    return np.asarray(np.fft.irfft(product, 2 * n * finer)[: n * finer])
 
 
 def _combed(
@@ -110,39 +112,41 @@ def _combed(
     """
     splines = [spline_filter1d(values) for values in pair]
     n = len(pair[0]) // finer
-    periods, left = lags.astype(float), np.ones(len(lags))
+    periods, remainder = lags.astype(float), np.ones(len(lags))
     move, active = _FIRST_MOVE * cycle, np.arange(len(lags))
     while len(active):
         near = periods[active, None] + move * np.array([-1.0, 0.0, 1.0])
         multiples = np.arange(1, int(max(min(_FIRST_MOVE * cycle / move, n / near.min()), 1)) + 1)
         at = near[:, :, None] * multiples
         # beyond the record nothing overlaps
-        found, whole = (map_coordinates(s, [finer * at], mode="constant", prefilter=False).sum(axis=2) for s in splines)
-        low, here, high = (1 - found / whole).T
-        bend = np.maximum(low - 2 * here + high, 1e-300)
+        product, power = (
+            map_coordinates(s, [finer * at], mode="constant", prefilter=False).sum(axis=2) for s in splines
+        )
+        low, middle, high = (1 - product / power).T
+        bend = np.maximum(low - 2 * middle + high, 1e-300)
         periods[active] += move * np.clip(0.5 * (low - high) / bend, -1.0, 1.0)
-        left[active] = np.maximum(here, _NOTHING)
+        remainder[active] = np.maximum(middle, _NOTHING)
         move /= 2
         active = active[move * n > _LAST_MOVE * cycle * periods[active]]
-    return periods, left
+    return periods, remainder
 
 
 def _chance_of_noise(clean: Samples, period: float, band: tuple[float, float], lines: tuple[Line, ...]) -> float:
     """Chance with which noise stands as high at the lines of a period, above the bins beside them."""
-    whole = resampled(clean, period, band[1])
-    count = whole.length // round(period)
-    step = whole.rate / max(whole.length, 1)
+    periodic = resampled(clean, period, band[1])
+    count = periodic.length // round(period)
+    step = periodic.rate / max(periodic.length, 1)
     if count < _MIN_PERIODS:
         return 1.0
-    power = np.sum(np.abs(np.fft.rfft(whole.signals(), axis=1)) ** 2, axis=0)
+    power = np.sum(np.abs(np.fft.rfft(periodic.signals(), axis=1)) ** 2, axis=0)
     bins = np.arange(len(power))
     frequency = np.asarray(step * bins, dtype=float)
     inside = (frequency > band[0] - 0.5 * step) & (frequency < band[1] + 0.5 * step)
     away = np.abs((bins + count // 2) % count - count // 2)
-    own = inside & (away == 0) & ~bins_taken(frequency, lines, 1 / (count * step), LEFT_OUT_OF_PERIOD)
-    beside = inside & (away > 0) & (away <= _BESIDE)
+    at_lines = inside & (away == 0) & ~bins_taken(frequency, lines, 1 / (count * step), LEFT_OUT_OF_PERIOD)
+    between = inside & (away > 0) & (away <= _BESIDE)
     block = (bins + count // 2) // (count * math.ceil(_BESIDE / min(count - 1, 2 * _BESIDE)))
-    sums = [np.bincount(block, weights) for weights in (own, beside, own * power, beside * power)]
+    sums = [np.bincount(block, weights) for weights in (at_lines, between, at_lines * power, between * power)]
     held, spare, high, noise = np.array(sums)[:, (sums[0] > 0) & (sums[1] > 0)]
     chances = betainc(spare, held, noise / np.maximum(noise + high, 1e-300))
     return float(gammaincc(max(len(chances), 1e-9), -np.log(np.maximum(chances, 1e-300)).sum()))
@@ -155,6 +159,6 @@ def resampled(samples: Samples, period: float, top: float) -> Samples:
     slip = 2 * np.pi * top / samples.rate * abs(period - q) * count
     if slip <= _MAX_SLIP:
         count = samples.length // q
-        return samples.each(lambda rows: rows[:, : count * q])
+        return samples.mapped(lambda rows: rows[:, : count * q])
     at = np.asarray(np.arange(count * q) * (period / q), dtype=float)
-    return samples.each(lambda rows: interpolated(rows, at), samples.rate * q / period)
+    return samples.mapped(lambda rows: interpolated(rows, at), samples.rate * q / period)

@@ -114,14 +114,14 @@ def one_phase_set(runs: Sequence[RunSpectra]) -> bool:
     waves = [mean @ np.linalg.eigh((mean.T @ mean.conj()).real)[1][:, -1] for mean in means]
     different: list[ComplexArray] = []
     for wave in waves:
-        if all(_likeness(wave, other) < _ALIKE for other in different):
+        if all(_likeness(wave, earlier) < _ALIKE for earlier in different):
             different.append(wave)
     return len(different) < _SETS
 
 
-def _likeness(wave: ComplexArray, other: ComplexArray) -> float:
+def _likeness(wave: ComplexArray, second: ComplexArray) -> float:
     """Share in which phases (n,) differ by no more than a time, 0 to 1."""
-    product = wave * other.conj()
+    product = wave * second.conj()
     return float(np.abs(np.fft.fft(product, 4 * len(product))).max() / max(float(np.abs(product).sum()), 1e-300))
 
 
@@ -131,19 +131,19 @@ def _regressed(z: ComplexArray, u: ComplexArray, by_time: ComplexArray, nuisance
     `by_time` (b, k): the sources' product with time; the part of the rows that goes with it is what moves.
     """
     basis = np.linalg.qr(nuisance)[0]
-    q, triangle = np.linalg.qr(beside(u, basis))
-    told = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
-    q, triangle, by_time = q[:, told], triangle[np.ix_(told, told)], by_time[:, told]
-    taken = np.concatenate([basis, q], axis=1)
-    remaining = beside(z, taken)
-    moving, moved = np.linalg.qr(beside(by_time, taken))
+    q, triangle = np.linalg.qr(orthogonal(u, basis))
+    independent = np.abs(np.diag(triangle)) > _NOTHING * max(float(np.abs(triangle).max()), 1e-300)
+    q, triangle, by_time = q[:, independent], triangle[np.ix_(independent, independent)], by_time[:, independent]
+    fitted = np.concatenate([basis, q], axis=1)
+    remaining = orthogonal(z, fitted)
+    moving, moved = np.linalg.qr(orthogonal(by_time, fitted))
     share = triangle @ np.linalg.pinv(moved)
-    freedom, size = float(len(z) - taken.shape[1]), np.sum(np.abs(share) ** 2, axis=1)
+    freedom, size = float(len(z) - fitted.shape[1]), np.sum(np.abs(share) ** 2, axis=1)
     slope = share @ (moving.conj().T @ remaining)
     return LineResponse(q.conj().T @ z, 1.0, _outer(remaining), max(freedom, 0.0), slope, size, freedom)
 
 
-def beside(rows: ComplexArray, basis: ComplexArray) -> ComplexArray:
+def orthogonal(rows: ComplexArray, basis: ComplexArray) -> ComplexArray:
     """Rows (b, m) without their part in orthonormal columns (b, j)."""
     return np.asarray(rows - basis @ (basis.conj().T @ rows))
 

@@ -43,7 +43,7 @@ class RunSpectra:
 
     phasors: RunPhasors  #: channel by channel
     command: ComplexArray | None  #: (n_windows, n_bins, 2) complex
-    taken: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
+    disturbed: BoolArray  #: (n_bins,): bins that lines of shaft or mains may have spoiled
     disturbances: tuple[Line, ...]
     period: float | None
     temperatures: dict[int, float]
@@ -112,7 +112,7 @@ def run_spectra(
     if period is not None:
         return spectra
     time = (np.arange(clean.length) - 0.5 * (clean.length - 1)) / clean.rate  # from the middle of the record
-    phasors, command = transformed(clean.each(lambda rows: rows * time))
+    phasors, command = transformed(clean.mapped(lambda rows: rows * time))
     return replace(spectra, by_time=replace(spectra, phasors=phasors, command=command))
 
 
@@ -132,12 +132,12 @@ def _period(
     """The driven part of a record, and the period [samples] with which it repeats itself; None where it does not."""
     if run.excitation_kind not in OPEN_ENDS:
         return samples, None
-    stated = run.excitation_kind == "multisine"
+    is_stated = run.excitation_kind == "multisine"
     clean = without_disturbances(samples, lines)
     part = driven_part(clean, band)
-    clean, driven = (record.each(lambda rows: rows[:, part]) for record in (clean, samples))
-    period = find_period(clean, band, lines, 1.0 if stated else _LEFT)
-    if period is None and stated:
+    clean, driven = (record.mapped(lambda rows: rows[:, part]) for record in (clean, samples))
+    period = find_period(clean, band, lines, 1.0 if is_stated else _LEFT)
+    if period is None and is_stated:
         text = "a multi-sine, but no period is found that the record holds three times"
         cure = 'Record longer; or state excitation = "random" if it does not repeat'
         raise refuse(run.file, "excitation", text, cure, run.id)

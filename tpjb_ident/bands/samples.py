@@ -76,7 +76,7 @@ class Samples:
         sizes = [float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0 for rows in centred]
         return np.concatenate([rows / size for rows, size in zip(centred, sizes) if size > 0])
 
-    def each(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
+    def mapped(self, change: Callable[[FloatArray], FloatArray], rate: float | None = None) -> Samples:
         """The record with all rows (k, n) changed alike, command too; at another rate where one is given."""
         command = None if self.command is None else change(self.command)
         return replace(self, rate=rate or self.rate, rows=change(self.rows), command=command)
@@ -110,9 +110,9 @@ def read_samples(
         channels.append(channel)
         rows.append(_at(_bridged(run, channel, values), at * (1 + (fast or {}).get(channel.name, 0.0))))
         lost = max(lost, float((~np.isfinite(values)).mean()))
-    told = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
+    condition = (Condition("samples-lost", f"run {run.id}: {lost:.1%} of a channel's samples"),)
     driven = command[:, inside] if command.any() else None
-    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, told if lost > _TOLD_LOST else ())
+    return Samples(rate, tuple(channels), np.array(rows)[:, inside], driven, condition if lost > _TOLD_LOST else ())
 
 
 def _on_first_grid(run: Run, n: int, highest: float) -> list[tuple[Channel, FloatArray, FloatArray]]:
@@ -179,12 +179,12 @@ def _rounding(time: FloatArray) -> float:
 def without_glitches(values: FloatArray) -> FloatArray:
     """Readings (n,) without single ones that the two on either side contradict, where these agree without it."""
     values = np.array(values, dtype=float)
-    beside = np.array([-2, -1, 1, 2])[:, None]
+    neighbours = np.array([-2, -1, 1, 2])[:, None]
     for _ in range(_PASSES):
         off = values - np.convolve(values, _CUBIC, "same")
         limit = BAD_LIMIT * robust_deviation(off[np.isfinite(off)])
         at = 4 + np.flatnonzero(np.abs(off[4:-4]) > limit)
-        remaining = off[at + beside] + _CUBIC[2 + beside] * off[at]
+        remaining = off[at + neighbours] + _CUBIC[2 + neighbours] * off[at]
         single = at[np.abs(remaining).max(axis=0) < limit]
         if not len(single):
             break

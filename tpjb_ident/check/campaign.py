@@ -59,7 +59,7 @@ def check_campaign(campaign: str | Path | Campaign, progress: Progress | None = 
         if progress is not None:
             progress(count, len(campaign.runs))
     observations, conditions = judged(campaign, observations)
-    findings = [f for observation in observations for f in observation.report.found]
+    findings = [f for observation in observations for f in observation.report.findings]
     merged = merge(findings, campaign.path.name, campaign.runs)
     merged += [_problem(condition, campaign.path.name) for condition in conditions]
     return _sorted([*campaign.notes, *merged, *_leftovers(campaign)])
@@ -125,8 +125,8 @@ def _check_duplicates(observations: Sequence[Observation]) -> None:
 
 def _shared_record(first: Run, second: Run) -> bool:
     """Whether one record excited at several frequencies serves both runs."""
-    same = replace(first.point, excitation=second.point.excitation) == second.point
-    return first.kind == second.kind == "dynamic" and same and first.point != second.point
+    is_same = replace(first.point, excitation=second.point.excitation) == second.point
+    return first.kind == second.kind == "dynamic" and is_same and first.point != second.point
 
 
 def _sorted(problems: Sequence[Problem]) -> list[Problem]:
@@ -149,8 +149,8 @@ def _leftovers(campaign: Campaign) -> list[Problem]:
 
 
 def _files(campaign: Campaign) -> list[str]:
-    known = set(map(Path.resolve, campaign.files.values()))
-    return [path.name for path in records_below(campaign.path) if path.resolve() not in known]
+    named = set(map(Path.resolve, campaign.files.values()))
+    return [path.name for path in records_below(campaign.path) if path.resolve() not in named]
 
 
 def _groups(campaign: Campaign) -> list[str]:

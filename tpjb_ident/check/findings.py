@@ -29,17 +29,17 @@ class Reporter:
     """Gathers the findings of one run."""
 
     run: Run
-    found: list[Finding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     doubts: set[str] = field(default_factory=set)
 
     def copy(self) -> Reporter:
         """A reporter that has found the same so far."""
-        return Reporter(self.run, list(self.found), set(self.doubts))
+        return Reporter(self.run, list(self.findings), set(self.doubts))
 
     @property
     def keys(self) -> list[str]:
         """Keys of all findings."""
-        return [finding.key for finding in self.found]
+        return [finding.key for finding in self.findings]
 
     def ask(
         self, kind: str, size: float = 1.0, *names: str, hint: str = "", grave: Severity = "error", **words: Any
@@ -56,17 +56,19 @@ class Reporter:
         words |= {"names": " and ".join(names), "size": size}
         place, text = question.place.format(**words), question.text.format(**words) + hint
         key = f"{kind} {words['names']}".rstrip() + hint
-        self.say(key, passed[-1], place, text, question.cure, names if question.of_channels else ())
+        self.note(key, passed[-1], place, text, question.cure, names if question.of_channels else ())
         return passed[-1]
 
-    def say(self, key: str, severity: Severity, place: str, what: str, cure: str, channels: Sequence[str] = ()) -> None:
+    def note(
+        self, key: str, severity: Severity, place: str, what: str, cure: str, channels: Sequence[str] = ()
+    ) -> None:
         """Note a finding; `key` is the same for equal findings in other runs, `channels` whose nature it is."""
         problem = Problem(severity, self.run.file, place, what, cure, self.run.id)
-        self.found.append(Finding(problem, key, tuple(channels)))
+        self.findings.append(Finding(problem, key, tuple(channels)))
 
     def take(self, problems: Sequence[Problem]) -> None:
         """Note problems that a reader raised."""
-        self.found.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
+        self.findings.extend(Finding(p, f"{p.place} {p.what}") for p in problems)
 
 
 def is_shared(concerned: int, alike: int) -> bool:
@@ -125,19 +127,19 @@ def reach(reports: Sequence[Reporter]) -> None:
         kinds.setdefault(report.run.kind, []).append(report)
     dynamic = kinds.pop("dynamic", [])
     for alike in kinds.values():
-        for group in _alike(f for report in alike for f in report.found if f.channels):
+        for group in _alike(f for report in alike for f in report.findings if f.channels):
             if len(group) < len(alike) and not is_shared(len(group), len(alike)):
                 continue
             for report in dynamic:
                 if set(group[0].channels) & set(report.run.channels):
-                    report.found.append(Finding(group[0].problem, group[0].key))
+                    report.findings.append(Finding(group[0].problem, group[0].key))
 
 
 def verdicts(reports: Sequence[Reporter]) -> Verdicts:
     """Sort the findings of runs of one kind."""
     groups: dict[tuple[str, Severity], dict[str, Problem]] = {}
     for report in reports:
-        for finding in report.found:
+        for finding in report.findings:
             groups.setdefault((finding.key, finding.problem.severity), {}).setdefault(report.run.id, finding.problem)
     result = Verdicts()
     alike = len({report.run.id for report in reports})

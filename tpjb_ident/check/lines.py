@@ -59,8 +59,8 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
 
 def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:
     """Mean and scatter of a run without an excitation line, others taken off; `values` (n, m)."""
-    known = np.array([f for f in frequencies if f > 0])
-    fit = LineFitter(len(values), rate, known).fit(np.ascontiguousarray(values.T)[:, None], np.zeros(1))
+    positive = np.array([f for f in frequencies if f > 0])
+    fit = LineFitter(len(values), rate, positive).fit(np.ascontiguousarray(values.T)[:, None], np.zeros(1))
     return RecordLines(fit.mean[0], np.full(values.shape[1], np.nan), fit.scale[0])
 
 

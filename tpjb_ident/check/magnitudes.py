@@ -120,11 +120,11 @@ def check_weight(report: Reporter, measured: Sequence[Sizes], mass: float, large
 
 def _check_rate(report: Reporter, run: Run) -> None:
     """The rate that the file shows against the one that the manifest states, where that is meant for this run."""
-    stated = getattr(run.reader, "stated_rate", None)
-    if stated is None or not (run.kind == "dynamic" or "sample_rate" in run.stated):
+    stated_rate = getattr(run.reader, "stated_rate", None)
+    if stated_rate is None or not (run.kind == "dynamic" or "sample_rate" in run.stated):
         return
     try:
         rate = run.sample_rate
     except RigDataError:  # said by whoever read the run
         return
-    report.ask("rate", abs(math.log(rate / stated)), rate=rate, stated=stated)
+    report.ask("rate", abs(math.log(rate / stated_rate)), rate=rate, stated=stated_rate)

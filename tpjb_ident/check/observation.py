@@ -120,17 +120,17 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
         check_signal(report, run.channels[name], statistics[name], noise_free, alive)
     speeds = [first[n] for n, c in run.channels.items() if n in first and c.quantity == "speed"]
     speed = next((float(np.nanmedian(values)) for values in speeds if np.isfinite(values).any()), math.nan)
-    seen = Observation(run, report, digest=digest, speed=speed)
+    observation = Observation(run, report, digest=digest, speed=speed)
     if not timed:
-        return seen
+        return observation
     thin = slice(None, None, max(1, min(length, _BLOCK) // _DECIMATED))
-    seen = replace(seen, channels=live, lines=lines, spread=_spread(used))
+    observation = replace(observation, channels=live, lines=lines, spread=_spread(used))
     if run.kind == "clearance":
-        seen = replace(seen, samples=used[thin])
+        observation = replace(observation, samples=used[thin])
     if phasors is None:
-        return seen
+        return observation
     astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
-    return replace(seen, other_line=other_line(phasors, astray), shaft_force=shaft_force(phasors))
+    return replace(observation, other_line=other_line(phasors, astray), shaft_force=shaft_force(phasors))
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:
@@ -227,8 +227,8 @@ def _lines(
 
 def _near_set_point(run: Run, phasors: RunPhasors, line: int) -> bool:
     """Whether a run is excited where it is said to be: a generator is not off by hertz."""
-    stated = run.point.excitation_hz
-    return abs(phasors.lines.excitation[line].frequency - stated) <= OFF_SET_POINT * max(stated, 1e-9)
+    set_point = run.point.excitation_hz
+    return abs(phasors.lines.excitation[line].frequency - set_point) <= OFF_SET_POINT * max(set_point, 1e-9)
 
 
 def _spread(values: FloatArray) -> FloatArray:

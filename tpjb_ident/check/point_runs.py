@@ -62,8 +62,8 @@ class PointRuns:
 
     def misfits(self, stiffness: ComplexArray) -> FloatArray:
         """Share of every run's force that H does not explain, (n,)."""
-        rest = self.force - self.displacement @ stiffness.T
-        return np.asarray(np.linalg.norm(rest, axis=1) / np.linalg.norm(self.force, axis=1))
+        residual = self.force - self.displacement @ stiffness.T
+        return np.asarray(np.linalg.norm(residual, axis=1) / np.linalg.norm(self.force, axis=1))
 
     def robust_stiffness(self) -> ComplexArray | None:
         """H with the least median misfit among all pairs of runs, so that a faulty run cannot pull it."""
@@ -77,21 +77,21 @@ class PointRuns:
         refined = self.stiffness(close.tolist())
         return pairs[least] if refined is None else refined
 
-    def apart(self, known: Collection[int], oddness: Callable[[int, list[int]], float]) -> set[int]:
+    def outlying(self, initial: Collection[int], oddness: Callable[[int, list[int]], float]) -> set[int]:
         """Runs that differ from the others: `known` ones, then the oddest until none is odd or too many are.
 
         `oddness` of a run beside some others: over what chance allows.
         """
-        outliers = set(known)
+        outliers = set(initial)
         while len(outliers) + 1 <= _MOST * len(self) and len(self) - len(outliers) >= _MIN_RUNS:
-            remaining = self.others(outliers)
+            remaining = self.without(outliers)
             odd = [oddness(i, [j for j in remaining if j != i]) for i in remaining]
             if max(odd) < 1.0:
                 break
             outliers.add(remaining[int(np.argmax(odd))])
         return outliers
 
-    def others(self, outliers: Collection[int]) -> list[int]:
+    def without(self, outliers: Collection[int]) -> list[int]:
         """Runs that are none of some outliers."""
         return [i for i in range(len(self)) if i not in outliers]
 

@@ -45,17 +45,17 @@ def check_positions(runs: Sequence[Observation]) -> None:
         values = np.array([mean.value for mean in means])
         low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
         allowed = max(_FAR * (high - low), _MIN_JUMP[state])
-        for mean in _apart(means, allowed, 0.0, _MIN_PLACES):
+        for mean in _outlying(means, allowed, 0.0, _MIN_PLACES):
             mean.observation.report.ask("position", 1.0, name, mean=1e6 * mean.value, low=1e6 * low, high=1e6 * high)
             mean.observation.report.doubts.add("displacement")
     for (name, _), means in points.items():
         middle = float(np.median([mean.value for mean in means]))
-        for mean in _apart(means, _LEAST_STEP, _STEP, 4):
+        for mean in _outlying(means, _LEAST_STEP, _STEP, 4):
             if "displacement" not in mean.observation.report.doubts:
                 mean.observation.report.ask("step", 1.0, name, off=1e6 * (mean.value - middle))
 
 
-def _apart(means: Sequence[_Mean], least: float, many: float, count: int) -> list[_Mean]:
+def _outlying(means: Sequence[_Mean], least: float, many: float, count: int) -> list[_Mean]:
     values = np.array([mean.value for mean in means])
-    apart = far(np.abs(values - np.median(values)), least, many, count)
-    return [mean for mean, is_apart in zip(means, apart) if is_apart]
+    outlying = far(np.abs(values - np.median(values)), least, many, count)
+    return [mean for mean, is_apart in zip(means, outlying) if is_apart]

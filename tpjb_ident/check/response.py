@@ -82,12 +82,12 @@ def _check_film(runs: PointRuns, stiffness: ComplexArray) -> None:
 def _check_agreement(runs: PointRuns, stiffness: ComplexArray) -> None:
     """Name runs that answer otherwise than the others, then those in which one channel has a gain of its own."""
     misfits = runs.misfits(stiffness)
-    known = far(misfits, _OUTLIER, 6.0) & (np.median(misfits) <= _AGREE)
-    outliers = runs.apart(np.flatnonzero(known).tolist(), lambda run, others: _distance(runs, run, others))
-    consistent = runs.others(outliers)
+    clear = far(misfits, _OUTLIER, 6.0) & (np.median(misfits) <= _AGREE)
+    outliers = runs.outlying(np.flatnonzero(clear).tolist(), lambda run, peers: _distance(runs, run, peers))
+    consistent = runs.without(outliers)
     common = runs.stiffness(consistent) if outliers else stiffness
     for run in sorted(outliers):
-        _tell(runs, run, consistent, stiffness if common is None else common)
+        _report(runs, run, consistent, stiffness if common is None else common)
     for run, gain in wrong_gains(runs, outliers).items() if len(runs.channels) == 4 else ():
         name, *alike = _names(runs, gain)
         hint = f" (or {' or '.join(alike)} another gain)" if alike else ""
@@ -103,20 +103,20 @@ def _direction(gain: WrongGain) -> str:
     return "much" if gain.gain > 1 else "little"
 
 
-def _distance(runs: PointRuns, run: int, others: list[int]) -> float:
+def _distance(runs: PointRuns, run: int, peers: list[int]) -> float:
     """How far a run is from the others' matrix, over what chance allows; zero where it is no fault.
 
     The residual's square over its variance, by the others' scatter, follows an F distribution.
     """
-    stiffness = runs.stiffness(others)
-    difference = None if stiffness is None else dynamic_difference(runs, run, others, stiffness)
+    stiffness = runs.stiffness(peers)
+    difference = None if stiffness is None else dynamic_difference(runs, run, peers, stiffness)
     if stiffness is None or difference is None or runs.misfits(stiffness)[run] < _LEAST:
         return 0.0
-    ratio = float(np.mean(difference.rest**2 / np.diag(difference.noise)))
+    ratio = float(np.mean(difference.residual**2 / np.diag(difference.noise)))
     return ratio / float(fdtri(4, difference.spare, 1 - CHANCE))
 
 
-def _tell(runs: PointRuns, run: int, consistent: Sequence[int], stiffness: ComplexArray) -> None:
+def _report(runs: PointRuns, run: int, consistent: Sequence[int], stiffness: ComplexArray) -> None:
     """Name a run that differs, with the wiring fault of probes or cells that explains it, or the gain."""
     misfit, report = float(runs.misfits(stiffness)[run]), runs.observations[run].report
     probes, cells = runs.channels[:2], runs.channels[2:]

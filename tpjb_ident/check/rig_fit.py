@@ -43,7 +43,7 @@ _CLEAR = 30.0
 class RigFit:
     """What the terms make of a campaign's dynamic runs."""
 
-    seen: tuple[Observation, ...] = field(repr=False)  #: of every block
+    observations: tuple[Observation, ...] = field(repr=False)  #: of every block
     rig: Rig
     blocks: Blocks = field(repr=False)
     solution: Solution = field(repr=False)
@@ -52,8 +52,8 @@ class RigFit:
 def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True) -> RigFit | None:
     """Fit the terms to all lines of dynamic runs; None where they are too few; `static`: cells show the static load."""
     clear = [run for run in runs if "force" not in run.report.doubts and run.shows("force")]
-    seen = tuple(run for run in clear for _ in run.lines.omega)
-    if len(seen) < _MIN_BLOCKS:
+    observations = tuple(run for run in clear for _ in run.lines.omega)
+    if len(observations) < _MIN_BLOCKS:
         return None
     sensors = sensors_of(campaign)
     blocks = _blocks(sensors, clear)
@@ -73,7 +73,7 @@ def rig_fit(campaign: Campaign, runs: Sequence[Observation], static: bool = True
     learnt = learnt_rig(rig, solution)
     if learnt is not rig:
         solution = solver(learnt).begun(solution).run()
-    return RigFit(seen, learnt, blocks, solution)
+    return RigFit(observations, learnt, blocks, solution)
 
 
 def _blocks(sensors: Sequence[Sensor], runs: Sequence[Observation]) -> Blocks:
@@ -112,10 +112,10 @@ def check_accelerometers(fit: RigFit) -> None:
     judged = np.flatnonzero(np.isfinite(moved).all(axis=1) & (size > _CLEAR * noise))
     off = _off(shown, moved)[judged]
     for b in judged[far(off, _OFF, _MANY, _MIN_BLOCKS)]:
-        _tell(fit.seen[b], shown[b], moved[b])
+        _report(fit.observations[b], shown[b], moved[b])
 
 
-def _tell(observation: Observation, shown: ComplexArray, expected: ComplexArray) -> None:
+def _report(observation: Observation, shown: ComplexArray, expected: ComplexArray) -> None:
     def misfit(repair: FloatArray) -> float:
         return float(_off(repair @ shown, expected))
 

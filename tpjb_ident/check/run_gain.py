@@ -58,14 +58,14 @@ class WrongGain(NamedTuple):
 class Difference(NamedTuple):
     """How one run differs from what the others foretell, with its covariance."""
 
-    rest: FloatArray  #: (m,)
+    residual: FloatArray  #: (m,)
     noise: FloatArray  #: (m, m): covariance that the others' scatter tells
     honest: FloatArray  #: (m, m): covariance of what honest runs differ by beyond it
     spare: int
 
     def misfit(self, pattern: FloatArray, part: float) -> float:
-        """Squared distance of the rest from `part` times the pattern, per equation, in units of its covariance."""
-        remaining = self.rest - part * pattern
+        """Squared distance of the residual from `part` times the pattern, per equation, in units of its covariance."""
+        remaining = self.residual - part * pattern
         return float(remaining @ np.linalg.solve(self.noise + self.honest, remaining)) / len(remaining)
 
 
@@ -86,61 +86,61 @@ def evidence(differences: Sequence[Difference], patterns: Sequence[FloatArray]) 
     information = sum(float(pattern @ w) for pattern, w in zip(patterns, weights))
     if not information > 0:
         return Evidence()
-    part = sum(float(w @ d.rest) for d, w in zip(differences, weights)) / information
+    part = sum(float(w @ d.residual) for d, w in zip(differences, weights)) / information
     doubt = sum(float(w @ d.noise @ w) ** 2 / d.spare for d, w in zip(differences, weights)) / information**2
     freedom = min(1 / max(doubt, 1e-300), 1e9)  # infinite freedom is the normal distribution
     chance = float(2 * stdtr(freedom, -abs(part) * math.sqrt(information)))
     return Evidence(part, 1 / math.sqrt(information), chance)
 
 
-def wrong_gains(runs: PointRuns, known: Collection[int] = ()) -> dict[int, WrongGain]:
+def wrong_gains(runs: PointRuns, outliers: Collection[int] = ()) -> dict[int, WrongGain]:
     """Runs with one wrong gain; `known` are runs that stand apart anyway."""
 
-    def oddness(run: int, others: list[int]) -> float:
-        gain = gain_of_run(runs, run, others)
+    def oddness(run: int, peers: list[int]) -> float:
+        gain = gain_of_run(runs, run, peers)
         # each run is tried with two cells and two probes, a probe with two zeros
-        return 0.0 if gain is None else CHANCE / (6 * (len(others) + 1)) / max(gain.chance, 1e-300)
+        return 0.0 if gain is None else CHANCE / (6 * (len(peers) + 1)) / max(gain.chance, 1e-300)
 
-    wrong = runs.apart(known, oddness)
-    gains = {run: gain_of_run(runs, run, runs.others(wrong)) for run in sorted(wrong.difference(known))}
+    wrong = runs.outlying(outliers, oddness)
+    gains = {run: gain_of_run(runs, run, runs.without(wrong)) for run in sorted(wrong.difference(outliers))}
     return {run: gain for run, gain in gains.items() if gain is not None}
 
 
-def gain_of_run(runs: PointRuns, run: int, others: Sequence[int]) -> WrongGain | None:
+def gain_of_run(runs: PointRuns, run: int, peers: Sequence[int]) -> WrongGain | None:
     """The gain of one channel that explains `run` best beside the others; None where no single one does.
 
     Where the best is too small to be a fault, no worse one is named in its place.
     """
-    tried = sorted(_explanations(runs, run, others))
+    tried = sorted(_explanations(runs, run, peers))
     if not tried or abs(tried[0][2].part) < _LEAST:
         return None
     least, _, best = tried[0]
-    alike = dict.fromkeys(channel for left, channel, _ in tried if left < least + _AS_WELL)
+    alike = dict.fromkeys(channel for misfit, channel, _ in tried if misfit < least + _AS_WELL)
     gain = 1 / (1 - best.part)
     return WrongGain(tuple(alike), gain, gain**2 * best.error, best.chance)
 
 
-def _explanations(runs: PointRuns, run: int, others: Sequence[int]) -> Iterator[tuple[float, int, Evidence]]:
+def _explanations(runs: PointRuns, run: int, peers: Sequence[int]) -> Iterator[tuple[float, int, Evidence]]:
     """Explanations of `run` by one channel's gain that nothing in it contradicts, with the squares that they leave."""
-    stiffness = runs.stiffness(others)
-    dynamic = None if stiffness is None else dynamic_difference(runs, run, others, stiffness)
+    stiffness = runs.stiffness(peers)
+    dynamic = None if stiffness is None else dynamic_difference(runs, run, peers, stiffness)
     if stiffness is None or dynamic is None:
         return
-    static = static_difference(runs, run, others, stiffness)
+    static = static_difference(runs, run, peers, stiffness)
     forces = np.hstack([-stiffness @ runs.probe_plane, runs.cell_plane]) * runs.phasors[run]  # of every channel
     for channel, pattern in enumerate(map(_stacked, forces.T)):
         shown = evidence([dynamic], [pattern])
         if shown.chance > _PHASORS_SHOW or shown.part > _MOST_PART:
             continue
-        own = np.diag(np.arange(4) == channel).astype(float)
+        selector = np.diag(np.arange(4) == channel).astype(float)
         for lever, slack in _levers(runs, run, channel, shown.part):
-            means = static._replace(honest=static.honest + slack**2 * own)
-            by_mean = evidence([means], [lever * own[channel]])
-            apart = abs(by_mean.part - shown.part) / math.hypot(by_mean.error, shown.error)
-            joint = evidence([dynamic, means], [pattern, lever * own[channel]])
-            left = dynamic.misfit(pattern, joint.part), means.misfit(lever * own[channel], joint.part)
-            if apart <= _AGREE and max(left) <= _STRANGE:
-                yield len(pattern) * sum(left) + (_FREE if slack == _ANYTHING else 0.0), channel, joint
+            means = static._replace(honest=static.honest + slack**2 * selector)
+            by_mean = evidence([means], [lever * selector[channel]])
+            distance = abs(by_mean.part - shown.part) / math.hypot(by_mean.error, shown.error)
+            joint = evidence([dynamic, means], [pattern, lever * selector[channel]])
+            misfits = dynamic.misfit(pattern, joint.part), means.misfit(lever * selector[channel], joint.part)
+            if distance <= _AGREE and max(misfits) <= _STRANGE:
+                yield len(pattern) * sum(misfits) + (_FREE if slack == _ANYTHING else 0.0), channel, joint
 
 
 def _levers(runs: PointRuns, run: int, channel: int, part: float) -> list[tuple[float, float]]:
@@ -155,28 +155,28 @@ def _levers(runs: PointRuns, run: int, channel: int, part: float) -> list[tuple[
     return [(mean, 0.0), (lever, abs(_LEVER_KNOWN * lever * part)) if np.isfinite(lever) else (0.0, _ANYTHING)]
 
 
-def dynamic_difference(runs: PointRuns, run: int, others: Sequence[int], stiffness: ComplexArray) -> Difference | None:
+def dynamic_difference(runs: PointRuns, run: int, peers: Sequence[int], stiffness: ComplexArray) -> Difference | None:
     """Force of `run` minus H (2, 2) [N/m] of the others times its displacement: Re X, Re Y, Im X, Im Y [N].
 
     None where they leave no scatter.
     """
-    spare = 2 * (2 * len(others) - 4)
-    D, rest = runs.displacement, runs.force - runs.displacement @ stiffness.T
+    spare = 2 * (2 * len(peers) - 4)
+    D, residual = runs.displacement, runs.force - runs.displacement @ stiffness.T
     sizes = np.linalg.norm(D, axis=1)
     if spare < 4 or not sizes[run] > 0:
         return None
-    rows = list(others)
-    unit, own = D[rows] / sizes[rows, None], D[run] / sizes[run]
-    leverage = float(np.real(own.conj() @ np.linalg.solve(unit.T @ unit.conj(), own)))
-    scatter = float(np.sum(np.abs(rest[rows] / sizes[rows, None]) ** 2)) / spare
+    rows = list(peers)
+    unit, direction = D[rows] / sizes[rows, None], D[run] / sizes[run]
+    leverage = float(np.real(direction.conj() @ np.linalg.solve(unit.T @ unit.conj(), direction)))
+    scatter = float(np.sum(np.abs(residual[rows] / sizes[rows, None]) ** 2)) / spare
     variance = scatter * sizes[run] ** 2 * (1 + leverage)
     variance += (_LEAST_PHASOR * float(np.linalg.norm(runs.force[run]))) ** 2
     # by which share of stiffness and of damping the others differ; the matrix took 8 of their 4 n equations along
-    shares = [np.linalg.lstsq(_changes(stiffness, D[j]), _stacked(rest[j]), rcond=None)[0] for j in rows]
+    shares = [np.linalg.lstsq(_changes(stiffness, D[j]), _stacked(residual[j]), rcond=None)[0] for j in rows]
     wander = np.mean(np.square(shares), axis=0) * len(rows) / (len(rows) - 2)
     changes = _changes(stiffness, D[run])
     honest = changes @ np.diag(_HONEST**2 + wander) @ changes.T
-    return Difference(_stacked(rest[run]), variance * np.eye(4), honest, spare)
+    return Difference(_stacked(residual[run]), variance * np.eye(4), honest, spare)
 
 
 def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
@@ -184,16 +184,16 @@ def _changes(stiffness: ComplexArray, displacement: ComplexArray) -> FloatArray:
     return np.stack([_stacked(stiffness.real @ displacement), _stacked(1j * stiffness.imag @ displacement)], axis=1)
 
 
-def static_difference(runs: PointRuns, run: int, others: Sequence[int], stiffness: ComplexArray) -> Difference:
+def static_difference(runs: PointRuns, run: int, peers: Sequence[int], stiffness: ComplexArray) -> Difference:
     """Mean readings of `run` minus those of the others: probe, probe [m], cell, cell [N].
 
     A load that misses its set point shows in the cells and, over the stiffness (2, 2) [N/m], in the probes; what
     positions wander by besides is their scatter. Means tell nothing where the stiffness cannot carry a load.
     """
-    means = runs.means[list(others)]
-    rest = runs.means[run] - means.mean(axis=0)
+    means = runs.means[list(peers)]
+    residual = runs.means[run] - means.mean(axis=0)
     if np.linalg.eigvalsh(stiffness.real + stiffness.real.T)[0] <= 0:
-        return Difference(rest, np.zeros((4, 4)), 1e30 * np.eye(4), 1)
+        return Difference(residual, np.zeros((4, 4)), 1e30 * np.eye(4), 1)
     compliance = np.linalg.inv(stiffness.real)
     loads, places = means[:, 2:] @ runs.cell_plane.T, means[:, :2] @ runs.probe_plane.T
     misses = loads - loads.mean(axis=0)
@@ -206,7 +206,7 @@ def static_difference(runs: PointRuns, run: int, others: Sequence[int], stiffnes
     squares = [float(np.sum(x**2)) / spare * y @ y.T for x, y in ((misses, by_load), (wander, by_place))]
     least = np.diag([_LEAST_POSITION**2] * 2 + [max((_LEAST_LOAD * size) ** 2, 1e-12)] * 2)
     honest = (_HONEST * size) ** 2 * by_load @ by_load.T + least
-    return Difference(rest, (1 + 1 / len(means)) * (squares[0] + squares[1]), honest, spare)
+    return Difference(residual, (1 + 1 / len(means)) * (squares[0] + squares[1]), honest, spare)
 
 
 def _stacked(vector: ComplexArray) -> FloatArray:

@@ -43,12 +43,12 @@ def check_static_loads(observations: Sequence[Observation]) -> bool:
     if not shown:
         return True
     middle = complex(np.median(ratios.real), np.median(ratios.imag))
-    apart = far(np.abs(ratios - middle) / max(abs(middle), 1e-12), _LOAD_OFF, _MANY)
-    for (observation, ratio), is_apart in zip(shown, apart):
-        told = [_check_size(observation, abs(ratio))]
+    outlying = far(np.abs(ratios - middle) / max(abs(middle), 1e-12), _LOAD_OFF, _MANY)
+    for (observation, ratio), is_apart in zip(shown, outlying):
+        severities = [_check_size(observation, abs(ratio))]
         if abs(ratio) >= _NO_STATIC[1]:
-            told.append(_check_direction(observation, math.degrees(np.angle(ratio))))
-        if is_apart and not any(told):
+            severities.append(_check_direction(observation, math.degrees(np.angle(ratio))))
+        if is_apart and not any(severities):
             share, turn = abs(ratio / middle) - 1, math.degrees(np.angle(ratio / middle))
             observation.report.ask("load ratio", share=share, turn=turn)
     return True
@@ -65,12 +65,12 @@ def without_static_part(ratios: ComplexArray) -> bool:
 
 def _check_direction(observation: Observation, off: float) -> str:
     """Mean force that points so far from the stated load [deg]."""
-    stated = observation.run.point.static_load_direction_deg
-    misfit = pointing(observation.mean("force"), stated, _MENDED)
+    set_point = observation.run.point.static_load_direction_deg
+    misfit = pointing(observation.mean("force"), set_point, _MENDED)
     # with the load along one cell's axis a wrong sign of the other one changes nothing
     hint = explanation(repairs(observation.of("force")), misfit, _MENDED, alike=2)
-    shown = math.remainder(stated + off, 360.0)
-    severity = observation.report.ask("load direction", abs(off), hint=hint, shown=shown, stated=stated)
+    shown = math.remainder(set_point + off, 360.0)
+    severity = observation.report.ask("load direction", abs(off), hint=hint, shown=shown, stated=set_point)
     if severity == "error":
         observation.report.doubts.add("force")
     return severity
@@ -88,11 +88,11 @@ def _check_size(observation: Observation, ratio: float) -> str:
 
 def check_speed(observation: Observation) -> None:
     """Speed channel against the stated shaft speed."""
-    stated, shown = observation.run.point.shaft_speed_hz, observation.speed / (2 * math.pi)
-    if stated == 0.0:
+    set_point, shown = observation.run.point.shaft_speed_hz, observation.speed / (2 * math.pi)
+    if set_point == 0.0:
         observation.report.ask("turning", abs(shown), shown=shown)
     else:
-        observation.report.ask("speed", abs(abs(shown / stated) - 1.0), shown=shown, stated=stated)
+        observation.report.ask("speed", abs(abs(shown / set_point) - 1.0), shown=shown, stated=set_point)
 
 
 def check_excitation(runs: Sequence[Observation], mass: float) -> None:
@@ -120,13 +120,13 @@ class _Directed(NamedTuple):
 
     observation: Observation
     force: ComplexArray
-    stated: float
+    direction: float
 
     def off(self, force: ComplexArray) -> float:
         """Angle [deg] of the long axis of a force ellipse from what is stated; NaN where it is nearly a circle."""
         sizes, axes = np.linalg.eigh(np.real(np.outer(force, force.conj())))
         shown = math.degrees(math.atan2(axes[1, 1], axes[0, 1])) if sizes[0] < 0.25 * sizes[1] else math.nan
-        return (shown - self.stated + 90.0) % 180.0 - 90.0
+        return (shown - self.direction + 90.0) % 180.0 - 90.0
 
 
 def _check_directions(runs: Sequence[_Directed]) -> None:
@@ -137,8 +137,8 @@ def _check_directions(runs: Sequence[_Directed]) -> None:
         alike = [run for run in runs if run.observation.names("force") == cells]
 
         def unexplained(repair: FloatArray) -> float:
-            right = [abs(run.off(repair @ run.observation.line("force"))) <= _ALONG for run in alike]
-            return 1.0 - sum(right) / len(runs)
+            explained = [abs(run.off(repair @ run.observation.line("force"))) <= _ALONG for run in alike]
+            return 1.0 - sum(explained) / len(runs)
 
         faults = repairs(runs[0].observation.of("force"))
         hint = explanation(faults, unexplained, 1.0 - _NEARLY_ALL + 1e-9, alike=4)
@@ -147,6 +147,6 @@ def _check_directions(runs: Sequence[_Directed]) -> None:
     for run in off:
         turn = run.off(run.force)
         size = angle_between(turn, 0.0, 180.0) if not hint else 90.0
-        shown, report = run.stated + turn, run.observation.report
-        if report.ask("excitation direction", size, hint=hint, shown=shown, stated=run.stated) == "error":
+        shown, report = run.direction + turn, run.observation.report
+        if report.ask("excitation direction", size, hint=hint, shown=shown, stated=run.direction) == "error":
             report.doubts.add("force")

@@ -70,8 +70,8 @@ def _is_held(statistics: ChannelStatistics) -> bool:
     for pairs in (np.floor(steps / 2.0), np.floor((steps + 1.0) / 2.0)):
         starts = np.r_[0, np.flatnonzero(np.diff(pairs)) + 1]
         length, pair = np.diff(np.r_[starts, len(pairs)]), pairs[starts][1:-1]
-        beside = np.maximum(length[:-2], length[2:])
-        still = length[1:-1] > np.maximum(_HELD_OVER_BESIDE * beside, max(_LEAST_HELD, 0.002 * len(pairs)))
+        neighbours = np.maximum(length[:-2], length[2:])
+        still = length[1:-1] > np.maximum(_HELD_OVER_BESIDE * neighbours, max(_LEAST_HELD, 0.002 * len(pairs)))
         if np.any(still & (pair > 1) & (pair < pairs.max() - 1)):
             return True
     return bool(steps.max() < _FEW_STEPS)

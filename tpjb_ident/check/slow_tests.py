@@ -47,9 +47,9 @@ def check_dry(runs: Sequence[Observation]) -> None:
     observations, records = [], []
     for observation in runs:
         run = observation.run
-        stated = run.point.static_load_direction if "static_load_direction" in run.stated else None
+        direction = run.point.static_load_direction if "static_load_direction" in run.stated else None
         try:
-            records.append(read_dry_run(run, stated, settings))
+            records.append(read_dry_run(run, direction, settings))
             observations.append(observation)
         except RigDataError as error:
             _take(observation, error.problems)
@@ -70,7 +70,7 @@ def check_dry(runs: Sequence[Observation]) -> None:
 
 def _take(observation: Observation, problems: Sequence[Problem]) -> None:
     """Note what a reading refuses; not where as much is said already, nor that a computed record stands still."""
-    if not any(f.problem.severity == "error" or f.key == NO_NOISE for f in observation.report.found):
+    if not any(f.problem.severity == "error" or f.key == NO_NOISE for f in observation.report.findings):
         observation.report.take(problems)
 
 
@@ -90,15 +90,15 @@ def _refuse(observation: Observation, record: DryRecord, problem: Problem) -> No
     if hint:
         report.doubts.add(quantity)
     key = f"{problem.place}{hint}" if hint else problem.what
-    report.say(key, problem.severity, problem.place, problem.what + hint, problem.cure)
+    report.note(key, problem.severity, problem.place, problem.what + hint, problem.cure)
 
 
 def check_sweeps(runs: Sequence[Observation]) -> None:
     """Clearance runs: the shaft moves to the side to which the small load pushes it; or else what the fit refuses."""
     for observation in runs:
-        before = len(observation.report.found)
+        before = len(observation.report.findings)
         _check_sweep(observation)
-        if len(observation.report.found) > before or "force" in observation.report.doubts:
+        if len(observation.report.findings) > before or "force" in observation.report.doubts:
             continue
         try:
             sweep_samples(live_run(observation.run))
@@ -188,9 +188,9 @@ def _check_labels(runs: Sequence[Observation], shown: Sequence[float]) -> None:
                 "pad", pad=pad, shown=shown[k], beside=f"; by the directions of the other runs it is pad {number}"
             )
         elif len(contradicted):
-            other = int(contradicted[0])
-            beside = f", pad {pads[other]} toward {shown[other]:.0f} deg in run {runs[other].run.id}"
-            run.report.ask("pad", pad=pad, shown=shown[k], beside=beside)
+            first = int(contradicted[0])
+            text = f", pad {pads[first]} toward {shown[first]:.0f} deg in run {runs[first].run.id}"
+            run.report.ask("pad", pad=pad, shown=shown[k], beside=text)
 
 
 def _arranged(pads: IntArray, shown: FloatArray) -> IntArray:

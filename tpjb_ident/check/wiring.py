@@ -42,9 +42,9 @@ def explanation(
 
     Where more than `alike` of them leave no more than twice the least, none is named: else the simplest, the first.
     """
-    left = [(misfit(matrix), words) for words, matrix in tried]
-    least = min((size for size, _ in left), default=np.inf)
-    close = [words for size, words in left if size < limit and size <= 2 * least]
+    misfits = [(misfit(matrix), words) for words, matrix in tried]
+    least = min((size for size, _ in misfits), default=np.inf)
+    close = [words for size, words in misfits if size < limit and size <= 2 * least]
     return f"; as if {close[0]}" if 0 < len(close) <= alike else ""
 
 

@@ -45,8 +45,8 @@ class Prior:
 
     def estimated(self, posterior: FloatArray) -> BoolArray:
         """Which are estimated, by their posterior variance if all were."""
-        told = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
-        return np.asarray((told | self.always) & ~self.never)
+        is_learnt = np.sqrt(np.abs(posterior) * self.precision) < CONSIDERED
+        return np.asarray((is_learnt | self.always) & ~self.never)
 
     @staticmethod
     def none(points: int) -> Prior:
@@ -87,7 +87,7 @@ class Sums:
         self.G += flat.T @ flat
         self.g_t += flat.T @ r.reshape(-1)
 
-    def given(self, numbers: int) -> FloatArray:
+    def conditional(self, numbers: int) -> FloatArray:
         """Covariance of the first `numbers` of every point with all parameters given, (P, numbers, numbers)."""
         return np.asarray(np.linalg.inv(self.A[:, :numbers, :numbers]), dtype=float)
 
@@ -111,7 +111,7 @@ class Own:
     change: FloatArray  #: (P, L): of their values in the step
     deviation: FloatArray  #: (P, L): posterior
     estimated: BoolArray  #: (P, L)
-    here: FloatArray = field(repr=False)  #: (P, k, L): to the point's numbers of H
+    direct: FloatArray = field(repr=False)  #: (P, k, L): to the point's numbers of H
     shared: FloatArray = field(repr=False)  #: (P, q, L): to the shared parameters, and through them to all points
 
 
@@ -121,8 +121,8 @@ class Step:
 
     h: FloatArray  #: (P, k)
     theta: FloatArray  #: (q,)
-    own: Own
-    given: FloatArray = field(repr=False)  #: (P, k, k): covariance of H with all parameters given
+    by_point: Own
+    conditional: FloatArray = field(repr=False)  #: (P, k, k): covariance of H with all parameters given
     records: FloatArray = field(repr=False)  #: (P, k, k): that the records leave, the learning of parameters included
     K: FloatArray = field(repr=False)  #: (P, k, q)
     S: FloatArray = field(repr=False)  #: (q, q)
@@ -140,13 +140,13 @@ class Step:
             moved[considered] = passed.transpose(2, 0, 1) / np.sqrt(self.precision[considered])[:, None, None]
         return moved
 
-    def own_share(self, chosen: BoolArray) -> FloatArray:
+    def point_share(self, chosen: BoolArray) -> FloatArray:
         """Covariance (P, k, k) by the priors of the points' own parameters `chosen` (P, L), of all points."""
-        here, shared = (part * chosen[:, None, :] for part in (self.own.here, self.own.shared))
-        across = here @ shared.transpose(0, 2, 1) @ self.K.transpose(0, 2, 1)
+        local, shared = (part * chosen[:, None, :] for part in (self.by_point.direct, self.by_point.shared))
+        across = local @ shared.transpose(0, 2, 1) @ self.K.transpose(0, 2, 1)
         everywhere = np.einsum("pql,prl->qr", shared, shared)
         through = self.K @ everywhere @ self.K.transpose(0, 2, 1)
-        return here @ here.transpose(0, 2, 1) + across + across.transpose(0, 2, 1) + through
+        return local @ local.transpose(0, 2, 1) + across + across.transpose(0, 2, 1) + through
 
     @property
     def deviation(self) -> FloatArray:
@@ -155,24 +155,27 @@ class Step:
         return np.where(self.estimated, posterior, 1 / np.sqrt(self.precision))
 
 
-def step(sums: Sums, shared: Prior, own: Prior) -> Step:
+def step(sums: Sums, shared: Prior, by_point: Prior) -> Step:
     """Solve the normal equations; the points' own parameters are the last of their numbers."""
-    k = sums.A.shape[1] - own.precision.shape[1]
-    given = sums.given(k)
+    k = sums.A.shape[1] - by_point.precision.shape[1]
+    conditional = sums.conditional(k)
     A, g = sums.A.copy(), sums.g_h.copy()
     last = np.arange(k, A.shape[1])
-    A[:, last, last] += own.precision
-    g[:, k:] += own.precision * own.distance
+    A[:, last, last] += by_point.precision
+    g[:, k:] += by_point.precision * by_point.distance
     G = sums.G + np.diag(shared.precision)
     A_inverse, K, S = _eliminated(A, sums.E, G)
     inverse = np.asarray(np.linalg.inv(S), dtype=float)
     estimated = shared.estimated(np.diag(inverse))
-    told = own.estimated(_variances(A_inverse, K, inverse)[:, k:])
+    is_learnt = by_point.estimated(_variances(A_inverse, K, inverse)[:, k:])
     # what is considered is held at its mean; what it would move is kept apart
-    moves, moves_shared = A[:, :, k:] * ~told[:, None, :], (sums.E[:, k:] * ~told[:, :, None]).transpose(0, 2, 1)
-    held = _HELD * A[:, last, last] * ~told
+    moves, moves_shared = (
+        A[:, :, k:] * ~is_learnt[:, None, :],
+        (sums.E[:, k:] * ~is_learnt[:, :, None]).transpose(0, 2, 1),
+    )
+    held = _HELD * A[:, last, last] * ~is_learnt
     A[:, last, last] += held
-    g[:, k:] += held * own.distance
+    g[:, k:] += held * by_point.distance
     A_inverse, K, S = _eliminated(A, sums.E, G)
     S_inverse = np.zeros_like(S)
     chosen = np.ix_(estimated, estimated)
@@ -182,24 +185,24 @@ def step(sums: Sums, shared: Prior, own: Prior) -> Step:
     theta = S_inverse @ (estimated * remaining) + np.where(estimated, 0.0, shared.distance)
     x = np.einsum("pab,pb->pa", A_inverse, g) + K @ theta
     posterior = np.sqrt(np.maximum(_variances(A_inverse, K, S_inverse)[:, k:], 0.0))
-    root = np.sqrt(own.precision)
+    root = np.sqrt(by_point.precision)
     pushes = -(moves_shared + K.transpose(0, 2, 1) @ moves)
     points = Own(
         x[:, k:],
-        np.where(told, posterior, 1 / root),
-        told,
-        _by_prior(told, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),
-        S_inverse @ _by_prior(told, K[:, k:].transpose(0, 2, 1), pushes, root),
+        np.where(is_learnt, posterior, 1 / root),
+        is_learnt,
+        _by_prior(is_learnt, A_inverse[:, :k, k:], -(A_inverse @ moves)[:, :k], root),
+        S_inverse @ _by_prior(is_learnt, K[:, k:].transpose(0, 2, 1), pushes, root),
     )
-    weight = np.concatenate([np.zeros((len(A), k)), own.precision * told], axis=1)
+    weight = np.concatenate([np.zeros((len(A), k)), by_point.precision * is_learnt], axis=1)
     records = _records(A_inverse, K, S, S_inverse, weight, shared.precision)[:, :k, :k]
-    return Step(x[:, :k], theta, points, given, records, K[:, :k], S, S_inverse, estimated, shared.precision)
+    return Step(x[:, :k], theta, points, conditional, records, K[:, :k], S, S_inverse, estimated, shared.precision)
 
 
-def _by_prior(told: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
+def _by_prior(is_learnt: BoolArray, learnt: FloatArray, passed: FloatArray, root: FloatArray) -> FloatArray:
     """Changes (P, .., L) by one standard deviation of estimated and considered priors; `root` (P, L) of precision."""
     scale = root[:, None, :]
-    return np.asarray(np.where(told[:, None, :], learnt * scale, passed / scale))
+    return np.asarray(np.where(is_learnt[:, None, :], learnt * scale, passed / scale))
 
 
 def _eliminated(A: FloatArray, E: FloatArray, G: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -226,15 +229,15 @@ def _root(A: FloatArray) -> FloatArray:
 
 
 def _records(
-    A_inverse: FloatArray, K: FloatArray, S: FloatArray, S_inverse: FloatArray, own: FloatArray, shared: FloatArray
+    A_inverse: FloatArray, K: FloatArray, S: FloatArray, S_inverse: FloatArray, by_point: FloatArray, shared: FloatArray
 ) -> FloatArray:
     """Covariance (P, n, n) that the records alone leave; `own` (P, n), `shared` (q,) precision of the priors.
 
     As products throughout: differences of what wide priors leave would lose the records' share.
     """
-    weighed = own[:, :, None] * K
+    weighed = by_point[:, :, None] * K
     learnt = S_inverse @ (S - np.diag(shared) - np.einsum("pak,pal->kl", K, weighed)) @ S_inverse
-    alone = A_inverse - A_inverse @ (own[:, :, None] * A_inverse)
+    alone = A_inverse - A_inverse @ (by_point[:, :, None] * A_inverse)
     across = A_inverse @ weighed @ S_inverse @ K.transpose(0, 2, 1)
     return alone + K @ learnt @ K.transpose(0, 2, 1) - across - across.transpose(0, 2, 1)
 

@@ -51,7 +51,7 @@ class Residuals:
     leverage: FloatArray  #: share of them that the point's numbers take
     force: FloatArray  #: (n, 4): chi-square of the force equations along every component of the scatter
     information: FloatArray  #: (n, 4): what a scatter of the force of variance one adds to it
-    taken: FloatArray  #: (n, 4): degrees of freedom that the point's numbers take of it
+    spent: FloatArray  #: (n, 4): degrees of freedom that the point's numbers take of it
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Scatter:
     weights: FloatArray  #: (n,)
     pooled: FloatArray  #: (4,)
     spare: FloatArray  #: (4,): degrees of freedom of the pooled variances
-    own: BoolArray  #: (P,): points with a scatter of their own
-    own_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
+    separate: BoolArray  #: (P,): points with a scatter of their own
+    separate_spare: FloatArray  #: (P,): degrees of freedom of a point's own: a run has one fault
     judges: bool = True  #: whether blocks that stand apart lose their weight
     follows: bool = True  #: whether it is found in the solve
     usual: float = _USUAL**2  #: what a good rig has: counts where few runs tell
@@ -78,22 +78,22 @@ class Scatter:
 
     def freedom(self, point: int, components: slice) -> float:
         """Degrees of freedom of the mean of some components of a point, Welch and Satterthwaite."""
-        if self.own[point]:
-            return max(float(self.own_spare[point]), 1.0)
+        if self.separate[point]:
+            return max(float(self.separate_spare[point]), 1.0)
         share = self.variance[point, components] / max(float(self.variance[point, components].sum()), 1e-300)
-        each = np.maximum(np.minimum(self.spare[components] + _ALIKE, self.spare.sum()), 1.0)
-        return float(1 / max(float(np.sum(share**2 / each)), 1e-12))
+        degrees = np.maximum(np.minimum(self.spare[components] + _ALIKE, self.spare.sum()), 1.0)
+        return float(1 / max(float(np.sum(share**2 / degrees)), 1e-12))
 
     @staticmethod
     def unjudged(groups: int, blocks: int) -> Scatter:
         """No scatter yet, all blocks count and none is judged: where lines of one run stand for many runs."""
         return replace(Scatter.none(groups, blocks), judges=False)
 
-    def kept(self, groups: int, weights: FloatArray) -> Scatter:
+    def fixed(self, groups: int, weights: FloatArray) -> Scatter:
         """Pooled scatter for other groups of the same blocks, with weights (n,); both stay."""
-        none, one = np.zeros(groups, dtype=bool), np.ones(groups)
+        none, unit = np.zeros(groups, dtype=bool), np.ones(groups)
         variance = np.tile(self.pooled, (groups, 1))
-        return Scatter(variance, weights, self.pooled, self.spare, none, one, judges=False, follows=False)
+        return Scatter(variance, weights, self.pooled, self.spare, none, unit, judges=False, follows=False)
 
     def updated(self, group: IntArray, fit: Residuals, solvable: BoolArray, count: int) -> Scatter:
         """Weights after the first step, scatter from the third on.
@@ -110,35 +110,41 @@ class Scatter:
         points = len(solvable)
         used = weights > 0.05
         # where too few good runs remain all count in full, and nothing has to be made up for
-        kept = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
-        chi = _by_point(group, kept[:, None] * fit.force, points)
+        corrected = np.where(weights < 1.0, weights / _expected(fit.rows), 1.0)
+        chi = _by_point(group, corrected[:, None] * fit.force, points)
         rows = totals(group, np.asarray(used), points)[:, None]
-        information = _by_point(group, kept[:, None] * fit.information, points)
-        spare = np.where(solvable[:, None], rows - _by_point(group, used[:, None] * fit.taken, points), 0.0)
-        told = (spare > _LEAST_SPARE) & (information > 0)
-        gain = np.where(told, information * spare / np.maximum(rows, 1.0), 1.0)
+        information = _by_point(group, corrected[:, None] * fit.information, points)
+        spare = np.where(solvable[:, None], rows - _by_point(group, used[:, None] * fit.spent, points), 0.0)
+        usable = (spare > _LEAST_SPARE) & (information > 0)
+        gain = np.where(usable, information * spare / np.maximum(rows, 1.0), 1.0)
         unusual = _unusual(
-            np.sum(chi * told, axis=1), np.sum(spare * told, axis=1), np.asarray(told.any(axis=1)), self.own
+            np.sum(chi * usable, axis=1), np.sum(spare * usable, axis=1), np.asarray(usable.any(axis=1)), self.separate
         )
-        pooled, freedom = self._pooled(chi, spare, gain, told & ~unusual[:, None])
+        pooled, freedom = self._pooled(chi, spare, gain, usable & ~unusual[:, None])
         # weights come to rest before a point's runs are said to differ more than the others'
-        own = unusual if count >= _OWN_FROM else self.own
+        separate = unusual if count >= _OWN_FROM else self.separate
         variance = np.tile(pooled, (points, 1))
-        excess = _alike(np.maximum(self.variance + np.where(told, (chi - spare) / gain, 0.0), 0.0), spare)
-        variance[own] = np.maximum(excess[own], pooled)
+        excess = _alike(np.maximum(self.variance + np.where(usable, (chi - spare) / gain, 0.0), 0.0), spare)
+        variance[separate] = np.maximum(excess[separate], pooled)
         runs = totals(group, used, points)
-        own_spare = np.maximum(runs - 2.0, 1.0)
+        separate_spare = np.maximum(runs - 2.0, 1.0)
         return replace(
-            self, variance=variance, weights=weights, pooled=pooled, spare=freedom, own=own, own_spare=own_spare
+            self,
+            variance=variance,
+            weights=weights,
+            pooled=pooled,
+            spare=freedom,
+            separate=separate,
+            separate_spare=separate_spare,
         )
 
     def _pooled(
-        self, chi: FloatArray, spare: FloatArray, gain: FloatArray, told: BoolArray
+        self, chi: FloatArray, spare: FloatArray, gain: FloatArray, usable: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """Variances that all points share (4,), by moments, and their degrees of freedom."""
-        if not told.any():
+        if not usable.any():
             return np.maximum(self.pooled, self.usual), np.zeros(COMPONENTS)
-        freedom, excess, weight = (np.sum(values * told, axis=0) for values in (spare, chi - spare, gain))
+        freedom, excess, weight = (np.sum(values * usable, axis=0) for values in (spare, chi - spare, gain))
         moment = np.maximum(0.0, self.pooled + excess / np.maximum(weight, 1e-300))
         moment = _alike(moment, freedom)
         # what a good rig has is added where few runs tell: a mean of both would shrink what they show
@@ -195,20 +201,20 @@ def _expected(rows: FloatArray) -> FloatArray:
     return np.asarray(first - 2 * second / limit + third / limit**2)
 
 
-def _unusual(chi: FloatArray, spare: FloatArray, told: BoolArray, before: BoolArray) -> BoolArray:
+def _unusual(chi: FloatArray, spare: FloatArray, usable: BoolArray, before: BoolArray) -> BoolArray:
     """Points (P,) whose chi-square is improbable beside the others', the worst first; those of `before` stay so."""
-    own = before & told
-    for _ in range(int(told.sum()) // 2):
-        usual = told & ~own
+    separate = before & usable
+    for _ in range(int(usable.sum()) // 2):
+        usual = usable & ~separate
         if usual.sum() < 2:
             break
         ratio = np.where(usual, chi / np.maximum(spare, 1.0), -1.0)
         worst = int(np.argmax(ratio))
-        others = usual.copy()
-        others[worst] = False
-        all_spare = float(spare[others].sum())
-        typical = max(float(chi[others].sum()) / max(all_spare, 1.0), _LEAST_CHI)
+        remaining = usual.copy()
+        remaining[worst] = False
+        all_spare = float(spare[remaining].sum())
+        typical = max(float(chi[remaining].sum()) / max(all_spare, 1.0), _LEAST_CHI)
         if float(fdtrc(spare[worst], max(all_spare, 1.0), ratio[worst] / typical)) >= _CHANCE:
             break
-        own[worst] = True
-    return own
+        separate[worst] = True
+    return separate

@@ -60,9 +60,11 @@ def _has_low_corner(channel: Channel) -> bool:
 def alive(sensors: Sequence[Sensor], size: FloatArray, least: float = _NOTHING) -> BoolArray:
     """Which sensors show something of what the largest of their quantity does, (m,); `size` (m,) of their phasors."""
     largest: dict[str, float] = {}
-    for sensor, own in zip(sensors, size.tolist()):
-        largest[sensor.quantity] = max(own, largest.get(sensor.quantity, 0.0))
-    return np.array([own > least * largest[sensor.quantity] for sensor, own in zip(sensors, size)], dtype=bool)
+    for sensor, amplitude in zip(sensors, size.tolist()):
+        largest[sensor.quantity] = max(amplitude, largest.get(sensor.quantity, 0.0))
+    return np.array(
+        [amplitude > least * largest[sensor.quantity] for sensor, amplitude in zip(sensors, size)], dtype=bool
+    )
 
 
 def axes_of(channels: Sequence[Channel | None]) -> FloatArray:
@@ -79,15 +81,15 @@ def campaign_rig(
     return Rig(sensors, campaign.housing_mass, campaign.mass_uncertainty, mount, bare=bare, static=ratio != 0)
 
 
-def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, ratio: complex) -> str:
+def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated_mount: str | None, ratio: complex) -> str:
     """Whether the housing stands on its cells or floats: as stated, else by a over w^2 d.
 
     That is -c h of a housing on springs, 1 + g h of one that floats, c and g the compliance of what gives way. Without
     accelerometers cells tell that carry the static load (`ratio`: cells over set points of all runs): the housing
     stands on them. Cells of a floating stator show none; then it is "unknown".
     """
-    if stated:
-        return stated
+    if stated_mount:
+        return stated_mount
     rig = Rig(tuple(sensors), 1.0)
     carried = "cells" if _CARRIED[0] < abs(ratio) < _CARRIED[1] else "unknown"
     if len(rig.of("acceleration")) < 2:
@@ -95,18 +97,18 @@ def found_mount(sensors: Sequence[Sensor], blocks: Blocks, stated: str | None, r
     a = vector(rig, blocks, "acceleration")
     d = vector(rig, blocks, "displacement")
     force = vector(rig, blocks, "force")
-    known = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1) & np.isfinite(force).all(axis=1)
-    if not known.any():
+    usable = np.isfinite(a).all(axis=1) & np.isfinite(d).all(axis=1) & np.isfinite(force).all(axis=1)
+    if not usable.any():
         return carried
-    square = (blocks.omega[known] ** 2)[:, None]
-    d, force, a = square * d[known], square * force[known], a[known]
+    square = (blocks.omega[usable] ** 2)[:, None]
+    d, force, a = square * d[usable], square * force[usable], a[usable]
     power = np.maximum(np.sum(np.abs(d) ** 2, axis=0), 1e-300)
     quotient, h = np.sum(d.conj() * a, axis=0) / power, np.sum(d.conj() * force, axis=0) / power
-    standing, floating = _rest(-quotient, h, np.inf), _rest(quotient - 1, h, _SHAFT)
+    standing, floating = _remainder(-quotient, h, np.inf), _remainder(quotient - 1, h, _SHAFT)
     return "floating" if floating.max() < _FLOATS and floating.sum() < standing.sum() else "cells"
 
 
-def _rest(share: ComplexArray, h: ComplexArray, most: float) -> FloatArray:
+def _remainder(share: ComplexArray, h: ComplexArray, most: float) -> FloatArray:
     """What a compliance times h (2,), nought to `most`, leaves of a share of the motion (2,)."""
     along = h / np.maximum(np.abs(h), 1e-300)
     return np.abs(share - np.clip((share * along.conj()).real, 0.0, most) * along)

@@ -46,8 +46,8 @@ class Shape:
 
     def change(self, x: FloatArray) -> ComplexArray:
         """Change of h (P, 2, 2) by the groups' numbers (G, k)."""
-        own = x[self.group]
-        numbers = own if self.columns is None else np.einsum("pak,pk->pa", self.columns, own)
+        parts = x[self.group]
+        numbers = parts if self.columns is None else np.einsum("pak,pk->pa", self.columns, parts)
         return complex_matrix(numbers)
 
 
@@ -83,11 +83,11 @@ def free_force(D: ComplexArray, F: ComplexArray) -> tuple[Shape, ComplexArray]:
 
     `D`, `F` (P, 2): what the points' only runs show [m], [N]; NaN where they show nothing.
     """
-    told = np.isfinite(np.concatenate([D, F], axis=1)).all(axis=1)
-    shown = np.where(told[:, None], D, 1.0)
+    usable = np.isfinite(np.concatenate([D, F], axis=1)).all(axis=1)
+    shown = np.where(usable[:, None], D, 1.0)
     size = np.maximum(np.linalg.norm(shown, axis=1), 1e-300)[:, None]
     across = shown.conj() / size
-    start = np.where(told[:, None, None], F[:, :, None] * (across / size)[:, None, :], np.nan)
+    start = np.where(usable[:, None, None], F[:, :, None] * (across / size)[:, None, :], np.nan)
     columns = np.zeros((len(D), NUMBERS, 4))
     for k in range(NUMBERS // 2):
         i, part = k // 2, across[:, k % 2]

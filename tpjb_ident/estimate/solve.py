@@ -52,7 +52,7 @@ class Solution:
 
     h: ComplexArray  #: (P, 2, 2), N/m: at the frequency found; NaN where the runs do not tell it
     records: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2
-    given: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2: of `records`, with the terms' parameters given
+    conditional: FloatArray = field(repr=False)  #: (P, 8, 8), (N/m)^2: of `records`, with the terms' parameters given
     shares: dict[str, FloatArray] = field(repr=False)  #: (P, 8, 8) by term, (N/m)^2
     factors: FloatArray = field(repr=False)  #: (q, P, 8), N/m: a standard deviation of every shared parameter
     fitted: dict[str, Fitted] = field(repr=False)
@@ -89,7 +89,7 @@ class Solution:
 
     def conditions(self) -> tuple[Condition, ...]:
         """What the terms' tests say of the rig: it touches every point."""
-        return tuple(found for term in self.terms for found in term.conditions(self.fitted[term.name]))
+        return tuple(condition for term in self.terms for condition in term.conditions(self.fitted[term.name]))
 
 
 class Solver:
@@ -110,7 +110,7 @@ class Solver:
         self.random = tuple(term for term in terms if type(term).random_effects is not Term.random_effects)
         self.terms = tuple(term for term in terms if term.parameters)
         self.shared = Table([term for term in self.terms if not term.points], 1, held=self.shape.held)
-        self.own = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
+        self.by_point = Table([term for term in self.terms if term.points], self.shape.groups, self.shape.group)
         runs = totals(blocks.point, np.asarray(blocks.present.any(axis=1)), len(blocks.points))
         enough = 4 * runs >= min(self.shape.numbers, NUMBERS)  # a run has four equations of the film
         self.solvable = np.asarray(np.isfinite(start).all(axis=(1, 2)) & enough)
@@ -127,7 +127,7 @@ class Solver:
         for term in self.terms:
             fitted = solution.fitted.get(term.name)
             if fitted is not None and len(fitted.value) == len(term.parameters):
-                (self.own if term.points else self.shared).put(term, fitted.value)
+                (self.by_point if term.points else self.shared).put(term, fitted.value)
         self.h = np.where(np.isfinite(solution.h), solution.h, self.h)
         self.housing_noise = solution.housing_noise
         return self
@@ -139,7 +139,7 @@ class Solver:
         self.scatter = self._scatter(self._sums(first=True)[1], 0)
         for count in range(1, _STEPS + 1):
             sums, fit = self._sums()
-            last = step(sums, self.shared.prior(), self.own.prior())
+            last = step(sums, self.shared.prior(), self.by_point.prior())
             change = self._move(last)
             if count in _HOUSING_STEPS:
                 m = self.blocks.z.shape[1]
@@ -150,12 +150,12 @@ class Solver:
             elif count > 3 and change < _CONVERGED:
                 break
         sums, fit = self._sums()
-        last = step(sums, self.shared.prior(), self.own.prior())
+        last = step(sums, self.shared.prior(), self.by_point.prior())
         return self._solution(last, fit, count)
 
     def _value(self, term: Term) -> FloatArray:
         """Values of a term's parameters."""
-        table = self.own if term.points else self.shared
+        table = self.by_point if term.points else self.shared
         return table.of(term, table.value)
 
     def _scatter(self, fit: Residuals, count: int) -> Scatter:
@@ -164,14 +164,14 @@ class Solver:
     def _states(self) -> Iterator[tuple[slice, Blocks, State]]:
         """Places of some blocks at a time, the blocks, and the last iterate for them."""
         h = np.where(self.solvable[:, None, None], self.h, np.nan)
-        slope, known = slopes_over_load(self.blocks.points, h)
+        slope, with_slope = slopes_over_load(self.blocks.points, h)
         for first in range(0, max(len(self.blocks), 1), _CHUNK):
             places = slice(first, first + _CHUNK)
             blocks = self.blocks.part(places)
-            yield places, blocks, self._state(blocks, places, slope, known & self.to_set_point)
+            yield places, blocks, self._state(blocks, places, slope, with_slope & self.to_set_point)
 
     def _sums(self, first: bool = False) -> tuple[Sums, Residuals]:
-        numbers = self.shape.numbers + self.own.value.shape[1]
+        numbers = self.shape.numbers + self.by_point.value.shape[1]
         sums = Sums.empty(self.shape.groups, self.shared.value.size, numbers)
         fits = []
         for places, blocks, state in self._states():
@@ -186,17 +186,17 @@ class Solver:
             self.answered &= are_told(sums.A[:, : self.shape.numbers, : self.shape.numbers])
             self.solvable &= self.answered[self.shape.group]
         sums.drop(~self.answered | ~sums.A.any(axis=(1, 2)), self.shape.numbers)  # none of its blocks counts
-        given = sums.given(self.shape.numbers)
-        parts = [rows.residuals(weight, given[group]) for group, rows, weight in fits]
+        conditional = sums.conditional(self.shape.numbers)
+        parts = [rows.residuals(weight, conditional[group]) for group, rows, weight in fits]
         joined = (np.concatenate([getattr(part, name) for part in parts]) for name in Residuals.__dataclass_fields__)
         return sums, Residuals(*joined)
 
-    def _state(self, blocks: Blocks, places: slice, slope: ComplexArray, known: BoolArray) -> State:
+    def _state(self, blocks: Blocks, places: slice, slope: ComplexArray, with_slope: BoolArray) -> State:
         n, m = blocks.z.shape
         state = State(
             self.h,
             slope,
-            known,
+            with_slope,
             np.zeros((2, 2), complex),
             np.eye(2, dtype=complex) * (self.rig.mount == "floating"),
             np.ones((n, m), complex),
@@ -237,14 +237,14 @@ class Solver:
         white = np.linalg.solve(L, z[:, :, None])
         state.u = np.asarray(np.linalg.solve(_regular(R[:, :UNKNOWNS]), Q1 @ white)[:, :, 0])
         film = film_columns(rig, blocks, state) * self.unit
-        own = [term.columns(blocks, state) for term in self.own.terms]
+        by_point = [term.columns(blocks, state) for term in self.by_point.terms]
         shared = [term.columns(blocks, state) for term in self.shared.terms]
-        columns = np.concatenate([film, 1j * film, *own, *shared], axis=2)
+        columns = np.concatenate([film, 1j * film, *by_point, *shared], axis=2)
         patterns = Q2 @ np.linalg.solve(L, forces)
         components = ForceScatter.of(patterns, motion, state.at_run(blocks), scatter)
         projected = components.white(_real(Q2 @ np.linalg.solve(L, columns)))
         r = components.white(_real(Q2 @ white))[:, :, 0]
-        J_film, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.own.value.shape[1]], axis=2)
+        J_film, J_own, J_t = np.split(projected, [NUMBERS, NUMBERS + self.by_point.value.shape[1]], axis=2)
         J_h = self.shape.mapped(J_film, blocks.point)
         counted = 2.0 * (blocks.present.sum(axis=1) + HOUSING_ROWS - UNKNOWNS)
         return _Rows(r, np.concatenate([J_h, J_own], axis=2), J_t, components.along(r, J_h), counted)
@@ -254,26 +254,26 @@ class Solver:
         if all(type(term).slope_columns is Term.slope_columns for term in self.shared.terms):
             return
         m = blocks.z.shape[1]
-        told = (blocks.windows > 3) & blocks.present.all(axis=1)
+        usable = (blocks.windows > 3) & blocks.present.all(axis=1)
         reading = state.reading(self.rig, blocks)[:, :m]
         columns = np.concatenate([t.slope_columns(blocks, reading) for t in self.shared.terms], axis=2)
-        L = np.linalg.cholesky(np.where(told[:, None, None], blocks.slope_noise, np.eye(m)))
+        L = np.linalg.cholesky(np.where(usable[:, None, None], blocks.slope_noise, np.eye(m)))
         Q = np.linalg.qr(np.linalg.solve(L, blocks.z[:, :, None]), mode="complete")[0]
         Q2 = Q[:, :, 1:].conj().transpose(0, 2, 1)
         J = _real(Q2 @ np.linalg.solve(L, columns))
         r = _real(Q2 @ np.linalg.solve(L, blocks.slope[:, :, None]))[:, :, 0] - J @ self.shared.value[0]
-        sums.add(group, weight * told, r, np.zeros((*r.shape, sums.A.shape[1])), J)
+        sums.add(group, weight * usable, r, np.zeros((*r.shape, sums.A.shape[1])), J)
 
-    def _move(self, taken: Step) -> float:
-        x = taken.h * self.unit
-        whole = np.abs(self.shape.change(x)).max(axis=(1, 2)) / np.abs(self.h).max(axis=(1, 2))
+    def _move(self, last: Step) -> float:
+        x = last.h * self.unit
+        relative = np.abs(self.shape.change(x)).max(axis=(1, 2)) / np.abs(self.h).max(axis=(1, 2))
         largest = np.zeros(self.shape.groups)
-        np.maximum.at(largest, self.shape.group, np.where(self.solvable, whole, 0.0))
+        np.maximum.at(largest, self.shape.group, np.where(self.solvable, relative, 0.0))
         damped = np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, _LARGEST_STEP))
         change = self.shape.change(x * damped[:, None]) * self.solvable[:, None, None]
         self.h = self.h + change
-        self.shared.value = self.shared.value + taken.theta
-        self.own.value = self.own.value + taken.own.change
+        self.shared.value = self.shared.value + last.theta
+        self.by_point.value = self.by_point.value + last.by_point.change
         self.moved = True
         size = np.abs(self.h).max(axis=(1, 2))
         return float((np.abs(change).max(axis=(1, 2)) / size).max(initial=0.0))
@@ -284,13 +284,16 @@ class Solver:
         fitted, shares = {}, {}
         for term in self.terms:
             if term.points:
-                told = (self.own.of(term, last.own.deviation), self.own.of(term, last.own.estimated))
-                share = last.own_share(self.own.chosen(term))
+                posterior = (
+                    self.by_point.of(term, last.by_point.deviation),
+                    self.by_point.of(term, last.by_point.estimated),
+                )
+                share = last.point_share(self.by_point.chosen(term))
             else:
-                told = (self.shared.of(term, last.deviation[None]), self.shared.of(term, last.estimated[None]))
+                posterior = (self.shared.of(term, last.deviation[None]), self.shared.of(term, last.estimated[None]))
                 part = factors[self.shared.chosen(term)[0]]
                 share = np.einsum("qpa,qpb->pab", part, part)
-            fitted[term.name] = Fitted(self._value(term), *told, self.housing_noise)
+            fitted[term.name] = Fitted(self._value(term), *posterior, self.housing_noise)
             shares[term.name] = share * self.unit**2
         weight = self.scatter.weights
         chi_square = totals(self.group, weight * fit.chi_square, groups)
@@ -299,7 +302,7 @@ class Solver:
         return Solution(
             np.where(self.solvable[:, None, None], self.h, np.nan),
             last.records * self.unit**2,
-            last.given * self.unit**2,
+            last.conditional * self.unit**2,
             shares,
             factors * self.unit,
             fitted,
@@ -342,14 +345,14 @@ class _Rows:
     along: AlongForce
     counted: FloatArray  #: (n,): equations that say something
 
-    def residuals(self, weight: FloatArray, given: FloatArray) -> Residuals:
+    def residuals(self, weight: FloatArray, conditional: FloatArray) -> Residuals:
         """What is left of blocks of a weight (n,), and what the numbers of their points take; `given` (n, a, a)."""
-        J_h, given = self.J[:, :, : given.shape[1]], weight[:, None, None] * given
-        leverage = np.einsum("nka,nab,nkb->n", J_h, given, J_h, optimize=True) / np.maximum(self.counted, 1.0)
+        J_h, conditional = self.J[:, :, : conditional.shape[1]], weight[:, None, None] * conditional
+        leverage = np.einsum("nka,nab,nkb->n", J_h, conditional, J_h, optimize=True) / np.maximum(self.counted, 1.0)
         along = self.along
-        taken = np.einsum("nca,nab,ncb->nc", along.J_h, given, along.J_h, optimize=True)
+        spent = np.einsum("nca,nab,ncb->nc", along.J_h, conditional, along.J_h, optimize=True)
         chi_square = np.einsum("nk,nk->n", self.r, self.r)
-        return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, taken)
+        return Residuals(chi_square, self.counted, leverage, along.chi_square, along.information, spent)
 
 
 def _regular(R: ComplexArray) -> ComplexArray:

@@ -177,7 +177,7 @@ class Additive(Term):
         return np.asarray(columns @ value)
 
 
-def beyond(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
+def exceeding(fitted: Fitted, parameters: tuple[Parameter, ...], limit: float = 3.0) -> list[int]:
     """Places of estimated parameters further from the mean than they scatter if the prior holds.
 
     The value's variance is then the prior's less what the records leave; and it must stand above its own error.

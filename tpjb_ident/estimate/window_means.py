@@ -65,12 +65,12 @@ def window_means(
     `present` (g, m): channels of every run.
     """
     z = np.where(present[run], z, 0.0)
-    whole = np.asarray(np.isfinite(z).all(axis=1))
-    good = np.where(whole, (weights > 0.2).astype(float), 0.0)
+    complete = np.asarray(np.isfinite(z).all(axis=1))
+    good = np.where(complete, (weights > 0.2).astype(float), 0.0)
     if not good.any():
         return None
-    z = np.where(whole[:, None], z, 0.0)
-    scale = np.max(np.abs(z[whole]), axis=0) + 1e-300
+    z = np.where(complete[:, None], z, 0.0)
+    scale = np.max(np.abs(z[complete]), axis=0) + 1e-300
     turned, wandering = aligned(z / scale, run, good)
     readings = replace(readings, film=readings.film * scale / scale[:, None])
     lower, upper, shrinkage = trimming_limits(2 * z.shape[1])
@@ -80,7 +80,7 @@ def window_means(
         distance = 2 * np.einsum("na,an->n", means.residual.conj(), solved).real
         size = means.count[run]
         inside = np.where(good > 0, 1 - 1 / np.maximum(size, 2.0), 1 + 1 / np.maximum(size, 1.0))
-        trimmed = np.where(whole & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
+        trimmed = np.where(complete & (size > 0), trimming_weight(distance / inside, lower, upper), 0.0)
         lost = totals(run, trimmed, len(present)) < 1.0
         good = np.where(lost[run], good, trimmed)
         means = _pooled(turned, run, time, readings, good, present)
@@ -116,17 +116,17 @@ def _pooled(
     slope[total < _DRIFT_WINDOWS] = 0.0
     drift = _drift(mean, slope, readings.devices)
     residual = z - mean[run] - drift[run] * away[:, None]
-    whole = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
-    runs = np.sqrt(total[whole])[:, None] * mean[whole]
+    complete = present.all(axis=1) if present.all(axis=1).any() else np.ones(g, dtype=bool)
+    runs = np.sqrt(total[complete])[:, None] * mean[complete]
     motion = motion_in(residual, weights, runs, readings.film) * present[run]
     residual = residual - motion
     # the mean, and one complex rate a device of several channels
-    taken = 1.0 + 0.5 * ((total >= _DRIFT_WINDOWS) & (spread > 0))
-    each = np.maximum(total - taken, 0.0)
-    spare = float(each.sum())
+    used = 1.0 + 0.5 * ((total >= _DRIFT_WINDOWS) & (spread > 0))
+    remaining = np.maximum(total - used, 0.0)
+    spare = float(remaining.sum())
     # a channel that some runs lack has fewer residuals: its row and column are scaled alike, which keeps N positive
-    told = np.maximum(each @ present, 1.0)
-    root = np.sqrt(1 / told)
+    counts = np.maximum(remaining @ present, 1.0)
+    root = np.sqrt(1 / counts)
     noise = (weights[:, None] * residual).T @ residual.conj() * np.outer(root, root)
     noise = noise + (1e-24 + _FLOOR * float(np.trace(noise).real)) * np.eye(z.shape[1])
     moved = (weights[:, None] * motion).T @ motion.conj() / max(spare, 1.0)

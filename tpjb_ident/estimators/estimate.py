@@ -102,7 +102,7 @@ def estimate_table(
     omega: float,
     method: str,
     rlm_settings: RlmSettings | None = None,
-    known: DynamicStiffness | None = None,
+    reference: DynamicStiffness | None = None,
 ) -> DynamicStiffness:
     """As `estimate_dynamic_stiffness`, for a table that is already checked and scaled.
 
@@ -118,12 +118,14 @@ def estimate_table(
         nothing, condition = np.full((8, 8), np.nan), displacement_condition(table.D)
         none, weights = np.full((2, 2), np.nan + 0j), np.zeros((len(table.valid), 2))
         return DynamicStiffness(none, omega, nothing, nothing[0], name, weights, (obstacle,), condition)
-    fit = _exact(table) if len(table) == 2 else SOLVERS[method](table, settings, known is None)
+    fit = _exact(table) if len(table) == 2 else SOLVERS[method](table, settings, reference is None)
     estimate = _in_units(table, omega, name, fit)
-    if known is None:
+    if reference is None:
         return estimate
-    covariance, systematic = _VARIANCE.get(method, 1.0) * known.covariance, known.systematic
-    return replace(estimate, covariance=covariance, dof=known.dof, chi_square=known.chi_square, systematic=systematic)
+    covariance, systematic = _VARIANCE.get(method, 1.0) * reference.covariance, reference.systematic
+    return replace(
+        estimate, covariance=covariance, dof=reference.dof, chi_square=reference.chi_square, systematic=systematic
+    )
 
 
 def _si(value: Any, unit: str, name: str) -> Any:
@@ -166,8 +168,8 @@ def _ols(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
 
 def _mm(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
     fit = mm_fit(table.D, table.F, table.direction)
-    found = TableFit(fit.coefficients, fit.weights, conditions=fit.conditions)
-    return _regression(table, found, scatter, _VARIANCE["mm"])
+    solution = TableFit(fit.coefficients, fit.weights, conditions=fit.conditions)
+    return _regression(table, solution, scatter, _VARIANCE["mm"])
 
 
 def _mm_eiv(table: PhasorTable, settings: RlmSettings, scatter: bool) -> TableFit:
@@ -198,8 +200,8 @@ def instrumental_fit(table: PhasorTable, scatter: bool = True) -> tuple[TableFit
     h = plain + np.linalg.solve(B_D.T, B_left.T).T
     D = table.reference @ B_D.T
     explained = replace(table, D=D, F=table.F - (table.D - D) @ h.T)
-    found = TableFit(h, fit.weights, conditions=fit.conditions)
-    return _regression(explained, found, scatter, _VARIANCE["iv"]), explained
+    solution = TableFit(h, fit.weights, conditions=fit.conditions)
+    return _regression(explained, solution, scatter, _VARIANCE["iv"]), explained
 
 
 def _regression(table: PhasorTable, fit: TableFit, scatter: bool, variance: float = 1.0) -> TableFit:
@@ -245,18 +247,18 @@ def _in_units(table: PhasorTable, omega: float, name: str, fit: TableFit) -> Dyn
 
 def fit_conditions(condition: float, weights: FloatArray, directions: int) -> list[Condition]:
     """What the windows of a fit say of it: condition number of their displacements, weights, directions."""
-    found = []
+    conditions = []
     if condition > _MAX_CONDITION:
         text = f"condition number {condition:.3g} of the displacement directions > 30"
-        found.append(Condition("ill-conditioned", text))
+        conditions.append(Condition("ill-conditioned", text))
     rejected = float((weights < REJECTED_WEIGHT).mean()) if len(weights) else 0.0
     if rejected > _MAX_REJECTED:
         text = f"{100 * rejected:.0f} % of the windows got no weight (limit 40 %)"
-        found.append(Condition("many-windows-rejected", text))
+        conditions.append(Condition("many-windows-rejected", text))
     if directions == 2:
         text = "two directions only: the interval cannot see what runs differ by, only their repeats"
-        found.append(Condition("no-spare-direction", text))
-    return found
+        conditions.append(Condition("no-spare-direction", text))
+    return conditions
 
 
 #: What solves Eq. (15) by each method, whether its scatter is asked for: a new estimator is a function here.

@@ -99,11 +99,11 @@ def _statsmodels(design: FloatArray, response: FloatArray, settings: RlmSettings
 
     if settings.norm not in NORMS:
         raise ArgumentError(unknown_name("norm", settings.norm, NORMS))
-    own: dict[str, Callable[[], Any]] = {
+    extra: dict[str, Callable[[], Any]] = {
         "student": lambda: norms.StudentT(c=1.0, df=4.0),
         "mquantile": lambda: norms.MQuantileNorm(0.5, norms.HuberT()),  # the symmetric one, which estimates H
     }
-    norm = own.get(settings.norm, getattr(norms, NORMS[settings.norm]))()
+    norm = extra.get(settings.norm, getattr(norms, NORMS[settings.norm]))()
     fit = RLM(response, design, M=norm).fit(
         maxiter=settings.max_iterations, tol=settings.tolerance, conv="coefs", scale_est=settings.scale
     )

@@ -56,7 +56,7 @@ def band_blocks(
     groups = np.cumsum([0, *(len(plan.bins) for plan in plans)])
     lines = np.cumsum([0, *(len(plan.frequencies) for plan in plans)])
     rows: list[dict[str, object]] = []
-    known: list[list[Hashable]] = [[] for _ in sensors]
+    calibrations: list[list[Hashable]] = [[] for _ in sensors]
     operating: list[OperatingPoint] = []
     runs: list[str] = []
     for b, (point, miss) in enumerate(zip(points, misses)):
@@ -66,11 +66,11 @@ def band_blocks(
             names = [s.phasors.run for s in spectra]
             warmth = temperatures.get(names[0], np.nan)
             channels = _described(spectra[0], sensors)
-            row = {"calibration": calibration_numbers(channels, known), "along": axes_of(channels)}
+            row = {"calibration": calibration_numbers(channels, calibrations), "along": axes_of(channels)}
             row |= {"run": len(runs), "temperature": warmth, "miss": miss.of(members)}
             for place, response in enumerate(_run_rows(point, spectra, channels, warmth, turn)):
                 at = {"point": groups[b] + place, "omega": 2 * np.pi * point.plan.middles[place]}
-                rows += [one | row | at for one in response]
+                rows += [values | row | at for values in response]
             runs.append(", ".join(names))
     blocks = stacked(operating, runs, len(sensors), rows)
     line = np.concatenate([plan.line + first for plan, first in zip(plans, lines)])
@@ -112,9 +112,9 @@ def _described(spectra: RunSpectra, sensors: Sequence[Sensor]) -> list[Channel |
     """The run's channel of every sensor; None of one that it lacks, or that shows nothing beside its like."""
     largest = np.abs(spectra.phasors.z).max(axis=(0, 1))
     table = {(c.name, c.quantity): (c, size) for c, size in zip(spectra.phasors.channels, largest)}
-    known = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
-    shown = alive(sensors, np.array([size for _, size in known]))
-    return [channel if own else None for (channel, _), own in zip(known, shown)]
+    described = [table.get((sensor.name, sensor.quantity), (None, 0.0)) for sensor in sensors]
+    shown = alive(sensors, np.array([size for _, size in described]))
+    return [channel if is_shown else None for (channel, _), is_shown in zip(described, shown)]
 
 
 def _run_rows(

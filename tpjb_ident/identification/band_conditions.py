@@ -22,14 +22,14 @@ _TOO_MUCH = 0.05
 
 def run_conditions(point: BandPoint, solution: BandSolution) -> tuple[Condition, ...]:
     """What the records, the runs beside each other and the terms' tests say."""
-    found = [condition for s in point.spectra for condition in s.phasors.conditions]
+    conditions = [condition for s in point.spectra for condition in s.phasors.conditions]
     if len(point.spectra) == 2:
         text = "with two runs the interval holds how their repeats differ, not how runs do"
-        found.append(Condition("no-spare-direction", text))
+        conditions.append(Condition("no-spare-direction", text))
     if solution.run_scatter > _TOO_MUCH:
         text = f"runs differ by {100 * solution.run_scatter:.1f} % in force over displacement"
-        found.append(Condition("runs-disagree", text))
-    return merged(tuple(found), solution.lines.conditions())
+        conditions.append(Condition("runs-disagree", text))
+    return merged(tuple(conditions), solution.lines.conditions())
 
 
 def band_conditions(point: BandPoint, solved: SolvedBands, b: int) -> tuple[Condition, ...]:

@@ -138,8 +138,8 @@ def _alike(spectra: Sequence[RunSpectra]) -> Sequence[RunSpectra]:
     """Runs with the same bins."""
     first = spectra[0]
     for spectrum in spectra[1:]:
-        same = len(spectrum.frequencies) == len(first.frequencies)
-        if not same or np.abs(spectrum.frequencies / first.frequencies - 1).max() > 1e-3:
+        is_same = len(spectrum.frequencies) == len(first.frequencies)
+        if not is_same or np.abs(spectrum.frequencies / first.frequencies - 1).max() > 1e-3:
             sentences = [
                 f"{s.phasors.run} {'none' if s.period is None else f'{s.period:.4g} s'}" for s in (first, spectrum)
             ]
@@ -171,7 +171,7 @@ def _group(runs: list[Run]) -> BandGroup:
 def line_plan(spectra: Sequence[RunSpectra]) -> LinePlan:
     """Lines of runs that have the same bins."""
     frequencies = spectra[0].frequencies
-    free = ~np.any([s.taken for s in spectra], axis=0)
+    free = ~np.any([s.disturbed for s in spectra], axis=0)
     period = spectra[0].period
     if period is not None:
         chosen = np.flatnonzero(free)

@@ -78,7 +78,7 @@ def solve_bands(rig: Rig, data: BandBlocks, correct: bool, taken_off: Mapping[st
     usable &= np.abs(away).max(axis=(1, 2)) < _RUN_AWAY * np.abs(crude).max(axis=(1, 2))
     h[usable] = crude[usable] + away[usable]
     parts = _parts(data, used, np.isfinite(h).all(axis=(1, 2)))
-    part, part_h = _part_solution(replace(task, kept=solution), parts, h, used)
+    part, part_h = _part_solution(replace(task, held=solution), parts, h, used)
     return BandSolution(task.rig, h, solution, parts, part_h, part, condition, used, size)
 
 
@@ -106,13 +106,13 @@ class _Task:
     terms: tuple[Term, ...]
     correct: bool
     taken_off: Mapping[str, float]  #: rates of devices' clocks, put right before
-    kept: Solution | None  #: whose scatter, weights and shared parameters stay
+    held: Solution | None  #: whose scatter, weights and shared parameters stay
 
     def solved(self, start: ComplexArray, shape: Shape, begun: Solution | None = None) -> Solution:
         """One solve from a start (P, 2, 2), NaN where points take no part, or from where another one ended."""
-        if self.kept is not None:
-            scatter = self.kept.scatter
-            shape = replace(shape, scatter=scatter.kept(shape.groups, scatter.weights), held=self.kept.fitted)
+        if self.held is not None:
+            scatter = self.held.scatter
+            shape = replace(shape, scatter=scatter.fixed(shape.groups, scatter.weights), held=self.held.fitted)
         solver = Solver(self.rig, self.data.blocks, self.terms, start, self.correct, shape)
         return (solver if begun is None else solver.begun(begun)).run()
 
@@ -120,29 +120,29 @@ class _Task:
         """The task with its terms, runs' gains scattering by `deviation` (number of runs,)."""
         rig, blocks = self.rig, self.data.blocks
         film = Distortion(rig, blocks, self.data.bent, self.data.band[self.data.line], self.data.uneven)
-        made = [RunGain(rig, blocks, deviation), film, Clock(rig, blocks, self.taken_off)]
-        return replace(self, terms=tuple(campaign_terms(rig, blocks, self.correct, made)))
+        prepared = [RunGain(rig, blocks, deviation), film, Clock(rig, blocks, self.taken_off)]
+        return replace(self, terms=tuple(campaign_terms(rig, blocks, self.correct, prepared)))
 
 
 def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution, _Task, float]:
     """H of the lines, with what it shows of rig and runs: the task that the models are fitted with."""
     data = task.data
-    own, spare = _own_scatter(data, task.correct)
+    by_load, spare = _own_scatter(data, task.correct)
     lines = len(data.band)
     shape = Shape(data.line, count=lines, scatter=Scatter.unjudged(lines, len(data.blocks)))
     size, freedom = _FIRST, np.inf
     for _ in range(_ROUNDS if spare.any() else 0):
-        task = task.with_gains(np.hypot(own, size * spare))
+        task = task.with_gains(np.hypot(by_load, size * spare))
         solution = task.solved(start, shape)
         term = next(t for t in task.terms if isinstance(t, RunGain))
-        size, freedom = term.scatter(solution.fitted[term.name], own, _USUAL)
+        size, freedom = term.scatter(solution.fitted[term.name], by_load, _USUAL)
     # a scatter of few runs is uncertain by itself: Student's t over the normal quantile
     wide = float(stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975)) if np.isfinite(freedom) else 1.0
-    task = task.with_gains(np.hypot(own, size * wide * spare))
+    task = task.with_gains(np.hypot(by_load, size * wide * spare))
     solution = task.solved(start, shape)
     rig = learnt_rig(task.rig, solution)
     if rig is not task.rig:
-        task = replace(task, rig=rig).with_gains(np.hypot(own, size * wide * spare))
+        task = replace(task, rig=rig).with_gains(np.hypot(by_load, size * wide * spare))
         solution = task.solved(start, shape, solution)
     return solution, task, size * float(spare.any())
 
@@ -157,20 +157,20 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
     for point in blocks.points:
         families.setdefault(point.static_key[1:], set()).add(point.static_load)
     alone = np.array([not correct or len(families[point.static_key[1:]]) < 2 for point in blocks.points], dtype=float)
-    own, spare = np.zeros((2, len(blocks.runs)))
-    own[blocks.run] = UNKNOWN_EXPONENT * np.abs(blocks.miss.real) * alone[blocks.point]
+    by_load, spare = np.zeros((2, len(blocks.runs)))
+    by_load[blocks.run] = UNKNOWN_EXPONENT * np.abs(blocks.miss.real) * alone[blocks.point]
     runs, first = np.unique(blocks.run, return_index=True)
     band = data.band[data.line[blocks.point[first]]]
     spare[runs] = np.bincount(band)[band] > 2
-    return own, spare
+    return by_load, spare
 
 
 def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     """H of every line by least squares (L, 2, 2), and the condition number of its motions (L,)."""
     D, F = vector(rig, data.blocks, "displacement"), film_force(rig, data.blocks)
-    told = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
-    line, lines = data.line[data.blocks.point[told]], len(data.band)
-    DD, FD = (line_products(line, rows[told], D[told], lines) for rows in (D, F))
+    usable = np.isfinite(D).all(axis=1) & np.isfinite(F).all(axis=1)
+    line, lines = data.line[data.blocks.point[usable]], len(data.band)
+    DD, FD = (line_products(line, rows[usable], D[usable], lines) for rows in (D, F))
     condition = np.sqrt(np.linalg.cond(DD))
     h = np.full((lines, 2, 2), np.nan + 0j)
     regular = condition < _ONE_LINE
@@ -178,16 +178,16 @@ def _crude(rig: Rig, data: BandBlocks) -> tuple[ComplexArray, FloatArray]:
     return h - rig.bare.at(data.line_omega), condition
 
 
-def _parts(data: BandBlocks, used: BoolArray, told: BoolArray) -> tuple[BandPart, ...]:
+def _parts(data: BandBlocks, used: BoolArray, usable: BoolArray) -> tuple[BandPart, ...]:
     """Parts of all bands; few tones are no band: each that is told is a point."""
     parts = []
     for b in range(int(data.band.max(initial=-1)) + 1):
         lines = np.flatnonzero(used & (data.band == b))
         if len(lines) < 2 * MODELS["K-C-M"]:
-            groups = [lines[k : k + 1] for k in np.flatnonzero(told[lines])]
+            groups = [lines[k : k + 1] for k in np.flatnonzero(usable[lines])]
         else:
             groups = np.array_split(lines, min(_PARTS, len(lines) // 2))
-        parts += [BandPart(b, own, float(data.line_omega[own].mean())) for own in groups]
+        parts += [BandPart(b, members, float(data.line_omega[members].mean())) for members in groups]
     return tuple(parts)
 
 

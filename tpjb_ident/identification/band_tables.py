@@ -102,18 +102,18 @@ def band_results(
     lines = [tuple(_line(solved, solved.points[b], int(k)) for k in solved.usable(b)) for b in bands]
     parts = [solved.parts(b) for b in bands]
     points = [tuple(_point(solved, q, lines[b], quality[b], clearance) for q in parts[b]) for b in bands]
-    apart = real_numbers(solved.solutions[-1].part_h - solved.first.part_h) / np.sqrt(12)
+    bracket = real_numbers(solved.solutions[-1].part_h - solved.first.part_h) / np.sqrt(12)
     results = []
     for b, data in enumerate(solved.points):
-        changes = np.concatenate([solved.first.part.factors[:, parts[b]], apart[None, parts[b]]])
+        changes = np.concatenate([solved.first.part.factors[:, parts[b]], bracket[None, parts[b]]])
         models = _models(solved, b, points[b], changes) if points[b] else {}
         chosen = supported(models) if models else "raw H"
         period, width = data.spectra[0].period, data.plan.resolution
-        known = lines[b], models, chosen, quality[b], data.runs, period, width, points[b]
-        results.append(BandResult(data.point, data.group.kind, *known))
-    every = [q for members in parts for q in members]
-    more = {_BRACKET: apart[every]} if apart.any() else {}
-    return (tuple(results), *shared_changes(solved.first.part, every, more))
+        common = lines[b], models, chosen, quality[b], data.runs, period, width, points[b]
+        results.append(BandResult(data.point, data.group.kind, *common))
+    numbers = [q for members in parts for q in members]
+    more = {_BRACKET: bracket[numbers]} if bracket.any() else {}
+    return (tuple(results), *shared_changes(solved.first.part, numbers, more))
 
 
 def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
@@ -121,14 +121,16 @@ def _line(solved: SolvedBands, point: BandPoint, k: int) -> BandLine:
     h = np.array([s.h[k] for s in solved.solutions])
     best, budget = solved.estimate(solved.solution, k, np.array([k]), h, point.method)
     classic = point.classic[k - int(np.searchsorted(solved.data.band, solved.data.band[k]))]
-    others = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
+    alternatives = {name: value - solved.rig.bare.at(np.array([best.omega]))[0] for name, value in classic.h.items()}
     if _BRACKET in budget:
-        others |= {"h1": h[0], "h2": h[-1]}
+        alternatives |= {"h1": h[0], "h2": h[-1]}
     free, shared = np.full(8, classic.freedom), total(sources_of(solved.solution, k)[1].values())
     table = {point.method: best}
-    for name, value in others.items():
-        other = DynamicStiffness(value, best.omega, classic.covariance, free, name, best.weights, systematic=shared)
-        table.setdefault(name, other)
+    for name, value in alternatives.items():
+        alternative = DynamicStiffness(
+            value, best.omega, classic.covariance, free, name, best.weights, systematic=shared
+        )
+        table.setdefault(name, alternative)
     return BandLine(best.omega / (2 * np.pi), table, point.method, classic.coherence, classic.n_rows)
 
 

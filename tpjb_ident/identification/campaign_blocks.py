@@ -35,8 +35,8 @@ def unstated(campaign: Campaign) -> tuple[Condition, ...]:
 def run_temperatures(campaign: Campaign, measured: Iterable[tuple[str, Mapping[int, float]]]) -> dict[str, float]:
     """Temperature at the probes by run [K]: as stated, else the mean of its thermometers."""
     means = {run: float(np.mean(list(temperatures.values()))) for run, temperatures in measured if temperatures}
-    stated = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
-    return means | stated
+    noted = {run.id: run.temperature for run in campaign.of_kind("dynamic") if run.temperature is not None}
+    return means | noted
 
 
 def campaign_blocks(
@@ -49,7 +49,7 @@ def campaign_blocks(
     """Stack the runs of all points; `bent` (P,), `temperatures` [K] by run."""
     noises, freedoms = _pooled_noise(means, [data.runs[0].length for data in points])
     names: list[str] = []
-    known: list[list[Hashable]] = []
+    calibrations: list[list[Hashable]] = []
     rows: list[dict[str, object]] = []
     for p, (data, point, miss) in enumerate(zip(points, means, misses)):
         w = point.means
@@ -57,7 +57,7 @@ def campaign_blocks(
             if w is None or not w.count[g] > 0:
                 continue
             channels = point.channels[g]
-            known = known or [[] for _ in channels]
+            calibrations = calibrations or [[] for _ in channels]
             load = data.point.static_load
             present = np.array([channel is not None for channel in channels])
             row: dict[str, object] = {
@@ -67,7 +67,7 @@ def campaign_blocks(
                 "z": w.mean[g] * present,
                 "present": present,
                 "along": axes_of(channels),
-                "calibration": calibration_numbers(channels, known),
+                "calibration": calibration_numbers(channels, calibrations),
                 "noise": noises[p] / w.count[g],
                 "dof": freedoms[p],
                 "slope": w.slope[g],
@@ -84,10 +84,10 @@ def campaign_blocks(
     return stacked([data.point for data in points], names, len(means[0].channels[0]), rows, bent)
 
 
-def calibration_numbers(channels: Sequence[Channel | None], known: list[list[Hashable]]) -> list[int]:
+def calibration_numbers(channels: Sequence[Channel | None], tables: list[list[Hashable]]) -> list[int]:
     """Numbers of the channels' calibrations (m,); `known` holds those of each sensor, new ones join it."""
     numbers = []
-    for channel, calibrations in zip(channels, known):
+    for channel, calibrations in zip(channels, tables):
         calibration = None if channel is None else channel.calibration
         if channel is not None and calibration not in calibrations:
             calibrations.append(calibration)
@@ -100,17 +100,17 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
 
     What points share is the noise's density: that of a window goes with one over its length [s].
     """
-    told: list[tuple[float, ComplexArray]] = []
+    densities: list[tuple[float, ComplexArray]] = []
     for p, length in zip(means, lengths):
         if p.means is not None and p.means.spare > 0:
-            told.append((p.means.spare, np.asarray(length * p.means.noise, complex)))
-    if sum(spare for spare, _ in told) < _FREEDOM:
+            densities.append((p.means.spare, np.asarray(length * p.means.noise, complex)))
+    if sum(spare for spare, _ in densities) < _FREEDOM:
         # too few windows in all the campaign: what the lines leave of the records tells the noise
-        told += [(p.residual[1], p.residual[0]) for p in means if p.residual[1] > 0]
-    total = sum(spare for spare, _ in told)
-    m = told[0][1].shape[0] if told else 1
+        densities += [(p.residual[1], p.residual[0]) for p in means if p.residual[1] > 0]
+    total = sum(spare for spare, _ in densities)
+    m = densities[0][1].shape[0] if densities else 1
     density = np.zeros((m, m), complex)
-    for spare, noise in told:
+    for spare, noise in densities:
         density += spare * noise / max(total, 1.0)
     noises: list[ComplexArray] = []
     freedoms: list[float] = []
@@ -118,9 +118,9 @@ def _pooled_noise(means: Sequence[PointMeans], lengths: Sequence[float]) -> tupl
         spare = 0.0 if p.means is None else p.means.spare
         more = min(max(_FREEDOM - spare, 0.0), total - spare)
         pool: ComplexArray = np.asarray(density / max(length, 1e-9), dtype=np.complex128)
-        own: ComplexArray = pool if p.means is None else p.means.noise
+        single: ComplexArray = pool if p.means is None else p.means.noise
         freedom = max(spare + more, 1.0)
-        noise = (spare * own + more * pool) / freedom
+        noise = (spare * single + more * pool) / freedom
         noises.append(unbiased_noise(noise, freedom))
         freedoms.append(freedom)
     return noises, np.array(freedoms)

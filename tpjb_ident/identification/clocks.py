@@ -90,8 +90,8 @@ def with_found_devices(
     ):
         devices["acceleration"] = "accelerometers" if acceleration.clear else ""
         rates |= {"accelerometers": acceleration.rate} if acceleration.clear else {}
-    apart = [replace(s, device=devices.get(s.quantity, "")) for s in sensors]
-    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.device else s for s in apart), rates
+    separate = [replace(s, device=devices.get(s.quantity, "")) for s in sensors]
+    return tuple(replace(s, delay_uncertainty=s.delay_uncertainty or start) if s.device else s for s in separate), rates
 
 
 @dataclass(frozen=True)
@@ -105,19 +105,19 @@ def _rate(sensors: Sequence[Sensor], blocks: Blocks, quantity: str) -> _Rate | N
     """Rate of a quantity's clock against the probes'; None where no one rate explains the runs."""
     rows = [j for j, sensor in enumerate(sensors) if sensor.quantity == quantity]
     probes = [j for j, sensor in enumerate(sensors) if sensor.quantity == "displacement"]
-    told = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1)
-    if not rows or told.sum() < 2:
+    usable = (blocks.windows > 3) & blocks.present[:, rows + probes].all(axis=1)
+    if not rows or usable.sum() < 2:
         return None
-    own, own_error = _turning(blocks, rows)
+    turn, turn_error = _turning(blocks, rows)
     probe, probe_error = _turning(blocks, probes)
-    rate = (probe - own)[told] / blocks.omega[told]
-    error = np.hypot(own_error, probe_error)[told] / blocks.omega[told]
+    rate = (probe - turn)[usable] / blocks.omega[usable]
+    error = np.hypot(turn_error, probe_error)[usable] / blocks.omega[usable]
     # a run that slipped tells nothing of a rate
     near = np.argsort(np.abs(rate - np.median(rate)) / error)[: max(2, int(_USUAL * len(rate)))]
     weight = 1 / np.hypot(error, np.median(error)) ** 2
     middle, doubt = float(np.average(rate[near], weights=weight[near])), float(1 / np.sqrt(np.sum(weight)))
     alike = float(chdtrc(len(near), np.sum(((rate - middle)[near] / error[near]) ** 2))) > _ONE_RATE
-    turned = float(np.median(np.abs(rate) * blocks.omega[told] * 2 * blocks.time[told]))
+    turned = float(np.median(np.abs(rate) * blocks.omega[usable] * 2 * blocks.time[usable]))
     return _Rate(middle, doubt, abs(middle) > _CLEAR * doubt and turned > _NOTABLE) if alike else None
 
 

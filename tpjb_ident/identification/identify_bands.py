@@ -33,11 +33,11 @@ def identify_bands(
 ) -> Identification:
     """Identify every operating point of a campaign that was excited over a band."""
     runs = tuple(run for run in campaign.of_kind("dynamic") if is_broadband(run))
-    seen = []
+    observations = []
     for done, run in enumerate(runs):
         progress(run.id, done, len(runs))
-        seen.append(observe(run))
-    checked = campaign_verdicts(campaign, seen)
+        observations.append(observe(run))
+    checked = campaign_verdicts(campaign, observations)
     unusable = [
         ExcludedRun(r.id, r.point, RigDataError(checked.unusable[r.id])) for r in runs if r.id in checked.unusable
     ]
@@ -58,16 +58,16 @@ def identify_bands(
     points, bad = solved.points, solved.excluded
     quality = []
     for b, point in enumerate(points):
-        known = solved.loads.conditions(b), check_conditions(checked, point.runs)
+        of_runs = solved.loads.conditions(b), check_conditions(checked, point.runs)
         without = without_runs(point.point, bad, any_excitation=True)
         of_band = run_conditions(point, solved.first), band_conditions(point, solved, b)
-        quality.append(merged(*known, without, *of_band))
+        quality.append(merged(*of_runs, without, *of_band))
     results, changes, names = band_results(solved, quality, settings.clearance)
     lost = lost_points([point.point for point in points], bad, any_excitation=True, kind="run over a band")
     named = named_runs(bad, len(runs)) + lost + unstated(campaign)
-    found = tuple(point for band in results for point in band.points)
+    identified = tuple(point for band in results for point in band.points)
     springs = cell_stiffness(solved.first.part)
-    return Identification(campaign.id, settings.method, found, changes, named, results, names, springs)
+    return Identification(campaign.id, settings.method, identified, changes, named, results, names, springs)
 
 
 def _solved(

@@ -28,7 +28,7 @@ def all_methods(
     data: PointData,
     settings: IdentifySettings,
     solved: dict[str, DynamicStiffness],
-    known: DynamicStiffness | None,
+    reference: DynamicStiffness | None,
 ) -> dict[str, DynamicStiffness]:
     """Every method that was asked for and applies, the default one in any case; those of `solved` are there already.
 
@@ -42,7 +42,7 @@ def all_methods(
         if name in solved:
             estimates[name] = solved[name]
         elif method != "iv" or drive is not None or settings.method == "iv":
-            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"), known)
+            estimates[name] = estimate_table(table, data.omega, method, RlmSettings(norm or "huber"), reference)
     return estimates
 
 

@@ -87,19 +87,19 @@ def point_share(solved: CampaignSolution, data: PointData, p: int) -> PointShare
         factor[g], change[g], weight[g] = solution.factor[b], solution.run_change[b], solution.weights[b]
     estimate, budget = _estimate(solved, p, weight, data)
     in_cells = solved.cell_pickup if p in solved.in_cells else 0.0
-    said, shaft = _conditions(solved, p), bool(means.shaft_conditions)
+    conditions, shaft = _conditions(solved, p), bool(means.shaft_conditions)
     miss, film = solved.loads.misses[p], solved.film[p]
-    return PointShare(shift, factor, change, estimate, budget, said, shaft, miss, film, in_cells)
+    return PointShare(shift, factor, change, estimate, budget, conditions, shaft, miss, film, in_cells)
 
 
 def _conditions(solved: CampaignSolution, p: int) -> tuple[Condition, ...]:
-    found = [*solved.loads.conditions(p), *solved.solution.conditions()]
+    conditions = [*solved.loads.conditions(p), *solved.solution.conditions()]
     if p in solved.mains and solved.pickup is not None:
-        found.append(solved.mains[p].condition(solved.pickup))
-    found += solved.means[p].shaft_conditions
+        conditions.append(solved.mains[p].condition(solved.pickup))
+    conditions += solved.means[p].shaft_conditions
     for term in solved.solution.terms:
-        found += term.point_conditions(p, solved.solution.fitted[term.name], solved.h[p])
-    return tuple(found)
+        conditions += term.point_conditions(p, solved.solution.fitted[term.name], solved.h[p])
+    return tuple(conditions)
 
 
 def _estimate(
@@ -121,7 +121,7 @@ def _estimate(
         common["mains on the cells"] = solved.in_cells[p]
     weights = windows.weights * run_weight[data.run_index]
     runs = int((run_weight > 0).sum())
-    said = fit_conditions(means.condition, weights[means.usable], runs)
+    flags = fit_conditions(means.condition, weights[means.usable], runs)
     estimate = DynamicStiffness(
         solved.h[p],
         float(np.median(solved.blocks.omega[mine])),
@@ -129,7 +129,7 @@ def _estimate(
         dof,
         SOLVED,
         np.repeat(weights[:, None], 2, axis=1),
-        (*means.status, *said, *not_locked(windows.wandering, runs)),
+        (*means.status, *flags, *not_locked(windows.wandering, runs)),
         means.condition,
         float(solution.chi_square[p]),
         int(max(solution.spare[p], 0)),

@@ -83,12 +83,12 @@ def device_readers(run: Run, command: bool = False) -> tuple[DeviceReader, ...]:
     readers = []
     for device in devices:
         channels = tuple(c for name, c in directed.items() if name in device.channels)
-        own = [c for c in tachometers if c.name in device.channels]
+        matching = [c for c in tachometers if c.name in device.channels]
         rate = device.rate if np.isfinite(device.rate) else run.sample_rate
         # of a run that ends early all devices do
         length = min(device.length, int(np.ceil(run.length / run.sample_rate * rate)))
         if channels:
-            readers.append(DeviceReader(run, device, channels, own[0] if own else None, rate, length))
+            readers.append(DeviceReader(run, device, channels, matching[0] if matching else None, rate, length))
     return tuple(readers)
 
 

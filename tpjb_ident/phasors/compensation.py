@@ -106,10 +106,10 @@ def slower_channel(values: FloatArray, export_rate: float) -> SlowerChannel | No
     peaks = find_peaks(agreement)[0]
     for k in peaks[chance[peaks] > _CLEAR].tolist():
         order = _filling_order(size, k)
-        beside = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
+        nearby = np.median(agreement[max(k - _BESIDE, 0) : k + _BESIDE + 1])
         again = agreement[2 * k - 2 : 2 * k + 3]
         is_repeated = len(again) < 5 or again.max() >= 0.5 * agreement[k]
-        if agreement[k] > max(_ABOVE * beside, _AGREEMENT) and is_repeated and order is not None:
+        if agreement[k] > max(_ABOVE * nearby, _AGREEMENT) and is_repeated and order is not None:
             rate = _sharpened(agreement, chance, k) * export_rate / n
             ratio = export_rate / rate
             even = abs(ratio - round(ratio)) < _EVEN * ratio

@@ -116,11 +116,11 @@ class _DeviceFit:
         fit = self.fitter.fit(rows, start, usual)
         usual = usual_scale(fit.scale) if usual is None else usual
         for i in np.flatnonzero(uneven | np.isfinite(self.speeds[first:stop])).tolist():
-            known = np.isfinite(time[i]) if uneven[i] else np.ones(self.length, dtype=bool)
-            if known.sum() > 2 * self.fitter.design.shape[1]:
-                fitter = self._fitter(self.speeds[first + i], time[i, known] if uneven[i] else None)
-                origin = time[i, known][:1] if uneven[i] else start[i : i + 1]
-                fit.put(np.array([i]), fitter.fit(rows[:, i : i + 1, known], origin, usual))
+            timed = np.isfinite(time[i]) if uneven[i] else np.ones(self.length, dtype=bool)
+            if timed.sum() > 2 * self.fitter.design.shape[1]:
+                fitter = self._fitter(self.speeds[first + i], time[i, timed] if uneven[i] else None)
+                origin = time[i, timed][:1] if uneven[i] else start[i : i + 1]
+                fit.put(np.array([i]), fitter.fit(rows[:, i : i + 1, timed], origin, usual))
         self.windows.put(np.arange(first, stop), fit, lines=self.shown)
         self.start[first:stop] = start
         if samples.speed is not None:

@@ -35,7 +35,7 @@ def unexpected_lines(
 
     `images` (m,): frequencies at which lines stand that are none [Hz].
     """
-    whole = result.lines.whole_frequencies
+    listed_lines = result.lines.whole_frequencies
     frequencies: list[float] = []
     for quantity in ("force", "displacement"):
         places = result.pick(quantity)
@@ -45,11 +45,11 @@ def unexpected_lines(
             for record in records:
                 columns = [k for k, place in enumerate(record.places) if place in places]
                 if columns:
-                    frequencies += _peaks(record, columns, np.append(whole, frequencies), smallest)
+                    frequencies += _peaks(record, columns, np.append(listed_lines, frequencies), smallest)
     top = REACH * max(result.lines.driven)
-    apart = _LOBE / records[0].duration
-    frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > apart]
-    strange = tuple(sorted(f for f in frequencies if f not in whole))[:MAX_LINES]
+    lobe = _LOBE / records[0].duration
+    frequencies = [f for f in frequencies if f < top and np.abs(images - f).min(initial=np.inf) > lobe]
+    strange = tuple(sorted(f for f in frequencies if f not in listed_lines))[:MAX_LINES]
     if not strange:  # what leaks from lines that nobody expects makes faint ones stand out
         return tuple(sorted(set(frequencies))), ()
     conditions = [lines_beside(strange)]
@@ -71,7 +71,7 @@ def lines_beside(frequencies: tuple[float, ...]) -> Condition:
     return Condition("unexpected lines", f"lines at {listed} Hz; fitted along")
 
 
-def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest: float) -> list[float]:
+def _peaks(record: WholeRecord, columns: list[int], lines: FloatArray, smallest: float) -> list[float]:
     """Frequencies [Hz] of lines above `smallest` in some channels: faint ones fitted, and peaks of the residual."""
     amplitude = np.linalg.norm(hann_amplitude(record.spectrum[:, columns]), axis=1)
     step = 1 / record.duration
@@ -79,7 +79,7 @@ def _peaks(record: WholeRecord, columns: list[int], known: FloatArray, smallest:
     least = np.maximum(_PROMINENCE * noise_floor(amplitude), smallest)
     candidate = amplitude > least
     candidate[frequency < _LOBE * step] = False
-    for f in known:
+    for f in lines:
         candidate[np.abs(frequency - f) < _LOBE * step] = False
     tops = [i for i in find_peaks(amplitude)[0] if candidate[i]]
     peaks = [float(frequency[i] + step * vertex(amplitude[i - 1 : i + 2])) for i in tops]
@@ -114,19 +114,19 @@ def near_line(result: RunPhasors, driven: int, duration: float, rate: float) -> 
     Its beat shows in the windows' phasors.
     """
     frequency = result.lines.excitation[driven].frequency
-    known = np.abs(np.delete(result.lines.frequencies, driven) - frequency) * duration
+    distances = np.abs(np.delete(result.lines.frequencies, driven) - frequency) * duration
     noise = phasor_noise(result, rate)
     live = np.isfinite(noise)
     z = result.z[:, driven, live] / noise[live]
     good = np.isfinite(z).all(axis=1)
-    if (known < _FARTHEST).any() or good.sum() < _LEAST or not live.any():
+    if (distances < _FARTHEST).any() or good.sum() < _LEAST or not live.any():
         return None
     windows, time = z[good], (result.start[good] + 0.5 * result.length) / duration
-    left, shift, power = _best(windows, time)
+    remainder, shift, power = _best(windows, time)
     count, channels = windows.shape
     amplitude = float(np.median(np.linalg.norm(windows, axis=1)))
     spare = count - _TAKEN
-    clear = power > _CLEAR_POWER * channels and left - count * channels < _LEFT * spare * power
+    clear = power > _CLEAR_POWER * channels and remainder - count * channels < _LEFT * spare * power
     return frequency + shift / duration if clear and power > count * (MIN_SHARE * amplitude) ** 2 else None
 
 

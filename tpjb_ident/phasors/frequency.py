@@ -76,12 +76,12 @@ def phase_advance(phasors: ComplexArray, start: FloatArray, noise: float) -> _Ad
     windows = np.flatnonzero(np.isfinite(phasors).all(axis=1))
     if len(windows) < 3:
         return None
-    z, apart = phasors[windows], np.diff(start[windows])
+    z, spacing = phasors[windows], np.diff(start[windows])
     size = float(np.median(np.linalg.norm(z, axis=1)))
     if not size > 10 * noise:
         return None
     turns = np.angle(np.einsum("ni,ni->n", z[1:], z[:-1].conj())) / (2 * np.pi)
-    return _Advance(windows, turns / apart, noise / size / (2 * np.pi * float(np.median(apart))))
+    return _Advance(windows, turns / spacing, noise / size / (2 * np.pi * float(np.median(spacing))))
 
 
 def _line_advance(result: RunPhasors, line: int, rate: float, places: list[int] | None = None) -> _Advance | None:

@@ -195,7 +195,7 @@ def _level(design: FloatArray, frequencies: FloatArray, duration: float) -> Floa
     """
     weights = np.asarray(design.mean(axis=0))
     turns = np.sort(frequencies) * duration
-    apart = turns[np.diff(turns, prepend=0.0) >= 1.0]
-    told = frequencies * duration >= apart.min(initial=np.inf)
-    weights[: 2 * len(frequencies)][np.repeat(told, 2)] = 0.0
+    separate = turns[np.diff(turns, prepend=0.0) >= 1.0]
+    is_resolved = frequencies * duration >= separate.min(initial=np.inf)
+    weights[: 2 * len(frequencies)][np.repeat(is_resolved, 2)] = 0.0
     return weights

@@ -80,6 +80,6 @@ def mains_lines(run: RunPhasors) -> tuple[ComplexArray | None, ComplexArray | No
         return None, None
     typical: list[ComplexArray | None] = []
     for z in (run.displacement.phasors[:, place], run.oil_force(place)):
-        whole = z[np.isfinite(z).all(axis=1)]
-        typical.append(complex_median(whole) if len(whole) else None)
+        complete = z[np.isfinite(z).all(axis=1)]
+        typical.append(complex_median(complete) if len(complete) else None)
     return typical[0], typical[1]

@@ -119,7 +119,7 @@ def known_lines(
 ) -> LineSet:
     """Collect the lines of one run; coinciding ones are one, named in the order excitation, shaft, mains, others."""
     settings = settings or LineSettings()
-    top, apart = HIGHEST * rate, ONE_LINE / duration
+    top, spacing = HIGHEST * rate, ONE_LINE / duration
     if not excitation or not all(0.0 < f < top for f in excitation):
         raise BadInputError(
             f"excitation frequencies must lie between 0 and {top:g} Hz (0.45 of the sample rate), got {excitation}"
@@ -128,7 +128,7 @@ def known_lines(
     faint = _faint_lines(driven, speed, settings)
     strong = strong_lines(driven, speed, settings)
     for f in extra:
-        strong.append(next((line for line in faint if abs(line.frequency - f) < apart), Line("found", f, _EXACT)))
+        strong.append(next((line for line in faint if abs(line.frequency - f) < spacing), Line("found", f, _EXACT)))
     conditions: list[Condition] = []
     nuisance: list[Line] = []
     resolved: list[Line] = []
@@ -141,15 +141,15 @@ def known_lines(
             if line in strong or line.name in _NAMED:
                 conditions.append(_on_excitation(line, coincident[0]))
         elif line in strong:
-            if _is_apart(line, nuisance, 0.0 if line.name == "found" else apart):
+            if _is_apart(line, nuisance, 0.0 if line.name == "found" else spacing):
                 nuisance.append(line)
-        elif _is_apart(line, [level, *driven, *nuisance, *resolved], 2 * apart):
+        elif _is_apart(line, [level, *driven, *nuisance, *resolved], 2 * spacing):
             resolved.append(line)
     return LineSet(driven, tuple(nuisance), tuple(conditions), speed, tuple(resolved))
 
 
-def _is_apart(line: Line, others: list[Line], least: float) -> bool:
-    return all(abs(o.frequency - line.frequency) > max(o.wander, line.wander, least) for o in others)
+def _is_apart(line: Line, lines: list[Line], least: float) -> bool:
+    return all(abs(o.frequency - line.frequency) > max(o.wander, line.wander, least) for o in lines)
 
 
 def _shaft_lines(speed: float, first: int, last: int) -> list[Line]:

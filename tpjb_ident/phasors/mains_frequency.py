@@ -46,9 +46,9 @@ def _votes(runs: Sequence[Run], choice: float) -> int:
     lines: list[bool] = []
     for run in runs:
         point = run.point
-        others = np.outer(np.arange(1, 7), [point.excitation_hz, point.shaft_speed_hz])
-        others[3:, 0] = np.inf  # higher harmonics of a drive are faint
-        if len(lines) < _MAX_RUNS and (np.abs(others - choice) >= _APART).all():
+        multiples = np.outer(np.arange(1, 7), [point.excitation_hz, point.shaft_speed_hz])
+        multiples[3:, 0] = np.inf  # higher harmonics of a drive are faint
+        if len(lines) < _MAX_RUNS and (np.abs(multiples - choice) >= _APART).all():
             lines += _line_at(run, choice)
     return sum(lines)
 

@@ -132,11 +132,11 @@ class _RunFit:
         lines = self.result.lines
         duration, rate = self.records[0].duration, self.run.sample_rate
         near = [near_line(self.result, i, duration, rate) for i in range(len(lines.excitation))]
-        beside = tuple(frequency for frequency in near if frequency is not None)
-        if beside:
+        neighbours = tuple(frequency for frequency in near if frequency is not None)
+        if neighbours:
             exact = lines.driven
-            self._fit(self._lines(exact, lines.speed, (*lines.found, *beside)), self.follow)
-            self.conditions += (lines_beside(beside),)
+            self._fit(self._lines(exact, lines.speed, (*lines.found, *neighbours)), self.follow)
+            self.conditions += (lines_beside(neighbours),)
 
 
 __all__ = ["PhasorSettings", "RunPhasors", "run_phasors"]

@@ -43,15 +43,15 @@ def longest_stretch(result: RunPhasors, rate: float) -> RunPhasors:
     idle = (level < _DEVIATIONS) | (level < _QUIET * np.quantile(level, 0.9))
     if not cuts and not (idle.any() and np.median(level) > _DEVIATIONS):
         return result
-    keep = _kept(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
-    if not keep.any():
+    inside = _longest(windows.reshape(len(good), -1), np.array([0, *cuts, len(good)]), idle)
+    if not inside.any():
         return result
-    others = np.ones(len(result.start), dtype=bool)
-    others[good[keep]] = False
-    others &= np.isfinite(result.z).any(axis=(1, 2))
-    first, last = good[keep][[0, -1]]
+    outside = np.ones(len(result.start), dtype=bool)
+    outside[good[inside]] = False
+    outside &= np.isfinite(result.z).any(axis=(1, 2))
+    first, last = good[inside][[0, -1]]
     span = float(result.start[first]), float(result.start[last] + result.length)
-    return replace(result, z=np.where(others[:, None, None], np.nan, result.z), span=span)
+    return replace(result, z=np.where(outside[:, None, None], np.nan, result.z), span=span)
 
 
 def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
@@ -62,12 +62,12 @@ def _cuts(groups: list[ComplexArray], first: int, stop: int) -> list[int]:
     joined = np.concatenate(parts, axis=1)
     total = _scatter(joined)
     places = range(_LEAST, stop - first - _LEAST + 1)
-    left = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
-    best = places[int(np.argmin(left))]
+    remainders = [_scatter(joined[:k]) + _scatter(joined[k:]) for k in places]
+    best = places[int(np.argmin(remainders))]
     levels = [(part[:best].mean(axis=0), part[best:].mean(axis=0)) for part in parts]
     largest = [max(np.linalg.norm(before), np.linalg.norm(after)) for before, after in levels]
     changes = [np.linalg.norm(after - before) for before, after in levels]
-    if min(left) > _LEFT * total or any(change < _CHANGE * size for change, size in zip(changes, largest)):
+    if min(remainders) > _LEFT * total or any(change < _CHANGE * size for change, size in zip(changes, largest)):
         return []
     cut = first + best
     return [*_cuts(groups, first, cut), cut, *_cuts(groups, cut, stop)]
@@ -79,20 +79,20 @@ def _scatter(windows: ComplexArray) -> float:
     return float(squares.sum() - squares.max())
 
 
-def _kept(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
+def _longest(windows: ComplexArray, edges: IntArray, idle: BoolArray) -> BoolArray:
     """Windows (n,) of the longest driven stretch that do not lie across a change; `windows` (n, m)."""
-    keep = np.zeros(len(windows), dtype=bool)
+    inside = np.zeros(len(windows), dtype=bool)
     for first, stop in itertools.pairwise(edges):
         part = np.zeros(len(windows), dtype=bool)
         part[first:stop] = ~idle[first:stop]
-        if part.sum() > keep.sum():
-            keep = part
-    if not keep.any():
-        return keep
-    places = np.flatnonzero(keep)
+        if part.sum() > inside.sum():
+            inside = part
+    if not inside.any():
+        return inside
+    places = np.flatnonzero(inside)
     middle = complex_median(windows[places])
     distance: FloatArray = np.linalg.norm(windows - middle, axis=1)
     for end, inner in ((places[0], places[1:4]), (places[-1], places[-4:-1])):
         if distance[end] > max(_ACROSS * np.linalg.norm(middle), 3 * np.max(distance[inner], initial=0.0)):
-            keep[end] = False
-    return keep
+            inside[end] = False
+    return inside

@@ -104,11 +104,11 @@ def with_record(result: RunPhasors, records: tuple[WholeRecord, ...]) -> RunPhas
     z = np.full((len(records[0].z), channels), np.nan + 0j)
     for record in records:
         z[:, record.places] = record.z
-    residual = tuple(_beside(records, i, channels) for i in range(len(z)))
+    residual = tuple(_residual_bins(records, i, channels) for i in range(len(z)))
     return replace(result, record=z, residual=residual)
 
 
-def _beside(records: tuple[WholeRecord, ...], line: int, channels: int) -> ComplexArray:
+def _residual_bins(records: tuple[WholeRecord, ...], line: int, channels: int) -> ComplexArray:
     """Residual (n_bins, n_channels) in the bins around a line, those of other lines left out."""
     first = records[0]
     frequencies = first.lines.whole_frequencies * first.duration
@@ -116,9 +116,9 @@ def _beside(records: tuple[WholeRecord, ...], line: int, channels: int) -> Compl
     bins = round(frequencies[line]) + np.concatenate([-offsets[::-1], offsets])
     free = np.abs(bins[:, None] - np.delete(frequencies, line)).min(axis=1, initial=np.inf) > _CLEAR_OF
     bins = bins[free & (bins > 0) & (bins < len(first.spectrum))]
-    beside = np.full((len(bins), channels), np.nan + 0j)
+    residual = np.full((len(bins), channels), np.nan + 0j)
     for record in records:
         at = np.round(bins * (record.duration / first.duration)).astype(int)
         within = at < len(record.spectrum)
-        beside[np.ix_(within, record.places)] = record.spectrum[at[within]]
-    return beside
+        residual[np.ix_(within, record.places)] = record.spectrum[at[within]]
+    return residual

@@ -107,10 +107,10 @@ def chance_of(chi_square: float, dof: int, noise_dof: Sequence[float]) -> float:
     if not len(finite) or not plain <= 0.5:
         return plain
     rng = np.random.default_rng(_DRAWN[1])
-    each = dof / len(noise_dof)
+    degrees = dof / len(noise_dof)
     total = np.zeros(_DRAWN[0])
     for nu in noise_dof:
-        share = rng.chisquare(each, _DRAWN[0])
+        share = rng.chisquare(degrees, _DRAWN[0])
         half = max(nu / 2, 1.0)
         total += share / (rng.chisquare(half, _DRAWN[0]) / half) if nu < _LARGE_DOF else share
     above = float((total >= chi_square).mean())
@@ -173,8 +173,8 @@ def _shared(gains: FloatArray, estimates: Sequence[DynamicStiffness], changes: F
     covariance = together.T @ together / len(changes)
     for n, total in enumerate(systematic):
         # what no source explains is the point's own: of its baseline, of mains on the cells
-        own = total - changes[:, n].T @ changes[:, n] / len(changes)
-        covariance = covariance + gains[n] @ own @ gains[n].T
+        separate = total - changes[:, n].T @ changes[:, n] / len(changes)
+        covariance = covariance + gains[n] @ separate @ gains[n].T
     return np.asarray(covariance)
 
 

@@ -161,8 +161,8 @@ class Identification(Presented):
                 place = f"{band.point.static_load / 1e3:g} kN, {band.kind}"
                 places.setdefault(str(condition), []).append(f"{place}: {condition.detail or 'found'}")
         for name, sentences in places.items():
-            others = len(sentences) - 1
-            more = f" (and at {others} more point{'s' if others > 1 else ''})" if others else ""
+            count = len(sentences) - 1
+            more = f" (and at {count} more point{'s' if count > 1 else ''})" if count else ""
             remarks.append(f"{name} at {sentences[0]}{more}")
         return tuple(remarks)
 

@@ -157,8 +157,8 @@ def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition
     for i, run in enumerate(data.runs):
         selected = (data.run_index == i) & complete
         n, hits = int(selected.sum()), int(bad[selected].sum())
-        others = (total - hits + 0.5) / (int(complete.sum()) - n + 1.0)
-        if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(others, 1.0)) < 1e-3:
+        chance = (total - hits + 0.5) / (int(complete.sum()) - n + 1.0)
+        if hits >= 3 and hits > 0.4 * n and bdtrc(hits - 1, n, min(chance, 1.0)) < 1e-3:
             angle = "" if run.direction is None else f" at {np.degrees(run.direction):.0f} deg"
             named.append(f"{run.run}{angle} ({hits} of {n})")
     if not named:
@@ -168,7 +168,7 @@ def directional_pattern(data: PointData, weights: FloatArray) -> tuple[Condition
 
 
 def disagreeing_runs(
-    data: PointData, h: ComplexArray, weights: FloatArray, known: float = 0.0
+    data: PointData, h: ComplexArray, weights: FloatArray, scatter: float = 0.0
 ) -> tuple[Condition, ...]:
     """Runs whose mean forces H does not explain: noise averages out of means, other faults do not.
 
@@ -192,7 +192,7 @@ def disagreeing_runs(
         return ()
     # two runs fix H: what is left over is shared by all of them
     share = float(np.sqrt(np.mean(np.square(shares)) * len(shares) / (len(shares) - 2)))
-    if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * known / float(np.mean(sizes))):
+    if share <= np.hypot(_MAX_DISAGREEMENT, _KNOWN_SCATTERS * scatter / float(np.mean(sizes))):
         return ()
     text = f"the runs' mean forces are {100 * share:.0f} % away from one H (limit {100 * _MAX_DISAGREEMENT:.0f} %)"
     return (Condition("runs-disagree", text),)

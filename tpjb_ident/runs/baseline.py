@@ -45,7 +45,7 @@ def dry_test(campaign: Campaign, settings: PhasorSettings, method: str) -> DryTe
     if not runs:
         return DryTest()
     for run in runs:
-        errors = [f.problem for f in observe(run).report.found if f.problem.severity == "error"]
+        errors = [f.problem for f in observe(run).report.findings if f.problem.severity == "error"]
         if errors:  # clipped or dead: there is no dry test without its channels
             raise RigDataError(errors)
     points = gather([run_phasors(run, campaign.housing_mass, settings) for run in runs])

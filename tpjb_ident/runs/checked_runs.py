@@ -21,7 +21,7 @@ _CONTRADICTED, _DOUBTFUL, _RUN_GAIN = "records-contradicted", "records-doubtful"
 
 def check_finished(campaign: Campaign, finished: FinishedRuns) -> tuple[FinishedRuns, Verdicts]:
     """Judge all finished runs beside each other; those with an error of their own are left out."""
-    observed = [observation for digest in finished.digests for observation in digest.seen]
+    observed = [observation for digest in finished.digests for observation in digest.observations]
     if not observed:  # runs that are no files
         return finished, Verdicts()
     result = campaign_verdicts(campaign, observed)
@@ -49,8 +49,8 @@ def check_conditions(result: Verdicts, runs: Iterable[str]) -> tuple[Condition, 
     """What the checks say of one point."""
     members = list(runs)
     groups = ((_CONTRADICTED, result.shared), (_DOUBTFUL, result.doubtful), (_RUN_GAIN, result.run_gains))
-    told = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
-    return tuple(Condition(name, _sentence(problems)) for name, problems in told if problems)
+    by_name = ((name, [p for run in members for p in by_run.get(run, ())]) for name, by_run in groups)
+    return tuple(Condition(name, _sentence(problems)) for name, problems in by_name if problems)
 
 
 def _sentence(problems: list[Problem]) -> str:

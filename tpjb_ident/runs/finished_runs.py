@@ -27,7 +27,7 @@ class RunDigest:
     temperatures: dict[int, float]
     harmonics: tuple[FilmLines | None, ...] = ()
     sample_rate: float = 0.0
-    seen: tuple[Observation, ...] = field(default=(), repr=False)
+    observations: tuple[Observation, ...] = field(default=(), repr=False)
 
     @property
     def run(self) -> str:
@@ -44,12 +44,12 @@ def digest(
     phasors: RunPhasors,
     temperatures: dict[int, float],
     sample_rate: float = 0.0,
-    seen: tuple[Observation, ...] = (),
+    observations: tuple[Observation, ...] = (),
 ) -> RunDigest:
     """Sum up the phasors of all lines of a run that was recorded at `sample_rate` [Hz]."""
     lines = len(phasors.lines.excitation)
     excitation = replace(phasors, z=phasors.z[:, :lines].copy(), residual=phasors.residual[:lines])
-    return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, seen)
+    return RunDigest(excitation, *mains_lines(phasors), temperatures, film_lines(phasors), sample_rate, observations)
 
 
 @dataclass(frozen=True)

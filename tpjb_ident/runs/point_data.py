@@ -32,8 +32,8 @@ class PointData:
     @property
     def omega(self) -> float:
         """Excitation frequency as found in the runs, else as set [rad/s]."""
-        found = float(np.median([run.lines.driven[i] for run, i in zip(self.runs, self.lines)]))
-        return self.point.excitation if abs(found - self.point.excitation_hz) < 1e-6 else 2 * np.pi * found
+        frequency = float(np.median([run.lines.driven[i] for run, i in zip(self.runs, self.lines)]))
+        return self.point.excitation if abs(frequency - self.point.excitation_hz) < 1e-6 else 2 * np.pi * frequency
 
     @property
     def whole(self) -> BoolArray:
@@ -84,9 +84,9 @@ def campaign_points(finished: FinishedRuns) -> list[PointData]:
 def group(runs: list[tuple[OperatingPoint, tuple[float, ...]]]) -> list[tuple[OperatingPoint, list[tuple[int, int]]]]:
     """Operating points in order, each with the places of its runs and which line of the run is meant."""
     groups: dict[tuple[object, ...], tuple[OperatingPoint, list[tuple[int, int]]]] = {}
-    for k, (stated, frequencies) in enumerate(runs):
+    for k, (set_points, frequencies) in enumerate(runs):
         for i, frequency in enumerate(frequencies):
-            point = point_of(stated, frequency)
+            point = point_of(set_points, frequency)
             groups.setdefault(point.key, (point, []))[1].append((k, i))
     return [groups[key] for key in sorted(groups)]
 

@@ -55,8 +55,8 @@ def all_runs(
             result = store.load(run, mark)
         finished[index] = result or one_run(run, mass, settings)
         progress(run.id, done, len(runs))
-    found = FinishedRuns(tuple(finished[index] for index in sorted(finished)))
-    return found.without(_dead_accelerometers(found.digests))
+    gathered = FinishedRuns(tuple(finished[index] for index in sorted(finished)))
+    return gathered.without(_dead_accelerometers(gathered.digests))
 
 
 def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
@@ -66,12 +66,12 @@ def _dead_accelerometers(digests: Sequence[RunDigest]) -> dict[str, Problem]:
     for run in digests:
         for condition in run.phasors.conditions:
             if condition == DEAD_ACCELEROMETER:
-                dead[run.run] = Problem("error", run.seen[0].run.file, "", condition.detail, cure, run.run)
+                dead[run.run] = Problem("error", run.observations[0].run.file, "", condition.detail, cure, run.run)
     return dead if 2 * len(dead) < len(digests) else {}
 
 
 def process_run(
-    run: Run, housing_mass: float, settings: PhasorSettings, known: str | None
+    run: Run, housing_mass: float, settings: PhasorSettings, stored: str | None
 ) -> tuple[str, RunDigest | ExcludedRun | None]:
     """Fingerprint of a run, and its result unless the fingerprint is the one already `known`.
 
@@ -79,11 +79,11 @@ def process_run(
     is kept anywhere (`known` is None) it is not asked for.
     """
     try:
-        if known is None:
+        if stored is None:
             return "", one_run(run, housing_mass, settings)
         with run.opened():  # once for both
             mark = fingerprint(run, housing_mass, settings)
-            if mark and mark == known:
+            if mark and mark == stored:
                 return mark, None
             before = _state(run)
             result = one_run(run, housing_mass, settings)
@@ -119,28 +119,28 @@ def one_run(run: Run, housing_mass: float, settings: PhasorSettings) -> RunDiges
             phasors = run_phasors(cached, housing_mass, settings)
         except RecordTooShortError as error:
             raise RecordTooShortError(f"run {run.id}: {error}", error.needed) from error
-        seen = _seen(run, cached, phasors)
-        phasors, dead = _without_dead(phasors, seen[0])
+        observations = _observed(run, cached, phasors)
+        phasors, dead = _without_dead(phasors, observations[0])
         conditions = merged(phasors.conditions, dead, _repaired(run))
         result = replace(phasors, conditions=conditions, shaft_phase=shaft_phases(cached, phasors))
-        return digest(result, mean_temperatures(cached), run.sample_rate, seen)
+        return digest(result, mean_temperatures(cached), run.sample_rate, observations)
 
 
-def _seen(run: Run, kept: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
+def _observed(run: Run, cached: Run, phasors: RunPhasors) -> tuple[Observation, ...]:
     """What the checks make of the run's beginning, at every excitation frequency that was found in it.
 
     The observations are of the run itself, so that what the beginning holds in memory may go.
     """
-    beginning, driven = beginning_of(kept), phasors.lines.driven
-    seen = []
+    beginning, driven = beginning_of(cached), phasors.lines.driven
+    observations = []
     for line, frequency in enumerate(driven):
         alone = len(driven) == 1
         point = replace(run.point, excitation=2 * np.pi * frequency) if alone else point_of(run.point, frequency)
         observed = observe(replace(beginning, point=point), phasors, line)
-        own = run if alone else replace(run, point=point)
-        report = Reporter(own, observed.report.found, observed.report.doubts)
-        seen.append(replace(observed, run=own, report=report))
-    return tuple(seen)
+        line_run = run if alone else replace(run, point=point)
+        report = Reporter(line_run, observed.report.findings, observed.report.doubts)
+        observations.append(replace(observed, run=line_run, report=report))
+    return tuple(observations)
 
 
 def _repaired(run: Run) -> tuple[Condition, ...]:
@@ -150,13 +150,13 @@ def _repaired(run: Run) -> tuple[Condition, ...]:
     return (Condition("record-damaged", "; ".join(repairs)),) if repairs else ()
 
 
-def _without_dead(phasors: RunPhasors, seen: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
+def _without_dead(phasors: RunPhasors, observation: Observation) -> tuple[RunPhasors, tuple[Condition, ...]]:
     """The run without spare channels that the checks call dead; refused with a dead probe or cell.
 
     What is said of a dead accelerometer: the run may do without.
     """
-    dead = {finding.key: finding.problem for finding in seen.report.found if finding.key.startswith("dead ")}
-    grave, said, spare = [], [], []
+    dead = {finding.key: finding.problem for finding in observation.report.findings if finding.key.startswith("dead ")}
+    grave, conditions, spare = [], [], []
     for k, channel in enumerate(phasors.channels):
         problem = dead.get(f"dead {channel.name}")
         if problem is None:
@@ -164,11 +164,11 @@ def _without_dead(phasors: RunPhasors, seen: Observation) -> tuple[RunPhasors, t
         if problem.severity != "error":
             spare.append(k)
         elif channel.quantity == "acceleration":
-            said.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
+            conditions.append(Condition(DEAD_ACCELEROMETER, f"{problem.place} of {phasors.run} {problem.what}"))
         else:
             grave.append(problem)
     if grave:
         raise RigDataError(grave)
     z, mean = phasors.z.copy(), phasors.mean.copy()
     z[:, :, spare], mean[:, spare] = np.nan, np.nan
-    return replace(phasors, z=z, mean=mean), tuple(said)
+    return replace(phasors, z=z, mean=mean), tuple(conditions)

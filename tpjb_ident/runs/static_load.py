@@ -104,16 +104,16 @@ def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[L
     The ratio is the mean over the runs without outliers. Cells that show no static force have none: it is zero then.
     """
     ratios = [load_ratio(data, zero) for data in points]
-    known = np.concatenate(ratios)
-    known = known[np.isfinite(known)]
-    middle = complex(np.median(known.real), np.median(known.imag)) if len(known) else complex(1.0)
+    measured = np.concatenate(ratios)
+    measured = measured[np.isfinite(measured)]
+    middle = complex(np.median(measured.real), np.median(measured.imag)) if len(measured) else complex(1.0)
     none = [LoadMiss(np.zeros(len(r)), np.zeros(len(r))) for r in ratios]
-    if without_static_part(known):
+    if without_static_part(measured):
         return none, 0j
-    if not len(known) or not 0.5 < abs(middle.real) < 2.0:
+    if not len(measured) or not 0.5 < abs(middle.real) < 2.0:
         return none, middle  # nothing to correct by such cells, but the ratio itself must be told
-    distance = np.abs(known - middle)
-    common = complex(known[distance <= 4 * np.median(distance) + 1e-12].mean())
+    distance = np.abs(measured - middle)
+    common = complex(measured[distance <= 4 * np.median(distance) + 1e-12].mean())
     relative = [np.nan_to_num(ratio / common - 1.0) for ratio in ratios]
     return [LoadMiss(r.real, r.imag) for r in relative], common
 
@@ -187,16 +187,16 @@ class StaticLoads:
 def static_loads(campaign: Campaign, points: Sequence[LoadCase]) -> StaticLoads:
     """Zero of the cells, and the misses of all runs of a campaign's points."""
     cells = [channel for channel in campaign.channels.values() if channel.quantity == "force"]
-    stated = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
+    zero_uncertainty = float(max((getattr(cell, "zero_uncertainty", 0.0) for cell in cells), default=0.0))
     means, set_points = [], []
     for data in points:
         means += list(data.mean_loads @ [1.0, 1j])
         set_points += [_set_point(data)] * len(data.mean_loads)
-    zero = cell_zero(np.array(means, complex), np.array(set_points, complex), stated)
+    zero = cell_zero(np.array(means, complex), np.array(set_points, complex), zero_uncertainty)
     return StaticLoads(*load_misses(points, zero.force), zero)
 
 
-def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0) -> CellZero:
+def cell_zero(means: ComplexArray, set_points: ComplexArray, uncertainty: float = 0.0) -> CellZero:
     """Zero of the cells from all runs; `means` (n,), `set_points` (n,) [N]."""
     good = np.isfinite(means) & (np.abs(set_points) > 0)
     y, x = means[good], set_points[good]
@@ -214,6 +214,6 @@ def cell_zero(means: ComplexArray, set_points: ComplexArray, stated: float = 0.0
     spread = float(np.sum(weight * residual**2) / max(float(weight.sum()) - 2.0, 1.0))
     covariance = np.linalg.inv((design * weight[:, None]).conj().T @ design).real * spread
     zero, error = complex(coefficients[1]), float(np.sqrt(covariance[1, 1]))
-    there = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
-    allowed = stated == 0.0 or abs(zero) < 3 * stated + 3 * error
-    return CellZero(zero, error) if there and allowed else CellZero()
+    is_clear = abs(zero) > _CLEAR * error and abs(zero) > _NOTABLE * size.min()
+    allowed = uncertainty == 0.0 or abs(zero) < 3 * uncertainty + 3 * error
+    return CellZero(zero, error) if is_clear and allowed else CellZero()

@@ -11,7 +11,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, beyond
+from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exceeding
 
 _MILLISECOND = 1e-3
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
@@ -46,9 +46,9 @@ class Delay(Factor):
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
-            said = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
-            return tuple(condition for condition in said if condition == OUT_OF_STEP and late.any())
-        names = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
+            contradictions = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
+            return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and late.any())
+        names = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
         if not names:
             return ()
         return (Condition(OUT_OF_STEP, f"{'; '.join(self.words(fitted))}"),)

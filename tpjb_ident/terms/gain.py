@@ -9,7 +9,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig, Sensor
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Difference of gains beyond any calibration: an axis, a sign or a cable is wrong.
 _NO_GAIN = 0.3
@@ -56,14 +56,14 @@ class Gain(Factor):
     def _differing(self, fitted: Fitted) -> dict[str, list[float]]:
         """Gains by quantity, of those whose channels differ beyond what is stated."""
         quantities = [self.rig.sensors[j].quantity for j, _ in self._places]
-        differing = {quantities[k] for k in beyond(fitted, self.parameters)}
+        differing = {quantities[k] for k in exceeding(fitted, self.parameters)}
         return {name: [float(v) for v, q in zip(fitted.value, quantities) if q == name] for name in differing}
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Sensors that differ from the others beyond what is stated."""
-        outliers = [self.parameters[k].name for k in beyond(fitted, self.parameters)]
+        outliers = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
         if not outliers:
             return self.rig.contradicted.get(self.name, ())
         text = f"{'; '.join(self.words(fitted))}: beyond the uncertainty stated of {', '.join(outliers)}"
-        apart = max(np.ptp(values) for values in self._differing(fitted).values())
-        return (Condition("records-contradicted" if apart > _NO_GAIN else "probe-gains-differ", text),)
+        difference = max(np.ptp(values) for values in self._differing(fitted).values())
+        return (Condition("records-contradicted" if difference > _NO_GAIN else "probe-gains-differ", text),)

@@ -104,9 +104,9 @@ class Housing(Term):
                 columns[:, m:, 0] = moved
                 return columns
             columns[:, m, :2], columns[:, m + 1, 2:4] = moved, moved
-            given = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
-            given = -square[:, None] * _NANOMETRE * given
-            columns[:, m, 4], columns[:, m + 1, 5] = given[:, 0], given[:, 1]
+            force = np.einsum("nij,nj->ni", state.at_run(blocks), state.u[:, :2])
+            force = -square[:, None] * _NANOMETRE * force
+            columns[:, m, 4], columns[:, m + 1, 5] = force[:, 0], force[:, 1]
             columns[:, m:, 6] = -1j * moved
             return columns
         force = state.cell_force(self.rig, blocks)
@@ -177,8 +177,8 @@ class Housing(Term):
         A spring's loss is positive, late cells lower it. Accelerometers with which nothing else is wrong may have led
         by a corner of their own.
         """
-        stated = any(sensor.delay_uncertainty for sensor in sensors)
-        if stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+        is_stated = any(sensor.delay_uncertainty for sensor in sensors)
+        if is_stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
         if not lag < -2 * error:
@@ -247,5 +247,5 @@ def _inertia_share(rig: Rig, blocks: Blocks) -> float:
         return 0.0
     inertia = rig.mass * np.linalg.norm(blocks.z[:, rig.of("acceleration")], axis=1)
     force = np.linalg.norm(blocks.z[:, rig.of("force")], axis=1)
-    told = force > 0
-    return float(np.median(inertia[told] / force[told])) if told.any() else 0.0
+    pushed = force > 0
+    return float(np.median(inertia[pushed] / force[pushed])) if pushed.any() else 0.0

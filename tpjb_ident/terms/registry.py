@@ -45,14 +45,14 @@ TERMS: tuple[type[Term], ...] = (
 )
 
 
-def campaign_terms(rig: Rig, blocks: Blocks, correct: bool, made: Sequence[Term]) -> list[Term]:
+def campaign_terms(rig: Rig, blocks: Blocks, correct: bool, prepared: Sequence[Term]) -> list[Term]:
     """All terms of a campaign, those that are `made` of more than rig and blocks as they are.
 
     Without corrections a load's direction is not asked for.
     """
-    given = {type(term): term for term in made}
+    by_type = {type(term): term for term in prepared}
     used = [term for term in TERMS if correct or term is not LoadTurn]
-    return [given.get(term) or term(rig, blocks) for term in used]
+    return [by_type.get(term) or term(rig, blocks) for term in used]
 
 
 def learnt_rig(rig: Rig, solution: Solution) -> Rig:

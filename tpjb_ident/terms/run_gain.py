@@ -39,7 +39,7 @@ class RunGain(Factor):
             exponent[:, j, q] = blocks.run == r
         return exponent
 
-    def scatter(self, fitted: Fitted, own: FloatArray, usual: tuple[float, float]) -> tuple[float, float]:
+    def scatter(self, fitted: Fitted, by_load: FloatArray, usual: tuple[float, float]) -> tuple[float, float]:
         """Standard deviation of the runs' gains by what the records tell of them, and its degrees of freedom.
 
         `own` (number of runs,): deviation that a run has for a reason of its own; `usual`: that of a good rig, and the
@@ -47,11 +47,13 @@ class RunGain(Factor):
         """
         prior = np.array([p.deviation for p in self.parameters])
         share = np.clip(1 - (fitted.deviation / prior) ** 2, 0.0, 1.0)
-        apart = np.array([own[r] for r, _ in self._places])
+        expected = np.array([by_load[r] for r, _ in self._places])
         freedom = float(share.sum()) / len(self.rig.of("force"))  # a warmer film moves all cells of a run alike
         size, counted = usual
-        known = counted / (counted + freedom) * size**2
+        usual_variance = counted / (counted + freedom) * size**2
         if freedom < _LEAST:
             return size, np.inf
-        shown = max(float(np.sum(fitted.value**2 - share * apart**2)) / float(share.sum()), 0.0)
-        return float(np.sqrt(shown + known)), freedom * ((shown + known) / max(shown, 1e-3 * known)) ** 2
+        shown = max(float(np.sum(fitted.value**2 - share * expected**2)) / float(share.sum()), 0.0)
+        return float(np.sqrt(shown + usual_variance)), freedom * (
+            (shown + usual_variance) / max(shown, 1e-3 * usual_variance)
+        ) ** 2

@@ -45,9 +45,9 @@ class Shaft(Additive):
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
         """The shaft's unit phasor, in the sensor's own row."""
         columns = self.no_columns(blocks)
-        own = np.arange(len(self.rig))
+        sensors = np.arange(len(self.rig))
         vector = np.nan_to_num(blocks.shaft)[:, None] * self._size[blocks.point] * blocks.present
-        columns[:, own, 2 * own], columns[:, own, 2 * own + 1] = vector, 1j * vector
+        columns[:, sensors, 2 * sensors], columns[:, sensors, 2 * sensors + 1] = vector, 1j * vector
         return columns
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rigdata.arrays import ComplexArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.term import Factor, Fitted, Parameter, beyond
+from tpjb_ident.estimate.term import Factor, Fitted, Parameter, exceeding
 
 #: Parts in a thousand per kelvin, the unit of a coefficient in the solve.
 _UNIT = 1e-3
@@ -22,10 +22,10 @@ class Temperature(Factor):
 
     def __init__(self, rig: Rig, blocks: Blocks) -> None:
         super().__init__(rig, blocks)
-        known = np.isfinite(blocks.temperature)
-        self._reference = float(blocks.temperature[known].mean()) if known.any() else 0.0
+        measured = np.isfinite(blocks.temperature)
+        self._reference = float(blocks.temperature[measured].mean()) if measured.any() else 0.0
         uncertain = [j for j, sensor in enumerate(rig.sensors) if sensor.temperature_coefficient_uncertainty]
-        self._rows = uncertain if known.any() else []
+        self._rows = uncertain if measured.any() else []
         self.parameters = tuple(
             Parameter(rig.sensors[j].name, "1e-3/K", rig.sensors[j].temperature_coefficient_uncertainty / _UNIT)
             for j in self._rows
@@ -38,6 +38,6 @@ class Temperature(Factor):
 
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Drifts beyond what is stated."""
-        if not beyond(fitted, self.parameters):
+        if not exceeding(fitted, self.parameters):
             return ()
         return (Condition("probes-drift", "; ".join(self.words(fitted))),)

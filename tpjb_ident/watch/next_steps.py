@@ -51,7 +51,7 @@ def judge_states(
     expected: Sequence[RunStatus], observations: Sequence[Observation]
 ) -> tuple[list[RunStatus], list[list[Finding]]]:
     """State of every run, and the findings that so many runs share that no repeat will cure them."""
-    seen = {observation.run.id: observation.report.found for observation in observations}
+    seen = {observation.run.id: observation.report.findings for observation in observations}
     grave = [f for f in itertools.chain.from_iterable(seen.values()) if f.problem.severity != "note"]
     groups = grouped(grave, [observation.run for observation in observations])
     common = [group for group, concerned in groups if concerned]

@@ -273,6 +273,6 @@ def _name_cut_records(observations: Sequence[Observation], lengths: Sequence[flo
         if 0 < length < _WHOLE * usual and np.isfinite(same_kind).sum() > 2:
             cure = "Copy it again from the logger, or repeat the run"
             what = f"{length:.3g} s long, the others of its kind {usual:.3g} s: cut off, or not written to its end"
-            observation.report.say("short record", "error", "record", what, cure)
-            found: list[Finding] = observation.report.found
+            observation.report.note("short record", "error", "record", what, cure)
+            found: list[Finding] = observation.report.findings
             found.insert(0, found.pop())
