@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.operating_point import OperatingPoint
 from tpjb_ident.check.observation import Observation
 from tpjb_ident.check.questions import far
 from tpjb_ident.check.wiring import angle_between, explanation, pointing, repairs
@@ -21,6 +22,8 @@ _NO_STATIC = (0.002, 0.02)
 _LOAD_OFF, _MANY = 0.04, 9.0
 #: Angle [deg] within which an excitation acts as stated, runs that must not, and share that one fault must explain.
 _ALONG, _SEVERAL, _NEARLY_ALL = 10.0, 3, 0.8
+#: Angle [deg] within which the shaft moves as stated, whatever the force does.
+_MOVED_ALONG = 3.0
 
 
 def check_static_loads(observations: Sequence[Observation]) -> bool:
@@ -96,16 +99,16 @@ def check_speed(observation: Observation) -> None:
 
 
 def check_excitation(runs: Sequence[Observation], mass: float) -> None:
-    """Excitation of dynamic runs: there at all, as strong as in the other runs, in the stated direction."""
+    """Excitation of dynamic runs: there at all, as strong as in the point's other runs, in the stated direction."""
     measured = [run for run in runs if np.isfinite(run.film_force(mass)).all()]
-    sizes: list[float] = []
-    for run in measured:
-        force = float(np.linalg.norm(run.film_force(mass))) if run.shows("force") else 0.0
-        sizes.append(force / max(run.run.point.static_load, 1e-9))
-    present = [size for size in sizes if size > 0]
-    least = 0.1 * float(np.median(present)) if len(present) > 3 else 0.0
+    shown = [float(np.linalg.norm(run.film_force(mass))) if run.shows("force") else 0.0 for run in measured]
+    alike: dict[OperatingPoint, list[float]] = {}
+    for run, size in zip(measured, shown):
+        alike.setdefault(run.run.point, []).extend([size] if size > 0 else [])
     directed: list[_Directed] = []
-    for run, size in zip(measured, sizes):
+    for run, size in zip(measured, shown):
+        present = alike[run.run.point]
+        least = 0.1 * float(np.median(present)) if len(present) > 3 else 0.0
         if size <= 0 or size < least:
             hint = f"; the strongest other line is near {run.other_line:.3g} Hz" if np.isfinite(run.other_line) else ""
             run.report.ask("no excitation", hint=hint, stated=run.run.point.excitation_hz)
@@ -130,7 +133,9 @@ class _Directed(NamedTuple):
 
 
 def _check_directions(runs: Sequence[_Directed]) -> None:
-    off = [run for run in runs if abs(run.off(run.force)) > _ALONG]
+    # an actuator that controls displacement moves the shaft along its direction, whatever force that takes
+    moved = [abs(run.off(run.observation.line("displacement"))) <= _MOVED_ALONG for run in runs]
+    off = [run for run, is_moved in zip(runs, moved) if abs(run.off(run.force)) > _ALONG and not is_moved]
     hint = ""
     if len(off) >= _SEVERAL:
         cells = runs[0].observation.names("force")

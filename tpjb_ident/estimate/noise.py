@@ -9,11 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from rigdata.arrays import ComplexArray, FloatArray
+from rigdata.vector import directions
 from tpjb_ident.estimate.blocks import Blocks, Rig
 from tpjb_ident.estimate.equation import HOUSING_ROWS, State, film_force_rows
 
 #: |d ln h / d ln W| that is taken as plausible where the campaign has one load only.
 UNKNOWN_EXPONENT = 0.6
+#: Deviation of what a run's miss is: a load that was not met, or as likely cells that read otherwise in that run.
+GAIN_OR_LOAD = 0.5
 #: |d h / d alpha| over |h| of a load's direction, for the error of a run's own mean load.
 _UNKNOWN_TURN = 1.5
 #: Noise of the housing's equations over |a|: cells are no perfect springs, a floating stator has stingers.
@@ -77,6 +80,9 @@ def _force_effects(blocks: Blocks, state: State, scatter: FloatArray) -> Complex
     own = np.einsum("nij,nj->ni", h, d)
     unknown = UNKNOWN_EXPONENT * np.where(known, 0.0, np.abs(blocks.miss.real))
     effects.append(unknown[:, None] * own)
+    along = directions([point.static_load_direction for point in blocks.points])[blocks.point]
+    read = np.sum(along * own, axis=1)[:, None] * along - np.where(known[:, None], slope, 0.0)
+    effects.append((GAIN_OR_LOAD * np.abs(blocks.miss.real))[:, None] * read)
     effects += list(scatter_patterns(blocks, state, np.sqrt(scatter)))
     return np.stack(effects, axis=2)
 

@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 
 from rigdata.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from tpjb_ident.estimate.blocks import Rig, film_force, vector
-from tpjb_ident.estimate.noise import UNKNOWN_EXPONENT
+from tpjb_ident.estimate.noise import GAIN_OR_LOAD, UNKNOWN_EXPONENT
 from tpjb_ident.estimate.scatter import Scatter
 from tpjb_ident.estimate.shape import MODELS, Shape, nearest, over_frequency
 from tpjb_ident.estimate.solve import Solution, Solver
@@ -148,7 +148,7 @@ def _lines(task: _Task, start: ComplexArray, used: BoolArray) -> tuple[Solution,
 
 
 def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArray]:
-    """Scatter that a run's gain has by its missed load where nothing tells what that does, (number of runs,).
+    """Scatter that a run's gain has by its missed load, which may be one, or do what nothing tells, (number of runs,).
 
     And one for every run whose point has more than the two runs that h needs, else zero.
     """
@@ -158,7 +158,7 @@ def _own_scatter(data: BandBlocks, correct: bool) -> tuple[FloatArray, FloatArra
         families.setdefault(point.static_key[1:], set()).add(point.static_load)
     alone = np.array([not correct or len(families[point.static_key[1:]]) < 2 for point in blocks.points], dtype=float)
     by_load, spare = np.zeros((2, len(blocks.runs)))
-    by_load[blocks.run] = UNKNOWN_EXPONENT * np.abs(blocks.miss.real) * alone[blocks.point]
+    by_load[blocks.run] = np.hypot(GAIN_OR_LOAD, UNKNOWN_EXPONENT * alone[blocks.point]) * np.abs(blocks.miss.real)
     runs, first = np.unique(blocks.run, return_index=True)
     band = data.band[data.line[blocks.point[first]]]
     spare[runs] = np.bincount(band)[band] > 2

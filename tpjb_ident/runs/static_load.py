@@ -29,12 +29,16 @@ from tpjb_ident.conditions import Condition
 
 #: Misses beyond this share are no scatter: the set point or the cells are wrong.
 MAX_MISS = 0.05
-#: The same for its direction [rad].
+#: A run beyond this share is of another load.
+_LARGEST_MISS = 0.3
+#: Beyond this direction [rad] they are no scatter either.
 MAX_SIDEWAYS = 0.05
 #: Beyond these ratios of the cells to the set points in all runs, a sensitivity or a set point is wrong, not a gain.
 _CONTRADICTS = (0.7, 1.4)
 #: Turned by more than this in all runs [rad], cells are inverted or exchanged, or the load acts elsewhere.
 _CONTRADICTS_TURN = 0.5
+#: Spread of a half of the runs within which their loads agree: actuators are no better.
+_ONE_HALF = 1e-3
 #: Set points must differ by this share for a zero to be told from a gain.
 _MIN_RANGE = 0.15
 #: Standard errors beyond which an intercept is one,
@@ -54,7 +58,7 @@ class LoadMiss:
     def of(self, members: Sequence[int]) -> complex:
         """Missed load of some runs together, relative size + i turn [rad]; none where no scatter explains it."""
         size, turn = float(np.mean(self.size[members])), float(np.mean(self.sideways[members]))
-        return complex(size, turn) if abs(size) < MAX_MISS and abs(turn) < MAX_SIDEWAYS else 0j
+        return complex(size, turn) if abs(size) < _LARGEST_MISS and abs(turn) < MAX_SIDEWAYS else 0j
 
 
 @dataclass(frozen=True)
@@ -101,21 +105,30 @@ def _set_point(data: LoadCase) -> complex:
 def load_misses(points: Sequence[LoadCase], zero: complex = 0.0) -> tuple[list[LoadMiss], complex]:
     """Misses of all runs relative to the campaign, and the campaign's own ratio (cell gain, rotation).
 
-    The ratio is the mean over the runs without outliers. Cells that show no static force have none: it is zero then.
+    The ratio is the mean of the runs about the half that agrees best; of two such halves the one nearer to the set
+    points. Cells that show no static force have none: it is zero then.
     """
     ratios = [load_ratio(data, zero) for data in points]
     measured = np.concatenate(ratios)
     measured = measured[np.isfinite(measured)]
-    middle = complex(np.median(measured.real), np.median(measured.imag)) if len(measured) else complex(1.0)
+    common = _common_ratio(measured) if len(measured) else complex(1.0)
     none = [LoadMiss(np.zeros(len(r)), np.zeros(len(r))) for r in ratios]
     if without_static_part(measured):
         return none, 0j
-    if not len(measured) or not 0.5 < abs(middle.real) < 2.0:
-        return none, middle  # nothing to correct by such cells, but the ratio itself must be told
-    distance = np.abs(measured - middle)
-    common = complex(measured[distance <= 4 * np.median(distance) + 1e-12].mean())
+    if not len(measured) or not 0.5 < abs(common.real) < 2.0:
+        return none, common  # nothing to correct by such cells, but the ratio itself must be told
     relative = [np.nan_to_num(ratio / common - 1.0) for ratio in ratios]
     return [LoadMiss(r.real, r.imag) for r in relative], common
+
+
+def _common_ratio(ratios: ComplexArray) -> complex:
+    """Mean of the ratios (n,) about the one that half of them lie closest to."""
+    half = (len(ratios) - 1) // 2 if len(ratios) >= _MIN_RUNS else len(ratios) - 1
+    reach = np.sort(np.abs(ratios[:, None] - ratios), axis=1)[:, half]
+    # groups of runs that each agree among themselves are as good as one another
+    alike = np.flatnonzero(reach <= max(2 * float(reach.min()), _ONE_HALF))
+    place = alike[np.argmin(np.abs(ratios[alike] - 1))]
+    return complex(ratios[np.abs(ratios - ratios[place]) <= 4 * reach[place] + 1e-12].mean())
 
 
 def load_conditions(miss: LoadMiss, common: complex) -> tuple[Condition, ...]:
