@@ -81,6 +81,7 @@ class Rig:
     mount: str = "cells"
     mass: float = 30.0
     springs: tuple[float, float] = (4e8, 6e8)
+    foundation: tuple[float, float] = (0.0, np.inf)  #: mass under the cells [kg], and its springs [N/m]
     beside: tuple[float, float] = (0.0, 0.0)  #: springs beside the film, which dry runs of the plan tell [N/m]
     shaft_mass: float = 0.0
     shaft_compliance: float = 0.0  #: of a floating stator's shaft [m/N]
@@ -130,7 +131,10 @@ def response(rig: Rig, frequency: Array, load: float, scale: float = 1.0) -> dic
         d = np.linalg.inv(rig.mass * w2 * moved - h)
         acceleration = w2 * moved @ d
     else:
-        compliance = unit / (np.array(rig.springs)[:, None] * (1 + 1j * LOSS) - rig.mass * w2)
+        mass, springs = rig.foundation
+        below = 1 / (springs * (1 + 4j * LOSS) - mass * w2) if np.isfinite(springs) else 0.0
+        support = 1 / (1 / (np.array(rig.springs)[:, None] * (1 + 1j * LOSS)) + below)
+        compliance = unit / (support - rig.mass * w2)
         d = np.linalg.inv(h - w2 * rig.shaft_mass * (unit + compliance @ h))
         acceleration = -w2 * compliance @ h @ d
     return {"displacement": d, "acceleration": acceleration, "force": h @ d - rig.mass * acceleration}

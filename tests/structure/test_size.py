@@ -18,7 +18,7 @@ from tests.structure.sources import parsed, texts
 
 #: Thousand tokens and lines of each room.
 LIMITS = {
-    "measurement": (125.58, 15_205),  # 124.83, shafts that give under floating housings, slower devices over a band
+    "measurement": (126.2, 15_250),  # 124.83, shafts that give, slower devices over a band, foundations
     "model": (81.88, 10_942),
     "rigdata": (65.13, 8_739),
     "diagnosis": (38.71, 4_800),  # 38.48, look-alikes, tolerances that say an effect together

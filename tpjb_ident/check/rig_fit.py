@@ -102,7 +102,7 @@ def check_accelerometers(fit: RigFit) -> None:
     """Name the runs whose acceleration is not what springs, or the floating housing, make of it in the others."""
     rows = fit.rig.of("acceleration")
     housing = next((term for term in fit.solution.terms if isinstance(term, Housing)), None)
-    if len(rows) != 2 or housing is None:
+    if len(rows) != 2 or housing is None or housing.is_on_foundation(fit.solution.fitted[housing.name]):
         return
     moved = housing.acceleration(fit.blocks, fit.solution.fitted[housing.name])
     inverse = np.linalg.pinv(fit.blocks.along[:, rows])

@@ -41,11 +41,13 @@ def check_signal(
         report.ask("empty", 1.0, name, **words)
         return
     report.ask("missing", statistics.missing / statistics.samples, name, **words)
+    if channel.quantity == "command":  # rests where its actuator does
+        return
     if statistics.constant:
         alone = all(c.quantity != channel.quantity or c.name == name for c in alive)
         is_slow = alone and channel.quantity in {"temperature", "pressure"}
         # a channel of what does not move in this kind of run may well read one value throughout
-        still = channel.quantity in {"speed", "command"} or (channel.quantity == "acceleration" and not is_dynamic)
+        still = channel.quantity == "speed" or (channel.quantity == "acceleration" and not is_dynamic)
         if not noise_free and not still:
             report.ask("constant" if is_slow else "dead", 1.0, name, **words)
         return

@@ -42,6 +42,8 @@ _STIFFEST = 0.01
 _ALIKE = 1 / 6
 #: Share of the acceleration that the housing's equations leave where sensors are right, at most: rigs have 0.05.
 _UNEXPLAINED = 0.2
+#: The same of a support with another compliance at every frequency; logarithm by which frequencies differ.
+_LEFT, _ONE_LINE = 0.1, 0.01
 #: Inertia's share of the force below which wrong accelerometers do no harm worth refusing a point for.
 HARMLESS = 2e-3
 
@@ -55,6 +57,7 @@ class Housing(Term):
         super().__init__(rig, blocks)
         self._omega = float(np.median(blocks.omega)) if len(blocks) else 1.0
         self._inertia = _inertia_share(rig, blocks)
+        self._foundation = rig.mount == "cells" and _is_on_foundation(rig, blocks)
         usual, across, loss = _CELLS
         if len(rig.of("acceleration")) < 2:
             usual = 0.0  # the inertia stays in F, as is said of the point
@@ -84,6 +87,10 @@ class Housing(Term):
             state.floating = value[0] * np.eye(2, dtype=complex)
         else:
             state.floating, state.compliance = _kappa(value)
+
+    def is_on_foundation(self, fitted: Fitted) -> bool:
+        """Whether no one spring, but a support all the same carries the housing."""
+        return self._foundation and fitted.unexplained > _UNEXPLAINED
 
     def acceleration(self, blocks: Blocks, fitted: Fitted) -> ComplexArray:
         """What every block's cells, or probes where the housing floats, let the accelerometers show, (n, 2) [m/s^2]."""
@@ -120,6 +127,8 @@ class Housing(Term):
     def conditions(self, fitted: Fitted) -> tuple[Condition, ...]:
         """Accelerometers that cannot be those of a housing on springs, or that are out of step with the cells."""
         if self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
+            return ()
+        if self.is_on_foundation(fitted):
             return ()
         conditions = self._shown(fitted)
         if self.rig.out_of_step:  # the delay tells whether it stays that they lead
@@ -166,7 +175,7 @@ class Housing(Term):
 
     def springs(self, fitted: Fitted) -> tuple[float, float] | None:
         """Stiffness under the housing along X and Y [N/m]; None where no accelerometer shows it."""
-        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2:
+        if self.rig.mount != "cells" or len(self.rig.of("acceleration")) < 2 or self.is_on_foundation(fitted):
             return None
         x, y = (1 / (_NANOMETRE * max(float(c), _STIFFEST)) for c in fitted.value[:2])
         return x, y
@@ -181,7 +190,7 @@ class Housing(Term):
         if is_stated or self.rig.mount == "unknown" or len(self.rig.of("acceleration")) < 2:
             return None
         lag, error = float(fitted.value[-1]), float(fitted.deviation[-1])
-        if not lag < -2 * error:
+        if not lag < -2 * error or self.is_on_foundation(fitted):
             return None
         if self.rig.mount == "cells":
             compared, sound = "force", all(condition == OUT_OF_STEP for condition in self.conditions(fitted))
@@ -192,6 +201,39 @@ class Housing(Term):
             late = -lag / self._omega if s.quantity == compared else 0.0
             widened.append(replace(s, delay_uncertainty=late, out_of_step=sound and s.quantity == "acceleration"))
         return tuple(widened)
+
+
+def _is_on_foundation(rig: Rig, blocks: Blocks) -> bool:
+    """Whether one symmetric compliance at every frequency, another at each, makes the accelerations of the forces.
+
+    A foundation with a resonance does, wrong accelerometers do not; at the lowest frequency it is a spring still.
+    Single lines of a band, which `check` looks at, cannot tell: there it may be one.
+    """
+    if len(rig.of("acceleration")) < 2:
+        return False
+    force, acceleration = (vector(rig, blocks, quantity) for quantity in ("force", "acceleration"))
+    x, y = (-(blocks.omega**2)[:, None] * force).T
+    none = np.zeros_like(x)
+    design = np.stack([np.stack([x, none, y], axis=1), np.stack([none, y, x], axis=1)], axis=1)
+    lines = np.round(np.log(blocks.omega) / _ONE_LINE)
+    rows = rig.of("acceleration")
+    noise = np.sqrt(np.einsum("njj->n", blocks.noise[:, rows][:, :, rows]).real)
+    lines[~(np.linalg.norm(acceleration, axis=1) > 2 * _CLEAR * noise)] = np.nan
+    support, left, judged, count = np.full(3, np.nan + 0j), 0.0, 0.0, 0
+    for line in np.unique(lines[np.isfinite(lines)])[::-1]:
+        pushes, shown = design[lines == line].reshape(-1, 3), acceleration[lines == line].ravel()
+        fit, _, rank, _ = np.linalg.lstsq(np.nan_to_num(pushes), shown, rcond=1e-3)
+        if rank == 3 and len(pushes) > 3:
+            support, count = fit, count + 1
+            left += float(np.linalg.norm(shown - pushes @ fit)) ** 2 * len(pushes) / (len(pushes) - 3)
+            judged += float(np.linalg.norm(shown)) ** 2
+    if count < 2 or not judged > 0.5 * float(np.linalg.norm(np.nan_to_num(acceleration))) ** 2:
+        return not (blocks.windows > 1).any()
+    springs = support[[[0, 2], [2, 1]]]
+    is_spring = (
+        np.linalg.eigvalsh(springs.real)[0] > 0 and np.abs(springs.imag).max() < 2 * _LOSS * np.abs(springs).max()
+    )
+    return bool(is_spring and left < _LEFT**2 * judged)
 
 
 def _compliance(value: FloatArray) -> ComplexArray:

@@ -37,6 +37,7 @@ SOFT: Entries = {"springs": (3e7, 4e7), "mass": 60.0}
 STIFF: Entries = {"springs": (4e9, 4e9), "mass": 8.0}
 BAND: Entries = {"seconds": 6.0, "directions": (20.0, 110.0), "repeats": 2}
 MARCHED: Entries = {"speed": 97.0, "shaft_mass": 200.0, "mass": 120.0, "seconds": 3.0, "unbalance": 0.004}
+FOUNDATION: Entries = {"foundation": (2000.0, 1.5e8), "frequencies": (25.0, 40.0, 55.0)}
 OCVIRK = mr.ShortBearing()
 CLOCK_B = ('clock = "B"',)
 DRIFT = ('temperature_coefficient = "0.04 %/K"', 'temperature_reference = "40 degC"')
@@ -142,6 +143,7 @@ def good_rigs() -> list[Condition]:
         rig("floating, cells show the pull", **{**FLOATING, "static": True}),
         rig("floating, light, no accelerometers", without="A1", **{**FLOATING, "mass": 0.4}),
         rig("soft cells", **SOFT),
+        rig("foundation with a resonance of 44 Hz", **FOUNDATION),
         rig("accelerometers' inputs have a corner of 1 Hz", ("A1", {"fault": FAULTS["input"]})),
         rig("the same on soft cells", ("A1", {"fault": FAULTS["input"]}), **SOFT),
         rig("stiff cells, no accelerometers", without="A1", **STIFF),
@@ -218,6 +220,8 @@ def good_bands() -> list[Condition]:
         rig("random, cells at 320 Hz in columns of their own", ("L1", AT_320), **random),
         rig("multi-sine, cells and accelerometers at 320 Hz", ("L1 A1", AT_320), **tones),
         rig("random, 1 % bad readings in a probe", ("X1B", {"fault": FAULTS["few"]}), limits=WIDER, **random),
+        rig("random, foundation", **{**random, "foundation": (2000.0, 4e8)}),
+        rig("multi-sine that starts late", share=(0.4, 1.0), **tones),
         rig("sweep with quiet parts", share=(0.15, 0.8), **{**BAND, "excitation": "sweep"}),
         rig("multi-sine", **tones),
         rig("multi-sine, one command at rest", idle, **{**tones, "directions": (0.0, 90.0)}),
@@ -291,6 +295,8 @@ def bad_data() -> list[Condition]:
         bad("no accelerometers, soft cells", without="A1", **SOFT),
         bad("accelerometers inverted, floating", ("A1", inverted), **HEAVY),
         bad("accelerometers exchanged, soft cells", *two_axes(90, 0, "A1H A1V"), **SOFT),
+        bad("accelerometers inverted, foundation", ("A1", inverted), **FOUNDATION),
+        bad("accelerometers exchanged, foundation", *two_axes(90, 0, "A1H A1V"), **FOUNDATION),
         bad("accelerometers late by 2 ms, floating", ("A1", {"late": 2e-3}), **HEAVY),
         bad("cells late by 1 ms, soft, not stated", ("L1", {"late": 1e-3}), **SOFT),
         bad("probes late by 1 ms, floating, not stated", ("X1", {"late": 1e-3}), **HEAVY),
