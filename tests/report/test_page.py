@@ -137,23 +137,6 @@ def test_a_title_in_the_running_head_cannot_leave_its_string():
     assert "display: none }" not in style
 
 
-def test_the_second_legend_of_a_page_is_cut_off():
-    texts, panels = {}, []
-    for name in ("one", "two"):
-        figure, axes = new_picture("x", "y")
-        axes.plot([0, 1], [1, 0], label="model")
-        add_legend(axes)
-        panels.append(panel(name, name, figure, ""))
-        texts[name] = svg_text(figure, name)
-    html = render_page(
-        report_page.Page("t", "", "", lead=panels[0].name, sections=[Section("s", panels=panels)]), texts
-    )
-    assert html.count('<g visibility="hidden" id="two-legend_1"') == 1
-    assert 'visibility="hidden" id="one' not in html
-    heights = [float(h) for h in re.findall(r'viewBox="0 [\d.]+ [\d.]+ ([\d.]+)"', html)]
-    assert heights[0] - heights[1] > 10.0
-
-
 def test_what_was_tested_stands_before_the_verdict():
     html = render_page(
         report_page.Page("t", "", "The verdict.", facts={"Shaft": "22 Hz (1320 rpm)"}, flags="No flags."), {}

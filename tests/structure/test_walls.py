@@ -90,13 +90,8 @@ def test_what_is_allowed_is_not_a_breach(path, source):
     assert not breaches(path, imported_modules(source))
 
 
-#: Distributions that are imported by another name.
-IMPORTED_AS = {"pillow": "pil"}
-
-
 def declared_names(requirements):
-    names = {re.split(r"[<>=\[ ]", d)[0].lower() for d in requirements}
-    return {IMPORTED_AS.get(name, name) for name in names}
+    return {re.split(r"[<>=\[ ]", d)[0].lower() for d in requirements}
 
 
 def test_every_third_party_import_is_declared():

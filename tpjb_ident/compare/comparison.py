@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
-#: Rows of `predict_points` of every pivot model, by operating point.
-Predictions = dict[str, dict[OperatingPoint, dict[str, Any]]]
+#: Rows of `predict_points` of every pivot model; operating points are their index.
+Predictions = dict[str, "pd.DataFrame"]
 #: Pivot models that are compared, in the order of the tables.
 VARIANTS = ("rigid", "kirk", "kirk-secant", "measured")
 _DEFAULT_VARIANTS = ("rigid", "kirk", "measured")
@@ -221,8 +221,6 @@ def compare_campaign(
     >>> len(comparison.identification.points), list(comparison.predictions)
     (7, ['rigid'])
     """
-    import pandas as pd
-
     from tpjb_ident.identification.identify import identify
     from tpjb_ident.identification.settings import IdentifySettings
 
@@ -236,10 +234,10 @@ def compare_campaign(
     points = [p.point for p in identification.points]
     report("waiting for the model", 0, 1)
     ahead = None if model is None else model()
-    if ahead is None or not all(predicted.keys() >= set(points) for predicted in ahead[1].values()):
+    if ahead is None or not all(set(points) <= set(rows.index) for rows in ahead[1].values()):
         ahead = model_side(campaign, bearing, settings, points, report)
     static, predictions = ahead
-    frames = {name: pd.DataFrame([rows[p] for p in points]) for name, rows in predictions.items()}
+    frames = {name: rows.loc[points].reset_index(drop=True) for name, rows in predictions.items()}
     return Comparison(
         campaign, bearing, settings, identification, static.curves, static.clearance, static.locus, frames,
         _loci(static, predictions), _remarks(settings, static, bearing),
@@ -257,6 +255,8 @@ def model_side(
 
     Points are by default all that the manifest names.
     """
+    import pandas as pd
+
     from tpjb_ident.compare.static_tests import measure_static
 
     report = progress or _silent
@@ -270,7 +270,7 @@ def model_side(
         pivots = measured_laws(static.curves, len(bearing.pads), campaign.id) if name == "measured" else name
         model = ModelSettings(pivots, settings.thermal, settings.effects_with(name))
         rows = predict_points(bearing, wanted, model, _labelled(report, f"predicting with {name} pivots"))
-        predictions[name] = dict(zip(wanted, rows, strict=True))
+        predictions[name] = pd.DataFrame(rows, index=pd.Index(wanted, tupleize_cols=False))
     return static, predictions
 
 
@@ -340,7 +340,7 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     frames = []
     for name, rows in predictions.items():
         frame = static.locus.to_frame()
-        places = np.array([(rows[point]["x_m"], rows[point]["y_m"]) for point in _stations(static)])
+        places = rows.loc[_stations(static), ["x_m", "y_m"]].to_numpy(float)
         if static.clearance is None:
             places += (frame[["x_m", "y_m"]] - places).mean().to_numpy()
         frame.insert(0, "pivots", name)

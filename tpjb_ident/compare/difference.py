@@ -156,40 +156,39 @@ def _points(a: Side, b: Side, pairs: IntArray, shared: Sequence[str]) -> pd.Data
     omega_squared = (2 * np.pi) ** 2 * (left["excitation_Hz"] * right["excitation_Hz"]).to_numpy(float)
     common[:, 4:] /= omega_squared[:, None]
     for j, name in enumerate(COEFFICIENT_COLUMNS):
-        none = _NO_CHANGE * _mean_direct(left, name).to_numpy()
-        columns |= _judged(name, (left, right), common[:, j], none, 8 * len(pairs))
+        systematic = [frame.get(f"{name}_se_systematic", 0.0) ** 2 for frame in (left, right)]
+        none = _NO_CHANGE * _mean_direct(left, name)
+        columns |= _judged(name, (left, right), sum(systematic) - 2.0 * common[:, j], none, 8 * len(pairs))
     flags = [frame.get("quality", pd.Series("", frame.index)) for frame in (left, right)]
-    usable = [not errors_in(f"{before}; {after}") for before, after in zip(*flags, strict=True)]
+    doubtful = (flags[0] + "; " + flags[1]).map(errors_in).astype(bool)
     for name in columns:
         if name.endswith("_changed"):
-            columns[name] = np.where(usable, columns[name], "cannot tell")
+            columns[name] = np.where(doubtful, "cannot tell", columns[name])
     return pd.DataFrame(columns)
 
 
-def _variances(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray | float, FloatArray | float]:
-    """Random and systematic variance of a quantity, and degrees of freedom of the random one."""
-    if f"{name}_se_systematic" not in frame:  # its interval is all that is known
-        return ((frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float) / (2 * HALF)) ** 2, 0.0, np.inf
-    error, systematic = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_se_systematic"))
-    freedom: FloatArray | float = np.inf
-    if f"{name}_random95" in frame:
-        with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
-            quantile = np.nan_to_num(frame[f"{name}_random95"].to_numpy(float) / error, nan=HALF)
-        freedom = np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
-    return error**2, systematic**2, freedom
+def _random(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
+    """Random variance of a quantity and its degrees of freedom; of a table without them by the interval."""
+    if f"{name}_random95" not in frame:
+        half = 0.5 * (frame[f"{name}_hi"] - frame[f"{name}_lo"]).to_numpy(float)
+        return (half / HALF) ** 2, np.full(len(frame), np.inf)
+    error, half = (frame[f"{name}{ending}"].to_numpy(float) for ending in ("_se", "_random95"))
+    with np.errstate(invalid="ignore", divide="ignore"):  # a coefficient that is missing has neither
+        quantile = np.nan_to_num(half / error, nan=HALF)
+    return error**2, np.interp(-quantile, -stdtrit(_FREEDOM, 0.5 + 0.5 * _LEVEL), _FREEDOM)
 
 
 def _judged(
-    name: str, frames: Sequence[pd.DataFrame], common: FloatArray | float, none: FloatArray, number: int
+    name: str, frames: Sequence[pd.DataFrame], systematic: pd.Series | float, none: pd.Series, number: int
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 
-    `common` is the covariance of the two. The difference's degrees of freedom are Welch's and Satterthwaite's. Of
-    `number` differences that are looked at together one in twenty is beyond its own interval by chance; "yes" holds for
-    all of them at once (Bonferroni).
+    `systematic` is the variance of the difference that is not random; a table's interval without more holds all of it.
+    The degrees of freedom are Welch's and Satterthwaite's. Of `number` differences that are looked at together one in
+    twenty is beyond its own interval by chance; "yes" holds for all of them at once (Bonferroni).
     """
-    (random_a, systematic_a, freedom_a), (random_b, systematic_b, freedom_b) = (_variances(f, name) for f in frames)
-    variance = random_a + random_b + np.maximum(systematic_a + systematic_b - 2 * common, 0.0)
+    (random_a, freedom_a), (random_b, freedom_b) = (_random(frame, name) for frame in frames)
+    variance = random_a + random_b + np.maximum(systematic, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):  # without scatter there is nothing to count
         freedom = variance**2 / (random_a**2 / freedom_a + random_b**2 / freedom_b)
     freedom = np.clip(np.nan_to_num(freedom, nan=_FREEDOM[-1]), 1.0, _FREEDOM[-1])
@@ -200,8 +199,8 @@ def _judged(
         columns |= {f"{name}_{side}{end}": frame[name + end] for end in _ENDS}
     off = columns[f"{name}_b"] - columns[f"{name}_a"]
     columns |= {f"{name}_difference": off, f"{name}_difference_lo": off - half, f"{name}_difference_hi": off + half}
-    verdict = np.where(np.abs(off) + half <= none, "no", "cannot tell")
-    return columns | {changed_column(name): np.where(np.abs(off) > sure, "yes", verdict)}
+    verdict = np.where(off.abs() + half <= none, "no", "cannot tell")
+    return columns | {changed_column(name): np.where(off.abs() > sure, "yes", verdict)}
 
 
 def changed_column(name: str) -> str:
@@ -222,9 +221,9 @@ def _pivots(a: Side, b: Side) -> pd.DataFrame:
     if not pairs:
         return pd.DataFrame()
     left, right = (pd.concat(frames, ignore_index=True) for frames in zip(*pairs, strict=True))
-    systematic = f"{TANGENT}_se_systematic"
-    common = left[systematic] * right[systematic] if same else 0.0
-    judged = _judged(TANGENT, (left, right), common, _NO_CHANGE * left[TANGENT].to_numpy(), len(left))
+    before, after = left["systematic"], right["systematic"]
+    systematic = (after - before) ** 2 if same else before**2 + after**2
+    judged = _judged(TANGENT, (left, right), systematic, _NO_CHANGE * left[TANGENT], len(left))
     return pd.DataFrame({"pad": left["pad"], "force_N": left["force_N"], **judged})
 
 
@@ -235,11 +234,11 @@ def _at_common_loads(*curves: pd.DataFrame) -> list[pd.DataFrame]:
     force = np.linspace(low, high, _PIVOT_LOADS) if low < high else np.zeros(0)
     frames = []
     for curve in curves:
-        value, low_end, high_end = (np.interp(force, curve["force_N"], curve[TANGENT + end]) for end in _ENDS)
+        frame = pd.DataFrame({"force_N": force}).assign(pad=curve["pad"].iloc[0])
+        for name in (TANGENT + end for end in _ENDS):
+            frame[name] = np.interp(force, curve["force_N"], curve[name])
         scale = curve["relative_calibration"].iloc[0] if "relative_calibration" in curve else 0.0
-        columns = {"pad": curve["pad"].iloc[0], "force_N": force, TANGENT: value}
-        columns |= {f"{TANGENT}_lo": low_end, f"{TANGENT}_hi": high_end, f"{TANGENT}_se_systematic": scale * value}
-        frames.append(pd.DataFrame({**columns, f"{TANGENT}_se": (high_end - low_end) / (2 * HALF)}))
+        frames.append(frame.assign(systematic=scale * frame[TANGENT]))
     return frames
 
 
@@ -253,8 +252,8 @@ def _clearance(a: Side, b: Side) -> pd.DataFrame:
         frame = pads.merge(table)
         half = HALF * frame[f"{_CLEARANCE}_se"]
         ends = {f"{_CLEARANCE}_lo": frame[_CLEARANCE] - half, f"{_CLEARANCE}_hi": frame[_CLEARANCE] + half}
-        frames.append(frame.assign(**ends, **{f"{_CLEARANCE}_se_systematic": 0.0}))
-    judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE].to_numpy(), len(pads))
+        frames.append(frame.assign(**ends))
+    judged = _judged(_CLEARANCE, frames, 0.0, _NO_CHANGE * frames[0][_CLEARANCE], len(pads))
     return pd.DataFrame({"pad": pads["pad"], **judged})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +14,12 @@ from tpjb_ident.columns import amount, size, symbol
 from tpjb_ident.compare.comparison import predicted_loci
 from tpjb_ident.compare.predictions import printed_formula
 from tpjb_ident.compare.summary import agreements, number_inside, summary_sentences
-from tpjb_ident.report.drawing.picture import VARIANT_LABEL
+from tpjb_ident.report.drawing.picture import MODEL_LABELS
 from tpjb_ident.report.drawing.series import DIRECT, point_labels, points_table
 from tpjb_ident.report.laboratory_sections import (
     budget_table,
     clearance_cells,
+    coefficient_cells,
     evidence_sections,
     flags_line,
     set_up_section,
@@ -26,10 +27,10 @@ from tpjb_ident.report.laboratory_sections import (
     tested_facts,
     values_table,
 )
-from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
+from tpjb_ident.report.page import Page, Section, Table, grouped, table_of, write_page
 from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
 from tpjb_ident.rounding import fixed, percent, signed
-from tpjb_ident.schema import DAMPING, ENTRIES, KINDS, STIFFNESS, coefficient_column
+from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.measure import ClearancePolygon
@@ -104,7 +105,7 @@ def deviations_table(table: pd.DataFrame) -> Table:
     rows = []
     for name, found in agreements(table).iterrows():
         cells = [f"{percent(median)} ({percent(found['worst', k])})" for k, median in found["median"].items()]
-        rows.append([VARIANT_LABEL.get(str(name), str(name)), *cells, number_inside(found)])
+        rows.append([MODEL_LABELS.get(str(name), str(name)), *cells, number_inside(found)])
     return Table(
         "Predicted / measured - 1: median (largest); inside: predictions within the measured 95 % interval",
         ["", *DIRECT, "inside"],
@@ -170,33 +171,28 @@ _PIVOT_LOADS = (2000.0, 4000.0)
 
 def measured_table(result: Identification) -> Table:
     """K and C of every point with intervals."""
-    rows = []
-    for place, p in zip(point_labels(points_table(result.points)), result.points, strict=True):
-        share = f"{100 * p.outlier_fraction:.0f} %"
-        flags = ", ".join(str(c) for c in p.quality) or "ok"
-        rows.append([place, *p.stiffness.cells(), str(p.n_windows), share, flags])
-    named = [f"{kind.symbol}{e}, {kind.display_unit}" for kind in (STIFFNESS, DAMPING) for e in ENTRIES]
-    columns = ["point", *named, "windows", "outliers", "flags"]
-    return Table(f"Measured ({result.method})", columns, rows)
+    frame = result.to_frame()
+    cells: dict[str, Iterable[str]] = {
+        "point": point_labels(frame),
+        **coefficient_cells(frame, (STIFFNESS, DAMPING)),
+        "windows": frame["n_windows"].map(str),
+        "outliers": (100.0 * frame["outlier_fraction"]).map("{:.0f} %".format),
+        "flags": frame["quality"].str.replace("; ", ", "),
+    }
+    return table_of(f"Measured ({result.method})", cells)
 
 
 def _predicted_table(frame: pd.DataFrame) -> Table:
     """Direct coefficients predicted with every pivot model, and how far off each is."""
-    rows = []
     ordered = frame.sort_values(["static_load_N", "excitation_Hz"], kind="stable")
-    for label, (_, row) in zip(point_labels(ordered), ordered.iterrows(), strict=True):
-        cells = []
-        for name in DIRECT:
-            column = coefficient_column(name)
-            cells.append(fixed(row[f"{column}_predicted"] / KINDS[name[0]].display_scale))
-            cells.append(percent(row[f"{column}_ratio"] - 1.0))
-        remark = "beyond the measured pivot load" if row["pivot_extrapolated"] else row["status"]
-        rows.append([label, row["pivots"], *cells, remark or ""])
-    columns = ["point", "pivots"]
+    cells: dict[str, Iterable[str]] = {"point": point_labels(ordered), "pivots": ordered["pivots"]}
     for name in DIRECT:
-        columns += [f"{name}, {KINDS[name[0]].display_unit}", "off by"]
-    columns.append("remark")
-    return Table("Predicted", columns, rows)
+        kind, column = KINDS[name[0]], coefficient_column(name)
+        cells[f"{name}, {kind.display_unit}"] = (ordered[f"{column}_predicted"] / kind.display_scale).map(fixed)
+        cells[f"{name} off by"] = (ordered[f"{column}_ratio"] - 1.0).map(percent)
+    extrapolated = ordered["pivot_extrapolated"].astype(bool)
+    cells["remark"] = ordered["status"].mask(extrapolated, "beyond the measured pivot load")
+    return table_of("Predicted", cells)
 
 
 def _flag_table(flagged: Sequence[tuple[str, Condition]]) -> Table:

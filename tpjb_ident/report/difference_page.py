@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +11,23 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from tpjb_ident.columns import per, place_of, size, spinning, symbol
-from tpjb_ident.compare.difference import Difference, difference_sentences, shown
+from tpjb_ident.compare.difference import Difference, changed_column, difference_sentences
 from tpjb_ident.condition_kinds import KINDS
 from tpjb_ident.conditions import Condition
-from tpjb_ident.report.drawing.picture import INK, LIGHT, add_legend, label, new_pictures
+from tpjb_ident.report.drawing.picture import (
+    ENTRY_STYLES,
+    INK,
+    PAPER,
+    add_legend,
+    in_house_style,
+    label,
+    new_pictures,
+)
 from tpjb_ident.report.drawing.series import point_labels, set_point_ticks, with_errors
 from tpjb_ident.report.figure import panel
-from tpjb_ident.report.laboratory_sections import flags_line, set_points
-from tpjb_ident.report.page import Page, Section, Table, write_page
-from tpjb_ident.rounding import significant
-from tpjb_ident.schema import DAMPING, ENTRIES, POINT_KEY, STIFFNESS, TANGENT, Coefficient
+from tpjb_ident.report.laboratory_sections import coefficient_cells, flags_line, interval_cells, set_points
+from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
+from tpjb_ident.schema import DAMPING, POINT_KEY, STIFFNESS, TANGENT, Coefficient
 
 _TITLE = (
     "Differences, 95 % intervals; full marks changed beyond what both allow (logarithmic beyond the widest interval)"
@@ -29,8 +35,7 @@ _TITLE = (
 _POINTS = "operating point: load in {}, excitation in Hz"
 #: How many times the widest interval a difference is at least where the scale is logarithmic outside.
 _BEYOND = 5.0
-_SIDES = ("a", "b", "difference")
-_MARKS = (("xx", "blue", "s"), ("yy", "red", "o"), ("xy", "grey", "<"), ("yx", "purple", ">"))
+_SIDES = {"a": "first", "b": "second", "difference": "difference"}
 
 
 def write_difference_report(
@@ -71,16 +76,16 @@ def _facts(difference: Difference) -> dict[str, str]:
 
 def _values_table(difference: Difference) -> Table:
     """K and C of both sides at the point in the middle, and what changed."""
-    row = difference.points.iloc[len(difference.points) // 2].to_dict()
-    rows = []
-    for kind, entry in itertools.product((STIFFNESS, DAMPING), ENTRIES):
-        name, scale = kind.column(entry), kind.display_scale
-        cells = [shown(row, name, scale, side) for side in _SIDES]
-        rows.append([f"{kind.symbol}{entry}, {kind.display_unit}", *cells, row[f"{kind.symbol}{entry}_changed"]])
-    place = f"{place_of(row['static_load_N'], row['excitation_Hz'])}, shaft at "
-    place += spinning(row["shaft_speed_Hz"], row["rotation"])
-    columns = ["", "first", "second", "difference", "changed"]
-    return Table(f"At {place}; 95 % intervals", columns, rows)
+    middle = difference.points.iloc[[len(difference.points) // 2]]
+    point = middle.iloc[0]
+    cells: dict[str, list[str]] = {}
+    for side, title in _SIDES.items():
+        of_side = coefficient_cells(middle, (STIFFNESS, DAMPING), f"_{side}")
+        cells |= {"": list(of_side), title: [text for (text,) in of_side.values()]}
+    cells["changed"] = [point[f"{heading[:3]}_changed"] for heading in cells[""]]
+    place = place_of(point["static_load_N"], point["excitation_Hz"])
+    shaft = spinning(point["shaft_speed_Hz"], point["rotation"])
+    return table_of(f"At {place}, shaft at {shaft}; 95 % intervals", cells)
 
 
 def _flags(points: pd.DataFrame) -> list[Condition]:
@@ -91,74 +96,69 @@ def _flags(points: pd.DataFrame) -> list[Condition]:
 
 def _sections(difference: Difference) -> list[Section]:
     sections = []
-    points = difference.points
+    points, pivots, clearance = difference.points, difference.pivots, difference.clearance
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
         panels = [panel("difference", _TITLE, _drawn, "", points)]
         sections.append(Section("Coefficients", panels=panels, tables=tables))
-    if not difference.pivots.empty:
-        rows = [
-            _row(row, TANGENT, "stiffness", significant(row["force_N"] * per("load"), ".3g"))
-            for row in difference.pivots.to_dict("records")
-        ]
-        columns = ["pad", f"load, {symbol('load')}", *_columns("stiffness")]
-        table = Table("Tangent stiffness of the pivots, where both were measured; 95 %", columns, rows)
+    if len(pivots):
+        loads = (per("load") * pivots["force_N"]).map("{:.3g}".format)
+        cells = {"pad": _pads(pivots), f"load, {symbol('load')}": loads, **_both(pivots, TANGENT, "stiffness")}
+        table = table_of("Tangent stiffness of the pivots, where both were measured; 95 %", cells)
         sections.append(Section("Pivots", tables=[table]))
-    if not difference.clearance.empty:
-        rows = [_row(row, "clearance_m", "length") for row in difference.clearance.to_dict("records")]
-        columns = ["pad", *_columns("length")]
-        table = Table("Assembled clearance at zero push load, 95 %", columns, rows)
+    if len(clearance):
+        cells = {"pad": _pads(clearance), **_both(clearance, "clearance_m", "length")}
+        table = table_of("Assembled clearance at zero push load, 95 %", cells)
         sections.append(Section("Clearance", tables=[table]))
     return sections
 
 
-def _columns(quantity: str) -> list[str]:
-    return [f"{side}, {symbol(quantity)}" for side in ("first", "second", "difference")] + ["changed"]
+def _pads(frame: pd.DataFrame) -> pd.Series:
+    return frame["pad"].map("#{:g}".format)
 
 
-def _row(row: Mapping[Any, Any], name: str, quantity: str, *place: str) -> list[str]:
-    cells = [shown(row, name, size(quantity), side) for side in _SIDES]
-    return [f"#{row['pad']:g}", *place, *cells, row[f"{name.partition('_')[0]}_changed"]]
+def _both(frame: pd.DataFrame, name: str, quantity: str) -> dict[str, Iterable[str]]:
+    """A quantity of both sides, its difference, and whether it changed."""
+    cells: dict[str, Iterable[str]] = {}
+    for side, title in _SIDES.items():
+        cells[f"{title}, {symbol(quantity)}"] = interval_cells(frame, f"{name}_{side}", size(quantity))
+    return cells | {"changed": frame[changed_column(name)]}
 
 
 def _coefficient_table(points: pd.DataFrame, kind: Coefficient) -> Table:
     """Differences of K or of C at every point, and which of them changed."""
-    rows = []
-    for place, row in zip(point_labels(points), points.to_dict("records"), strict=True):
-        cells = []
-        for entry in ENTRIES:
-            cells.append(shown(row, kind.column(entry), kind.display_scale))
-            if row[f"{kind.symbol}{entry}_changed"] == "yes":
-                cells[-1] += " *"
-        flags = dict.fromkeys(
-            f for side in "ab" for f in str(row.get(f"quality_{side}", "ok")).split("; ") if f != "ok"
-        )
-        rows.append([place, *cells, ", ".join(flags) or "ok"])
-    named = [f"{kind.symbol}{entry}, {kind.display_unit}" for entry in ENTRIES]
-    caption = f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow"
-    return Table(caption, ["point", *named, "flags of both"], rows)
+    cells = {"point": point_labels(points), **coefficient_cells(points, [kind], "_difference")}
+    for heading in list(cells)[1:]:
+        star = points[f"{heading[:3]}_changed"].map({"yes": " *"}).fillna("")
+        cells[heading] = list(cells[heading] + star)
+    both = points.reindex(columns=["quality_a", "quality_b"], fill_value="ok").astype(str).agg("; ".join, axis=1)
+    cells["flags of both"] = []
+    for text in both:
+        flags = dict.fromkeys(flag for flag in text.split("; ") if flag != "ok")
+        cells["flags of both"].append(", ".join(flags) or "ok")
+    return table_of(f"Difference of {kind.quantity}, 95 %; * changed beyond what both intervals allow", cells)
 
 
+@in_house_style
 def _drawn(points: pd.DataFrame) -> Figure:
     """Draw differences of K and C with their intervals, point by point; logarithmic beyond the widest interval."""
     figure, grid = new_pictures(2, 1, height=2.7)
     place = np.arange(len(points), dtype=float)
-    for (axes,), kind in zip(grid, (STIFFNESS, DAMPING), strict=True):
+    for axes, kind in zip(grid[:, 0], (STIFFNESS, DAMPING), strict=True):
         label(axes, _POINTS.format(symbol("load")), f"difference of {kind.symbol.upper()}, {kind.display_unit}")
         axes.axhline(0.0, color=INK, linewidth=1.0)
         half = 0.0
-        for k, (entry, colour, marker) in enumerate(_MARKS):
-            name = f"{kind.column(entry)}_difference"
-            value, errors = with_errors(points, name, kind.display_scale)
+        for k, (entry, look) in enumerate(ENTRY_STYLES.items()):
+            style = look | {"linestyle": "none"}
+            value, errors = with_errors(points, f"{kind.column(entry)}_difference", kind.display_scale)
             half = max(half, float(np.max(errors, where=np.isfinite(errors), initial=0.0)))
             x = place + 0.16 * (k - 1.5)
-            axes.errorbar(x, value, yerr=errors, fmt="none", ecolor=LIGHT[colour], capsize=2.5)
-            axes.plot(x, value, marker, color=LIGHT[colour], markerfacecolor=LIGHT["paper"], markersize=5, label=entry)
+            axes.errorbar(x, value, yerr=errors, **style, markerfacecolor=PAPER, capsize=2.5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
-            axes.plot(x[changed], value[changed], marker, color=LIGHT[colour], markersize=5)
+            axes.plot(x[changed], value[changed], **style)
         if np.max(np.abs(axes.dataLim.intervaly)) > _BEYOND * half > 0.0:
             axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(half)), linscale=0.7)
             axes.yaxis.set_major_formatter("{x:g}")
         set_point_ticks(axes, points)
-    add_legend(grid[0][0], across=True)
+    add_legend(grid[0, 0], across=True)
     return figure

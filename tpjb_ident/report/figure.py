@@ -21,7 +21,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
-from PIL import Image
 
 from tpjb_ident.report.drawing.picture import LIGHT
 from tpjb_ident.rounding import significant
@@ -30,11 +29,9 @@ from tpjb_ident.runtime.tables import printable, write_atomic, write_text
 
 _PNG_DPI = 160
 _FONT = re.compile(r"font: (?:(italic|oblique) )?(?:(bold|\d+) )?([\d.]+)px [^;\"]*")
-_SIZE = re.compile(r'viewBox="0 [\d.]+ ([\d.]+) ([\d.]+)"')
+_SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ')
 _USE = re.compile(r'<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"([^>]*)/>')
 _POINTS_PER_INCH = 72.0
-#: Between the last line of a legend and its panel [points].
-_BELOW_LEGEND = 2.0
 #: Markers are found again by their place in the drawing [points].
 _NEAR = 0.05
 #: More markers on a line are a cloud.
@@ -100,21 +97,6 @@ def inline_svg(text: str, name: str, title: str) -> str:
     return f'{head} role="img" aria-label="{title}">{content}'
 
 
-def without_legend(svg: str) -> tuple[str, frozenset[str]]:
-    """A drawing with its legend hidden (it may define marks that others use), its room cut off, and its words."""
-    start, size = svg.find('<g id="legend_1">'), _SIZE.search(svg)
-    if start < 0 or size is None or '<g id="legend_2">' in svg:
-        return svg, frozenset()
-    end = _end_of_group(svg, start)
-    texts = re.findall(r'y="([\d.]+)"[^>]*>([^<]+)</text>', svg[start:end])
-    bottom = max(float(y) for y, _ in texts) + _BELOW_LEGEND
-    width, height = float(size[1]), float(size[2])
-    cut = f'{svg[:start]}<g visibility="hidden"{svg[start + 2 :]}'.replace(
-        size[0], f'viewBox="0 {bottom:.2f} {width:g} {height - bottom:.2f}"', 1
-    )
-    return cut, frozenset(words for _, words in texts)
-
-
 def prefixed_ids(svg: str, prefix: str) -> str:
     """Rename every id and what refers to it, so that several drawings can share one page."""
     return _ID.sub(rf"\g<1>{prefix}-\g<2>", svg)
@@ -139,16 +121,9 @@ def _save_panel(index: int, folder: Path) -> str:
     ground = text.index(">", text.index("<svg")) + 1  # in a file of its own: dark viewers would swallow the ink
     on_white = f'{text[:ground]}<rect width="100%" height="100%" fill="white"/>{text[ground:]}'
     write_text(folder / f"{panel.name}.svg", on_white)
-    write_atomic(folder / f"{panel.name}.png", functools.partial(_save_png, panel.figure))
+    save = functools.partial(panel.figure.savefig, format="png", dpi=_PNG_DPI, facecolor="white")
+    write_atomic(folder / f"{panel.name}.png", save)
     return text
-
-
-def _save_png(figure: Figure, path: Path) -> None:
-    pixels = io.BytesIO()
-    figure.savefig(pixels, format="rgba", dpi=_PNG_DPI, facecolor="white")
-    width, height = (int(inches * _PNG_DPI) for inches in figure.get_size_inches())
-    opaque = Image.frombytes("RGBA", (width, height), pixels.getvalue()).convert("RGB")  # a third of the file
-    opaque.save(path, format="PNG", dpi=(_PNG_DPI, _PNG_DPI), compress_level=4)
 
 
 def _hover_points(figure: Figure) -> tuple[np.ndarray, list[str]]:
@@ -189,15 +164,6 @@ def _with_unit(label: str, value: float, spread: str = "") -> str:
     name, _, unit = label.rpartition(", ")
     name, unit = (name, unit) if name else (unit, "")
     return f"{name} {significant(value)}{spread} {unit}".strip()
-
-
-def _end_of_group(svg: str, start: int) -> int:
-    depth = 0
-    for match in re.compile(r"<g(?: [^>]*)?(?<!/)>|</g>").finditer(svg, start):
-        depth += -1 if match[0] == "</g>" else 1
-        if depth == 0:
-            return match.end()
-    return len(svg)
 
 
 def _titled(points: tuple[np.ndarray, list[str]], match: re.Match[str]) -> str:

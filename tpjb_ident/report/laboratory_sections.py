@@ -13,16 +13,17 @@ from rigdata.problem import RigDataError
 from tpjb_ident.columns import amount, channel_unit, degrees, per, size, spinning, symbol
 from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.conditions import SEVERITIES
-from tpjb_ident.estimators.stiffness import ENTRIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.page import Section, Table
 from tpjb_ident.report.plots.coefficients import frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
 from tpjb_ident.rounding import counted, fixed, with_interval
-from tpjb_ident.schema import DAMPING, STIFFNESS
+from tpjb_ident.schema import DAMPING, ENTRIES, STIFFNESS, Coefficient
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from rigdata.calibration import Channel
     from rigdata.campaign import Campaign
     from rigdata.run import Run
@@ -89,6 +90,22 @@ def values_table(points: Sequence[PointResult]) -> Table | None:
         f"Measured at {point_label(p)}, shaft at {spinning(p.point.shaft_speed_hz, p.point.rotation)}; 95 % intervals"
     )
     return Table(caption, columns, rows)
+
+
+def interval_cells(frame: pd.DataFrame, column: str, scale: float) -> list[str]:
+    """Values of a column with half their intervals."""
+    ends = (frame[column + end] for end in ("", "_lo", "_hi"))
+    return [with_interval(value, low, high, scale) for value, low, high in zip(*ends, strict=True)]
+
+
+def coefficient_cells(frame: pd.DataFrame, kinds: Sequence[Coefficient], side: str = "") -> dict[str, list[str]]:
+    """K, C or both of a table on disk with half their intervals, by headings; `side` is what their names end in."""
+    cells = {}
+    for kind in kinds:
+        for entry in ENTRIES:
+            heading = f"{kind.symbol}{entry}, {kind.display_unit}"
+            cells[heading] = interval_cells(frame, kind.column(entry) + side, kind.display_scale)
+    return cells
 
 
 def flags_line(flags: Iterable[Iterable[Condition]], points: int) -> str:

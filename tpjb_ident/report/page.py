@@ -15,7 +15,7 @@ from typing import Any
 import jinja2
 import markupsafe
 
-from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text, without_legend
+from tpjb_ident.report.figure import Panel, inline_svg, save_panels, shape, svg_text
 from tpjb_ident.runtime.provenance import versions
 from tpjb_ident.runtime.tables import printable, readable, write_text
 
@@ -45,6 +45,11 @@ class Table:
             if 2 * numbers < len(cells) or max(map(len, cells), default=0) > _LONG:
                 words.add(index)
         return words
+
+
+def table_of(caption: str, cells: Mapping[str, Iterable[str]]) -> Table:
+    """A table of columns of cells, by their headings."""
+    return Table(caption, list(cells), list(zip(*cells.values(), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -87,15 +92,8 @@ class Page:
 def render_page(page: Page, svg: Mapping[str, str]) -> str:
     """Render a report as HTML."""
     script = _TEMPLATES.get_template("sort.js").render()
-    shown: list[frozenset[str]] = []
-    drawings = {}
-    for panel in panels_of(page):
-        drawing, legend = without_legend(svg[panel.name])
-        repeated = any(legend <= former for former in shown)
-        drawings[panel.name] = drawing if repeated else svg[panel.name]
-        shown += [legend] if legend else []
     running = f"{page.title} \N{MIDDLE DOT} {page.facts.get('Bearing', page.subtitle)}"
-    drawn, shapes = _elements(panels_of(page), drawings)
+    drawn, shapes = _elements(panels_of(page), svg)
     return _TEMPLATES.get_template("report.html").render(
         page=page,
         drawn=drawn,

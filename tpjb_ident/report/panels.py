@@ -7,13 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.report.drawing.picture import BLUE, INK, label, new_pictures
-from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series
+from tpjb_ident.report.drawing.picture import BLUE, INK, in_house_style, label, new_pictures
+from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series, thinned
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 from tpjb_ident.report.plots.coefficients import coefficient
@@ -102,12 +101,14 @@ def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) 
     return panel("quick-look", title, _quick_look, "", title, list(series)[:_MOST], looks)
 
 
+@in_house_style
 def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Figure:
     figure, grid = new_pictures(len(series), 2, title=printable(title), width=_WIDTH, height=_ROW)
     for (over_time, spectrum), channel in zip(grid, series, strict=True):
         label(over_time, "time, s", printable(", ".join(filter(None, (channel.name, channel.unit)))))
         label(spectrum, "frequency, Hz", "")
-        _draw_time(over_time, channel)
+        time = np.arange(len(channel), dtype=float) if channel.time is None else channel.time
+        over_time.plot(*thinned(time, channel.values, _POINTS), color=INK, linewidth=0.6)
         look = looks[channel.name]
         spectrum.plot(look.frequency[4:], np.maximum(look.amplitude[4:], 1e-300), color=BLUE, linewidth=0.7)
         spectrum.set_yscale("log")
@@ -117,14 +118,3 @@ def _quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look])
         for axes in (over_time, spectrum):
             axes.margins(x=0.0)
     return figure
-
-
-def _draw_time(axes: Axes, series: Series) -> None:
-    time = np.arange(len(series), dtype=float) if series.time is None else series.time
-    step = max(1, len(series) // _POINTS)
-    count = len(series) // step
-    blocks = np.ma.masked_invalid(series.values[: count * step].reshape(count, step))
-    if step == 1:
-        axes.plot(time, blocks[:, 0], color=INK, linewidth=0.6)
-    else:
-        axes.fill_between(time[: count * step : step], blocks.min(axis=1), blocks.max(axis=1), color=INK, linewidth=0.4)

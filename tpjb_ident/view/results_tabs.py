@@ -24,7 +24,7 @@ from tpjb_ident.report.plots.records import window_weights
 from tpjb_ident.report.plots.residuals import residual_map
 from tpjb_ident.rounding import counted
 from tpjb_ident.schema import POINT_COLUMNS, POINT_KEY
-from tpjb_ident.view.records_tab import follow
+from tpjb_ident.view.records_tab import follow, text_element
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +53,7 @@ def verdict_tab(session: Session) -> Any:
         tables.append(deviations_table(_compared(session, [p.point for p in points], identification.to_frame())))
     bad = sum(bool(untrusted(p.quality)) for p in points)
     title = f"{counted(len(points), 'operating point')}, {f'{bad} NOT to be trusted' if bad else 'all to be trusted'}"
-    return _text("verdict", render_section(Section(title, notes, tables=tables)))
+    return text_element("verdict", render_section(Section(title, notes, tables=tables)))
 
 
 def points_tab(identification: Identification) -> Any:
@@ -66,7 +66,7 @@ def points_tab(identification: Identification) -> Any:
         place = f"{amount(p.point.static_load, 'load')} at {p.point.static_load_direction_deg:g} deg"
         points[f"{place}, {p.point.speed_words}, excitation {p.point.excitation_hz:g} Hz"] = p
     choice = Select(title="operating point", options=list(points), value=next(iter(points)), name="point", width=320)
-    windows = _text("windows")
+    windows = text_element("windows")
 
     def update() -> None:
         p = points[choice.value]
@@ -77,16 +77,9 @@ def points_tab(identification: Identification) -> Any:
         )
 
     follow(update, choice)
-    return column(choice, windows, _text("coefficients", _points_html(identification)), sizing_mode="stretch_width")
-
-
-def _text(name: str, html: str = "") -> Any:
-    from bokeh.models import Div
-
-    wide = ".bk-clearfix { display: block; width: 100%; }"  # otherwise as narrow as the text
-    # the page is inverted as a whole; sections of the report know dark screens themselves
-    back = "@media (prefers-color-scheme: dark) { :host { filter: invert(1) hue-rotate(180deg); } }"
-    return Div(text=html, name=name, sizing_mode="stretch_width", stylesheets=[wide, back])
+    return column(
+        choice, windows, text_element("coefficients", _points_html(identification)), sizing_mode="stretch_width"
+    )
 
 
 def _points_html(identification: Identification) -> str:
@@ -108,7 +101,7 @@ def model_tab(session: Session) -> Any:
     step = 0.05 if size("load") > 100.0 else 10.0
     load = Slider(title=f"static load, {symbol('load')}", start=step * round(0.8 * loads[0] / step), value=loads[0],
                   end=step * round(1.15 * loads[-1] / step), step=step, name="load", width=320)  # fmt: skip
-    curves = _text("curves")
+    curves = text_element("curves")
     html = functools.lru_cache(maxsize=512)(functools.partial(_curves_html, session))
 
     def update() -> None:
@@ -118,7 +111,7 @@ def model_tab(session: Session) -> Any:
     table = _compared(session, [p.point for p in identification.points], identification.to_frame())
     residuals = panel("residual-map", "Residuals of all points", residual_map(table), "")
     html_of_all = render_section(Section("All points", panels=[residuals]))
-    return column(load, curves, _text("residuals", html_of_all), sizing_mode="stretch_width")
+    return column(load, curves, text_element("residuals", html_of_all), sizing_mode="stretch_width")
 
 
 def _curves_html(session: Session, load: float) -> str:

@@ -9,14 +9,20 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
+from matplotlib.rcsetup import cycler
 from matplotlib.ticker import ScalarFormatter
+from matplotlib.transforms import Bbox
+
+from rigdata.arrays import FloatArray
 
 #: Okabe and Ito's palette, told apart by most colour-blind readers; ink, rule and paper follow the page.
 LIGHT = {
@@ -31,64 +37,58 @@ LIGHT = {
     "grey": "#7a828b",
 }
 INK, RULE, PAPER, BLUE, RED, GREY = (LIGHT[name] for name in ("ink", "rule", "paper", "blue", "red", "grey"))
-#: Lines that are told apart without colour.
-DASHED, SHORT_DASHED, DOTTED, DASH_DOTTED = (0, (5, 2)), (0, (4, 2)), (0, (1, 1.5)), (0, (3, 1, 1, 1))
-#: Colour, line and marker.
-Style = tuple[str, Any, str]
-#: How each pivot model is drawn everywhere: colour, line, marker. Line and marker tell them apart without colour.
-VARIANT_STYLE: dict[str, Style] = {
-    "rigid": ("grey", DOTTED, "s"),
-    "kirk": ("orange", DASHED, "^"),
-    "kirk-secant": ("purple", DASH_DOTTED, "v"),
-    "measured": ("blue", "-", "D"),
-    "model before": ("orange", DASHED, "^"),
-    "with the effects found": ("blue", "-", "D"),
-}
-VARIANT_LABEL = {
+#: What `plot` takes to draw a curve: its colour, line and marker.
+Style = dict[str, Any]
+
+
+def _styles(colours: str, lines: Sequence[Any], markers: str) -> list[Style]:
+    return list(cycler(color=[LIGHT[name] for name in colours.split()], linestyle=lines, marker=list(markers)))
+
+
+_SERIES = _styles("blue red green purple orange", ["-", "--", "-.", ":", (0, (8, 2, 1, 2))], "os^Dv")
+_TABLES = _styles("green red purple blue ink", ["-.", "--", ":", "-.", "--"], "*PX<>")
+#: How each pivot model is drawn everywhere. Line and marker tell them apart without colour.
+_MODELS = ("rigid", "kirk", "kirk-secant", "measured", "model before", "with the effects found")
+_OF_MODELS = _styles("grey orange purple blue orange blue", [":", "--", "-.", "-", "--", "-"], "s^vD^D")
+MODEL_STYLES = dict(zip(_MODELS, _OF_MODELS, strict=True))
+#: How the entries of K, C and h are drawn.
+ENTRY_STYLES = dict(
+    zip(("xx", "yy", "xy", "yx"), _styles("blue red green purple", ["--", "-", ":", "-."], "so<>"), strict=True)
+)
+#: Names of models in legends, where they are not their own.
+MODEL_LABELS = {
     "rigid": "rigid pivots",
     "kirk": "Kirk pivots",
     "kirk-secant": "Kirk, secant",
     "measured": "measured pivots",
 }
-#: Of the tables of other programs, one after the other.
-_TABLE_STYLE: tuple[Style, ...] = (
-    ("green", (0, (4, 1, 1, 1)), "*"),
-    ("red", (0, (2, 1)), "P"),
-    ("purple", (0, (6, 1, 1, 1, 1, 1)), "X"),
-    ("blue", (0, (1, 1)), "<"),
-    ("ink", (0, (3, 3)), ">"),
-)
-_PAD_STYLE: tuple[Style, ...] = (
-    ("blue", "-", "o"),
-    ("red", DASHED, "s"),
-    ("green", DASH_DOTTED, "^"),
-    ("purple", DOTTED, "D"),
-    ("orange", (0, (8, 2, 1, 2)), "v"),
-)
 #: Blue through paper to orange: signs that nobody confuses.
 DIVERGING = LinearSegmentedColormap.from_list("tpjb-diverging", ["#004c7a", "#4f9bcb", "#f6f7f8", "#e8a33d", "#9a4a00"])
 #: Paper to deep blue: more is darker.
 SEQUENTIAL = LinearSegmentedColormap.from_list("tpjb-sequential", ["#f6f7f8", "#9cc7e3", "#2f86bf", "#003a63"])
 
 
-def style_of_variant(variant: str, variants: Sequence[str]) -> Style:
-    """Colour, line style and marker of one of the variants of a picture: a pivot model or another program's table."""
-    tables = [name for name in variants if name not in VARIANT_STYLE]
-    return VARIANT_STYLE.get(variant) or _TABLE_STYLE[tables.index(variant) % len(_TABLE_STYLE)]
+def style_of(number: int) -> Style:
+    """How the curve of this number is drawn, where several of a kind are in one panel: pads, axes, bearings."""
+    return _SERIES[number % len(_SERIES)]
 
 
-def style_of_pad(pad: int) -> Style:
-    """Colour, line style and marker of a pad (from 1)."""
-    colour, dashes, marker = _PAD_STYLE[(pad - 1) % len(_PAD_STYLE)]
-    return LIGHT[colour], dashes, marker
+def model_styles(names: Sequence[str]) -> dict[str, Style]:
+    """How the predictions of a picture are drawn: those of pivot models, and of the tables of other programs."""
+    tables = [name for name in names if name not in MODEL_STYLES]
+    return MODEL_STYLES | {name: _TABLES[k % len(_TABLES)] for k, name in enumerate(tables)}
 
 
 _WIDTH, _HEIGHT = 4.6, 3.1  # inches: legible in one column of a phone, and of a printed page
-FONT_SIZE = 9.0
+SMALL = 8.0  # size of letters inside a panel
 LEFT, _RIGHT, _BOTTOM, _TOP = 0.8, 0.15, 0.55, 0.15  # margins [inches]
 _LINE = 0.172  # height of one line of text with its leading [inches]
 CHARACTER = 0.074  # mean width of a character [inches]
 _NOTEBOOK_DPI = 120
+
+_STYLE_FILE = Path(__file__).with_name("house.mplstyle")
+#: Decorator of what draws: the look of the house, and the user's again behind it.
+in_house_style = matplotlib.rc_context(matplotlib.rc_params_from_file(_STYLE_FILE, use_default_template=False))
 
 
 class Picture(Figure):
@@ -98,6 +98,8 @@ class Picture(Figure):
         buffer = io.BytesIO()
         self.savefig(buffer, format="png", dpi=_NOTEBOOK_DPI)
         return buffer.getvalue()
+
+    draw = in_house_style(Figure.draw)  # ticks are made when they are drawn
 
 
 def new_picture(
@@ -109,6 +111,7 @@ def new_picture(
     return figure, axes
 
 
+@in_house_style
 def new_pictures(
     rows: int,
     columns: int,
@@ -116,23 +119,26 @@ def new_pictures(
     title: str | None = None,
     width: float = _WIDTH,
     height: float | Sequence[float] = _HEIGHT,
-) -> tuple[Picture, list[list[Axes]]]:
-    """Make a picture with rows times columns of empty panels, each with its own margins; a height for all or each."""
-    head = 1.6 * _LINE if title else 0.0
-    heights = list(height) if isinstance(height, Sequence) else [height] * rows
-    size = (columns * width, sum(heights) + head)
-    figure = Picture(figsize=size, facecolor="white")
+) -> tuple[Picture, Any]:
+    """Make a picture with (rows, columns) empty panels, each with its own margins; a height for all or each."""
+    inner, gap = np.broadcast_to(height, rows) - _BOTTOM - _TOP, _BOTTOM + _TOP
+    total = float(inner.sum()) + rows * gap
+    size = columns * width, total + (1.6 * _LINE if title else 0.0)
+    figure = Picture(figsize=size)
     FigureCanvasAgg(figure)
-    grid = [
-        [
-            _panel(figure, (j * width + LEFT, sum(heights[i + 1 :]) + _BOTTOM, width - LEFT - _RIGHT,
-                            heights[i] - _BOTTOM - _TOP))
-            for j in range(columns)
-        ]
-        for i in range(rows)
-    ]  # fmt: skip
+    places = {
+        "left": LEFT / size[0],
+        "right": 1.0 - _RIGHT / size[0],
+        "bottom": _BOTTOM / size[1],
+        "top": (total - _TOP) / size[1],
+        "wspace": (LEFT + _RIGHT) / (width - LEFT - _RIGHT),
+        "hspace": gap / float(inner.mean()),
+    }
+    grid = figure.subplots(rows, columns, squeeze=False, height_ratios=inner.tolist(), gridspec_kw=places)
+    for axes in grid.flat:
+        axes.yaxis.set_major_formatter(_Millions())
     if title:
-        figure.suptitle(title, x=0.5, y=1.0 - 0.06 / size[1], va="top", fontsize=FONT_SIZE + 1.0, color=INK, wrap=True)
+        figure.suptitle(title, y=1.0 - 0.06 / size[1], wrap=True)
     return figure, grid
 
 
@@ -143,29 +149,11 @@ class _Millions(ScalarFormatter):
         return self.fix_minus(f"{x / 1e6:g}M") if abs(x) >= 1e5 else super().__call__(x, pos)
 
 
-def _panel(figure: Figure, box: tuple[float, float, float, float]) -> Axes:
-    """Empty axes at a box in inches, in the house look."""
-    width, height = figure.get_size_inches()
-    axes = figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
-    axes.patch.set_alpha(0.0)
-    axes.yaxis.set_major_formatter(_Millions())
-    axes.ticklabel_format(style="plain", useOffset=False)
-    axes.tick_params(colors=INK, labelsize=FONT_SIZE, color=RULE, labelcolor=INK)
-    axes.grid(True, color=RULE, linewidth=0.6, linestyle="-", alpha=1.0)
-    axes.set_axisbelow(True)
-    for side, spine in axes.spines.items():
-        spine.set_color(RULE)
-        spine.set_visible(side in ("left", "bottom"))
-    return axes
-
-
-def label(axes: Axes, x_label: str, y_label: str, heading: str | None = None) -> None:
+def label(axes: Axes, x_label: str, y_label: str, heading: str = "") -> None:
     """Label both axes; a heading stands above the panel, which gives way."""
-    axes.set_xlabel(x_label, fontsize=FONT_SIZE, color=INK)
-    axes.set_ylabel(y_label, fontsize=FONT_SIZE, color=INK)
+    axes.set(xlabel=x_label, ylabel=y_label, title=heading)
     if heading:
         shrink(axes, top=1.2 * _LINE)
-        axes.set_title(heading, fontsize=FONT_SIZE, color=INK, pad=4.0)
 
 
 def from_zero(axes: Axes) -> None:
@@ -176,44 +164,40 @@ def from_zero(axes: Axes) -> None:
         axes.set_ylim(low, high)
 
 
+def logarithmic(axes: Axes) -> None:
+    """Make the vertical axis logarithmic; powers of ten are set by a parser that takes longer than the picture."""
+    axes.set_yscale("log")
+    axes.minorticks_off()
+    axes.yaxis.set_major_formatter("{x:g}")
+
+
 def shrink(axes: Axes, *, left: float = 0.0, right: float = 0.0, top: float = 0.0, bottom: float = 0.0) -> None:
     """Take inches off the sides of a panel: room for names, a colour bar or a legend."""
-    box = axes.get_position()
-    width, height = _size(axes)
-    axes.set_position((
-        box.x0 + left / width, box.y0 + bottom / height,
-        box.width - (left + right) / width, box.height - (top + bottom) / height,
-    ))  # fmt: skip
+    low, high = axes.get_position().get_points()
+    inches = _size(axes)
+    axes.set_position(Bbox([low + np.array([left, bottom]) / inches, high - np.array([right, top]) / inches]))
 
 
-def add_legend(
-    axes: Axes, columns: int | None = None, handles: Sequence[Any] | None = None, across: bool = False
-) -> Legend | None:
-    """Put a frameless legend above the panel, which makes room for it; nothing if nothing is labelled."""
+def add_legend(axes: Axes, handles: Sequence[Any] | None = None, across: bool = False) -> None:
+    """Put a legend above the panel, which makes room for it; nothing if nothing is labelled."""
     drawn = list(axes.get_legend_handles_labels()[0] if handles is None else handles)
     if not drawn:
-        return None
+        return
     names = [str(handle.get_label()) for handle in drawn]
-    width, box = _size(axes)[0], axes.get_position()
-    columns = columns or _columns(names, width - 0.1 if across else width * box.width + 0.4 * LEFT)
-    columns = math.ceil(len(drawn) / math.ceil(len(drawn) / columns))  # no wider than the rows need
+    (width, height), box = _size(axes), axes.get_position()
+    columns = _columns(names, width - 0.1 if across else width * box.width + 0.4 * LEFT)
+    rows = math.ceil(len(drawn) / columns)
+    shrink(axes, top=_LINE * rows + 0.03)
+    heading = 1.4 * _LINE / (axes.get_position().height * height) if axes.get_title() else 0.0
     centre = (0.5 - box.x0) / box.width if across else 0.5
-    heading = 1.4 * _LINE if axes.get_title() else 0.0
-    shrink(axes, top=_LINE * math.ceil(len(drawn) / columns) + 0.03)
-    height = axes.get_position().height * _size(axes)[1]
-    legend = axes.legend(
-        handles=drawn, fontsize=FONT_SIZE, frameon=False, ncols=columns, loc="lower center", borderaxespad=0.2,
-        bbox_to_anchor=(centre, 1.0 + heading / height), columnspacing=1.2, handlelength=2.6, labelspacing=0.35,
-        labelcolor=INK,
-    )  # fmt: skip
-    return legend
+    axes.legend(handles=drawn, ncols=math.ceil(len(drawn) / rows), loc="lower center",  # no wider than the rows need
+                bbox_to_anchor=(centre, 1.0 + heading))  # fmt: skip
 
 
-def _size(axes: Axes) -> tuple[float, float]:
+def _size(axes: Axes) -> FloatArray:
     """Width and height of the picture that holds a panel [inches]."""
-    figure = axes.get_figure(root=True)
-    width, height = figure.get_size_inches()  # type: ignore[union-attr]
-    return float(width), float(height)
+    figure: Any = axes.get_figure(root=True)
+    return np.asarray(figure.get_size_inches())
 
 
 def _columns(names: Sequence[str], room: float) -> int:
@@ -226,25 +210,11 @@ def _columns(names: Sequence[str], room: float) -> int:
     return 1
 
 
-def add_colour_bar(axes: Axes, image: Any, text: str) -> None:
+def add_colour_bar(axes: Axes, image: Any, text: str) -> Axes:
     """Put a colour bar right of a panel, which makes room for it."""
     shrink(axes, right=0.75)
-    figure, box = axes.figure, axes.get_position()
-    width = _size(axes)[0]
-    bar_axes = figure.add_axes((box.x1 + 0.12 / width, box.y0, 0.14 / width, box.height))
-    bar = figure.colorbar(image, cax=bar_axes)  # type: ignore[union-attr]
-    bar.outline.set_visible(False)  # type: ignore[operator]
-    bar.ax.tick_params(labelsize=FONT_SIZE - 1, colors=INK, color=RULE)
-    bar.set_label(text, fontsize=FONT_SIZE, color=INK)
-
-
-def mark_extrapolated(axes: Axes, start: float) -> None:
-    """Shade everything right of `start` (in the panel's units) and say why."""
-    end = axes.get_xlim()[1]
-    if end > start:
-        axes.axvspan(start, end, color=RULE, alpha=0.35, linewidth=0, zorder=0)
-        axes.text(
-            start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=FONT_SIZE - 1,
-            color=GREY, va="bottom", ha="left",
-        )  # fmt: skip
-        axes.set_xlim(right=end)
+    width = _size(axes)[0] * axes.get_position().width
+    bar = axes.inset_axes((1.0 + 0.12 / width, 0.0, 0.14 / width, 1.0))
+    figure: Any = axes.figure
+    figure.colorbar(image, cax=bar, label=text).outline.set_visible(False)
+    return bar

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import ROTATIONS
 from tpjb_ident.columns import amount, per, place_of, size, spinning, symbol
-from tpjb_ident.report.drawing.picture import FONT_SIZE, shrink
+from tpjb_ident.report.drawing.picture import SMALL, shrink
 from tpjb_ident.schema import COEFFICIENT_COLUMNS, POINT_KEY, STATIC_KEY
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def point_labels(table: pd.DataFrame) -> list[str]:
 def set_point_ticks(axes: Axes, table: pd.DataFrame) -> None:
     """Name places 0 to n - 1 of a panel by operating points: a line for load, excitation and what else differs."""
     lines = [[f"{load * per('load'):.4g}", f"{hz:g}", *others] for load, hz, others in _set_points(table)]
-    axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=FONT_SIZE - 1.0)
+    axes.set_xticks(range(len(lines)), ["\n".join(texts) for texts in lines], fontsize=SMALL)
     shrink(axes, bottom=0.09 + _LINE * (len(lines[0]) - 1 if lines else 0))
 
 
@@ -92,6 +92,17 @@ def _set_points(table: pd.DataFrame) -> list[tuple[float, float, list[str]]]:
         (row["static_load_N"], row["excitation_Hz"], [forms[name].format(row[name]) for name in varied])
         for row in short.to_dict("records")
     ]
+
+
+def thinned(time: FloatArray, values: FloatArray, most: int) -> tuple[FloatArray, FloatArray]:
+    """Lows and highs of as many blocks as a screen can show; short records as they are."""
+    step = -(-len(values) // (most // 2))
+    if step <= 2:
+        return time, values
+    count = len(values) // step
+    blocks = np.ma.masked_invalid(values[: count * step].reshape(count, step))
+    ends = np.stack([blocks.min(axis=1).filled(np.nan), blocks.max(axis=1).filled(np.nan)], axis=1)
+    return np.repeat(time[: count * step : step], 2), ends.ravel()
 
 
 def with_errors(rows: pd.DataFrame, column: str, scale: float) -> tuple[FloatArray, FloatArray]:

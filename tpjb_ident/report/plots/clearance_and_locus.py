@@ -14,33 +14,25 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.clearance.polygon import corners
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
-    DASHED,
-    DOTTED,
-    FONT_SIZE,
     GREY,
     INK,
-    LIGHT,
-    SHORT_DASHED,
-    VARIANT_LABEL,
-    VARIANT_STYLE,
+    MODEL_LABELS,
+    SMALL,
     add_legend,
+    in_house_style,
+    model_styles,
     new_picture,
+    style_of,
 )
 
 if TYPE_CHECKING:
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
 
-_POLYGON_STYLE: tuple[tuple[str, Any], ...] = (
-    ("ink", "-"),
-    ("red", (0, (6, 2, 1, 2))),
-    ("green", SHORT_DASHED),
-    ("purple", DOTTED),
-)
-
 _TWO_SIGMA = 2.4477  # radius of the 95 % region of two normal variables, in standard deviations
 
 
+@in_house_style
 def clearance_and_locus(
     polygons: ClearancePolygon | Mapping[str, ClearancePolygon] | None = None,
     locus: Locus | FloatArray | None = None,
@@ -76,16 +68,19 @@ def clearance_and_locus(
     if drawing is not None:
         angles, clearances = (np.asarray(values) for values in drawing)
         order = np.argsort(angles % (2 * np.pi))  # its pads stand in any order
-        axes.plot(*(per("length") * _closed(corners(angles[order], clearances[order]))).T, color=GREY, linewidth=1.0,
-                  linestyle=DASHED, label="clearance, drawing")  # fmt: skip
-    for (name, polygon), (colour, dashes) in zip(named.items(), _POLYGON_STYLE * len(named), strict=False):
-        _draw_polygon(axes, name, polygon, LIGHT[colour], dashes)
+        _draw_closed(axes, corners(angles[order], clearances[order]), "--", color=GREY, label="clearance, drawing")
+    for number, (name, polygon) in enumerate(named.items()):
+        if not np.isfinite(polygon.corners).all():
+            continue
+        line = {"color": style_of(number)["color"] if number else INK, "linestyle": style_of(number)["linestyle"]}
+        text = "clearance, measured" if name == "measured" else f"clearance, {name}"
+        _draw_closed(axes, polygon.corners, **line, linewidth=1.5, label=text)
+        _draw_closed(axes, corners(polygon.fitted_angle, polygon.clearance_pushed), **line, linewidth=0.6)
     if named:
         _draw_numbers(axes, next(iter(named.values())))
+    styles = model_styles(list(predicted or {}))
     for name, places in (predicted or {}).items():
-        colour, dashes, _ = VARIANT_STYLE.get(name, ("green", (0, (4, 1, 1, 1)), ""))
-        axes.plot(*(per("length") * _closed(np.asarray(places))).T, color=LIGHT[colour],
-                  linestyle=dashes, linewidth=1.5, label=VARIANT_LABEL.get(name, name))  # fmt: skip
+        _draw_closed(axes, places, **styles[name] | {"marker": ""}, label=MODEL_LABELS.get(name, name))
     if locus is not None:
         _draw_locus(axes, locus)
     axes.set_aspect("equal", adjustable="datalim")
@@ -94,13 +89,9 @@ def clearance_and_locus(
     return figure
 
 
-def _draw_polygon(axes: Axes, name: str, polygon: ClearancePolygon, colour: str, dashes: Any) -> None:
-    if not np.isfinite(polygon.corners).all():
-        return
-    text = "clearance, measured" if name == "measured" else f"clearance, {name}"
-    axes.plot(*(per("length") * _closed(polygon.corners)).T, color=colour, linestyle=dashes, linewidth=1.5, label=text)
-    pushed = _closed(corners(polygon.fitted_angle, polygon.clearance_pushed))
-    axes.plot(*(per("length") * pushed).T, color=colour, linestyle=dashes, linewidth=0.6)
+def _draw_closed(axes: Axes, points: FloatArray, *form: str, **look: Any) -> None:
+    """Draw points (n, 2) [m] with a line that ends where it began."""
+    axes.plot(*(per("length") * np.vstack([points, points[:1]])).T, *form, **look)
 
 
 def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
@@ -108,29 +99,20 @@ def _draw_numbers(axes: Axes, polygon: ClearancePolygon) -> None:
     for k, (angle, clearance) in enumerate(zip(polygon.angles, polygon.clearance, strict=True), 1):
         if np.isfinite(clearance):
             toward = np.array([np.cos(angle), np.sin(angle)])
-            axes.annotate(
-                f"#{k}", tuple(per("length") * clearance * toward), xytext=tuple(-10.0 * toward),
-                textcoords="offset points", ha="center", va="center", fontsize=FONT_SIZE - 1, color=INK,
-            )  # fmt: skip
+            axes.annotate(f"#{k}", tuple(per("length") * clearance * toward), tuple(-10.0 * toward),
+                          textcoords="offset points", ha="center", va="center", fontsize=SMALL)  # fmt: skip
 
 
 def _draw_locus(axes: Axes, locus: Locus | FloatArray) -> None:
-    if isinstance(locus, np.ndarray):
-        places = locus
-    else:
-        places = np.array([p.position for p in locus.points]).reshape(-1, 2)
-        for point in locus.points:
-            size, turn = np.linalg.eigh(point.covariance)
-            axes.add_patch(Ellipse(
-                tuple(per("length") * point.position),
-                *(2.0 * per("length") * _TWO_SIGMA * np.sqrt(np.maximum(size, 0.0))),
-                angle=float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))), color=INK, alpha=0.25,
-                linewidth=0,
-            ))  # fmt: skip
+    places = locus
+    if not isinstance(places, np.ndarray):
+        points = places.points
+        places = np.array([point.position for point in points]).reshape(-1, 2)
+        for point in points:
+            variances, directions = np.linalg.eigh(per("length") ** 2 * point.covariance)
+            sides = 2.0 * _TWO_SIGMA * np.sqrt(np.maximum(variances, 0.0))
+            turn = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
+            place = tuple(per("length") * point.position)
+            axes.add_patch(Ellipse(place, *sides, angle=float(turn), color=INK, alpha=0.25, linewidth=0))
     if len(places):
-        axes.plot(*(per("length") * places).T, linestyle="none", marker="o", markersize=4.0, color=INK,
-                  label="locus, measured")  # fmt: skip
-
-
-def _closed(points: FloatArray) -> FloatArray:
-    return np.vstack([points, points[:1]]) if len(points) else points
+        axes.plot(*(per("length") * places).T, "o", markersize=4.0, color=INK, label="locus, measured")

@@ -13,22 +13,20 @@ from matplotlib.figure import Figure
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, size, symbol
 from tpjb_ident.report.drawing.picture import (
-    DASH_DOTTED,
-    DOTTED,
+    ENTRY_STYLES,
     INK,
-    LIGHT,
-    SHORT_DASHED,
-    VARIANT_LABEL,
-    Style,
+    MODEL_LABELS,
     add_legend,
     from_zero,
+    in_house_style,
     label,
+    model_styles,
     new_picture,
     new_pictures,
-    style_of_variant,
+    style_of,
 )
 from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, DIRECT, as_table, axis_of, longest_series, with_errors
-from tpjb_ident.schema import KINDS, STATIC_KEY, coefficient_column
+from tpjb_ident.schema import ENTRIES, KINDS, STATIC_KEY, coefficient_column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,9 +40,10 @@ if TYPE_CHECKING:
 _SMALL = 5.0
 #: A prediction nearer than this [%] is the measurement itself: it sets no scale.
 _EXACT = 1e-3
-_BARS: dict[str, Any] = {"fmt": "o", "color": INK, "markersize": 5, "capsize": 3, "linewidth": 1.2, "zorder": 5}
+_BARS: dict[str, Any] = {"fmt": "o", "color": INK, "zorder": 5, "label": "measured, 95 %"}
 
 
+@in_house_style
 def coefficient(
     comparison: Comparison | pd.DataFrame,
     name: str,
@@ -79,65 +78,54 @@ def coefficient(
     kind = KINDS[name[0]]
     scale, key = kind.display_scale, coefficient_column(name)
     column, axis_scale, axis_label = axis_of(over)
-    measured = series.drop_duplicates(column).dropna(subset=[key]).sort_values(column)
+    series = series.sort_values(column)
+    predicted = series[f"{key}_predicted"]
+    off = 100.0 * (predicted / series[key] - 1.0)
+    series = series.assign(at=series[column] / axis_scale, predicted=predicted / scale, off=off)
+    series["beyond"] = series.get("pivot_extrapolated", False) & (series["pivots"] == "measured")
+    measured = series.drop_duplicates(column).dropna(subset=[key])
     value, errors = with_errors(measured, key, scale)
     shares = 100.0 * errors / np.maximum(np.abs(value), np.finfo(float).tiny)
     apart = len(value) > 0 and float(np.median(shares)) < _SMALL
     figure, grid = new_pictures(2 if apart else 1, 1, title=title, height=(2.3, 1.5) if apart else 3.1)
-    axes = grid[0][0]
+    axes = grid[0, 0]
     label(axes, axis_label, f"{name}, {kind.display_unit}")
-    variants = {str(pivots): rows.sort_values(column) for pivots, rows in series.groupby("pivots", sort=False)}
-    styles = {variant: style_of_variant(variant, list(variants)) for variant in variants}
-    for variant, rows in variants.items():
-        _draw_predicted(axes, rows[f"{key}_predicted"].to_numpy(float) / scale, rows, styles[variant], over)
-    axes.errorbar(measured[column] / axis_scale, value, yerr=errors, label="measured, 95 %", **_BARS)
+    _draw_predictions(axes, series, "predicted")
+    axes.errorbar(measured["at"], value, yerr=errors, **_BARS)
     axes.margins(x=0.06, y=0.1)
     if name in DIRECT:
         from_zero(axes)
     add_legend(axes)
     if apart:
-        below = grid[1][0]
-        label(below, axis_label, "off measured, %")
-        reach = [_draw_deviations(below, rows, styles[variant], key, over) for variant, rows in variants.items()]
-        below.errorbar(measured[column] / axis_scale, np.zeros_like(value), yerr=shares, **_BARS)
-        below.margins(x=0.06)
-        limit = 1.4 * max(float(np.max(shares)), min((r for r in reach if r > _EXACT), default=1.0))
-        below.set_ylim(-limit, limit)
+        label(grid[1, 0], axis_label, "off measured, %")
+        _draw_deviations(grid[1, 0], series, measured["at"], shares)
     return figure
 
 
-def _draw_deviations(axes: Axes, rows: pd.DataFrame, style: Style, key: str, over: str) -> float:
-    """Draw predicted / measured - 1 [%] of one prediction; how far it reaches."""
-    off = 100.0 * (rows[f"{key}_predicted"] / rows[key] - 1.0).to_numpy(float)
-    _draw_predicted(axes, off, rows, style, over)
-    return float(np.max(np.abs(off), where=np.isfinite(off), initial=0.0))
+def _draw_deviations(axes: Axes, series: pd.DataFrame, at: pd.Series, shares: FloatArray) -> None:
+    """Draw predicted / measured - 1 [%], as far as the closest prediction reaches."""
+    _draw_predictions(axes, series, "off")
+    axes.errorbar(at, np.zeros(len(at)), yerr=shares, **_BARS)
+    axes.margins(x=0.06)
+    reach = series["off"].abs().groupby(series["pivots"]).max()
+    limit = 1.4 * max(float(np.max(shares)), reach[reach > _EXACT].min() if (reach > _EXACT).any() else 1.0)
+    axes.set_ylim(-limit, limit)
 
 
-def _draw_predicted(axes: Axes, y: FloatArray, rows: pd.DataFrame, style: Style, over: str) -> None:
-    column, size, _ = axis_of(over)
-    variant, (colour, dashes, marker) = str(rows["pivots"].iloc[0]), style
-    x = rows[column].to_numpy(float) / size
-    line = dashes if len(x) >= CURVE else "none"
-    axes.plot(x, y, color=LIGHT[colour], linestyle=line, linewidth=1.6, marker=marker, markersize=4,
-              label=VARIANT_LABEL.get(variant, variant))  # fmt: skip
-    if variant == "measured" and "pivot_extrapolated" in rows:
-        extrapolated = rows["pivot_extrapolated"].to_numpy(bool)
-        if extrapolated.any():
-            axes.plot(x[extrapolated], y[extrapolated], linestyle="none", marker=marker, markersize=8.5,
-                      color=LIGHT[colour], markerfacecolor="none", label="beyond the dry tests")  # fmt: skip
+def _draw_predictions(axes: Axes, series: pd.DataFrame, column: str) -> None:
+    """Draw one column of every prediction over the places of its points."""
+    predictions = {str(name): rows for name, rows in series.groupby("pivots", sort=False)}
+    styles = model_styles(list(predictions))
+    for name, rows in predictions.items():
+        style = styles[name] | ({} if len(rows) >= CURVE else {"linestyle": "none"})
+        axes.plot(rows["at"], rows[column], **style, markersize=4, label=MODEL_LABELS.get(name, name))
+        beyond = rows[rows["beyond"]]
+        if len(beyond):
+            frame = style | {"linestyle": "none", "markerfacecolor": "none", "markersize": 8.5}
+            axes.plot(beyond["at"], beyond[column], **frame, label="beyond the dry tests")
 
 
-_BEARING_COLOURS = ("blue", "red", "green", "purple")
-
-#: Marker, line and fill of the entry: full lines for the loaded direction.
-_ENTRY_STYLE: dict[str, tuple[str, Any, str | None]] = {
-    "xx": ("s", SHORT_DASHED, "paper"),
-    "yy": ("o", "-", None),
-    "xy": ("<", DOTTED, "paper"),
-    "yx": (">", DASH_DOTTED, "paper"),
-}
-
-
+@in_house_style
 def direct_coefficients(
     bearings: Mapping[str, Identification | pd.DataFrame],
     part: Literal["k", "c"] = "k",
@@ -169,22 +157,17 @@ def direct_coefficients(
     column, axis_scale, axis_label = axis_of(over)
     figure, axes = new_picture(axis_label, f"{kind.quantity}, {kind.display_unit}", title=title)
     drawn = False
-    for (name, source), colour in zip(bearings.items(), _BEARING_COLOURS * len(bearings), strict=False):
+    for number, (name, source) in enumerate(bearings.items()):
         series = longest_series(as_table(source), over)
         if series is None:
             continue
         drawn = True
         rows = series.drop_duplicates(column).sort_values(column)
         for entry in entries:
-            marker, dashes, face = _ENTRY_STYLE[entry]
-            key = kind.column(entry)
-            value, errors = with_errors(rows, key, kind.display_scale)
-            axes.errorbar(
-                rows[column] / axis_scale, value, yerr=errors, marker=marker,
-                markersize=5, markerfacecolor=LIGHT[face or colour], color=LIGHT[colour],
-                linestyle=dashes if len(rows) >= CURVE else "none",
-                linewidth=1.3, capsize=3, label=f"{name}, {part}{entry}",
-            )  # fmt: skip
+            style = ENTRY_STYLES[entry] | {"color": style_of(number)["color"]}
+            style |= {} if len(rows) >= CURVE else {"linestyle": "none"}
+            value, errors = with_errors(rows, kind.column(entry), kind.display_scale)
+            axes.errorbar(rows[column] / axis_scale, value, yerr=errors, **style, label=f"{name}, {part}{entry}")
     if not drawn:
         raise ValueError(f"no bearing was measured at two points over {over}: give a campaign with a series over it")
     axes.margins(x=0.06)
@@ -194,9 +177,7 @@ def direct_coefficients(
     return figure
 
 
-_FRF_STYLE = {"xx": ("blue", "o"), "yy": ("red", "s"), "xy": ("green", "^"), "yx": ("ink", "v")}
-
-
+@in_house_style
 def frf(
     source: BandResult | Identification | pd.DataFrame,
     *,
@@ -220,33 +201,38 @@ def frf(
     ValueError
         No line, an unknown entry, or the rows of several operating points.
     """
-    unknown = [entry for entry in entries if entry not in _FRF_STYLE]
-    if unknown or not entries:
-        raise ValueError(f"entries must be some of {', '.join(_FRF_STYLE)}; got {entries}")
+    if not entries or not set(entries) <= set(ENTRIES):
+        raise ValueError(f"entries must be some of {', '.join(ENTRIES)}; got {entries}")
     table, model = _frf_rows(source)
     if table is None or not len(table):
         raise ValueError("there is no line to draw, or no two excitation frequencies at one load")
     over_band = "coherence_x" in table
     if over_band and table.filter([*STATIC_KEY, "excitation"]).nunique().max() > 1:
         raise ValueError("the table holds several operating points; give the rows of one")
-    figure, ((real,), (imag,), *below) = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
-    for axes, part, name in ((real, "real", "Re h"), (imag, "imag", "Im h")):
-        label(axes, "frequency, Hz", f"{name}, {symbol('stiffness')}")
+    figure, grid = new_pictures(3 if over_band else 2, 1, title=title, height=2.3)
+    for axes, part in zip(grid[:2, 0], ("real", "imag"), strict=True):
+        label(axes, "frequency, Hz", f"{part.capitalize()[:2]} h, {symbol('stiffness')}")
         for entry in entries:
-            _draw_measured(axes, table, f"h{entry}_{part}_N_per_m", entry)
-            _draw_model(axes, model, entry, part, label=entry == entries[0])
+            value, errors = with_errors(table, f"h{entry}_{part}_N_per_m", size("stiffness"))
+            style = ENTRY_STYLES[entry] | {"linestyle": "none", "markersize": 3, "capsize": 1.5, "linewidth": 0.8}
+            axes.errorbar(table["excitation_Hz"], value, yerr=errors, **style, label=f"h{entry}, 95 %")
+            if model is not None:
+                f = np.linspace(*model.band, 200)
+                h = model.h(2 * np.pi * f)[:, "xy".index(entry[0]), "xy".index(entry[1])]
+                name = model.model if entry == entries[0] else None
+                axes.plot(f, getattr(h, part) * per("stiffness"), color=style["color"], label=name)
         axes.margins(x=0.05, y=0.1)
-    add_legend(real)
-    for (axes,) in below:
-        _draw_coherence(axes, table)
+    add_legend(grid[0, 0])
+    if over_band:
+        _draw_coherence(grid[2, 0], table)
     return figure
 
 
 def _draw_coherence(axes: Axes, table: pd.DataFrame) -> None:
     label(axes, "frequency, Hz", "multiple coherence")
-    for axis, colour, dashes in (("x", "blue", "-"), ("y", "red", SHORT_DASHED)):
-        axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], color=LIGHT[colour], linestyle=dashes,
-                  linewidth=1.2, label=f"force along {axis}")  # fmt: skip
+    for number, axis in enumerate("xy"):
+        style = style_of(number) | {"marker": ""}
+        axes.plot(table["excitation_Hz"], table[f"coherence_{axis}"], **style, label=f"force along {axis}")
     axes.set_ylim(min(0.9, 0.98 * float(table[["coherence_x", "coherence_y"]].min().min())), 1.01)
     axes.margins(x=0.05)
     add_legend(axes)
@@ -278,7 +264,7 @@ def _rows_of_sines(series: pd.DataFrame | None) -> pd.DataFrame | None:
     rows = series.drop_duplicates("excitation_Hz").sort_values("excitation_Hz", kind="stable")
     omega = 2 * np.pi * rows["excitation_Hz"]
     columns = {}
-    for entry, end in itertools.product(_FRF_STYLE, ("", "_lo", "_hi")):
+    for entry, end in itertools.product(ENTRIES, ("", "_lo", "_hi")):
         columns[f"h{entry}_real_N_per_m{end}"] = rows[f"k{entry}_N_per_m{end}"]
         columns[f"h{entry}_imag_N_per_m{end}"] = rows[f"c{entry}_Ns_per_m{end}"] * omega
     return rows[["excitation_Hz"]].assign(**columns)
@@ -294,23 +280,3 @@ def _model_of_sines(source: Identification, series: pd.DataFrame | None) -> Freq
         if fit is not None and group.points[0].point.static_key == wanted:
             return fit
     return None
-
-
-def _draw_measured(axes: Axes, table: pd.DataFrame, column: str, entry: str) -> None:
-    colour, marker = _FRF_STYLE[entry]
-    value, errors = with_errors(table, column, size("stiffness"))
-    axes.errorbar(
-        table["excitation_Hz"], value, yerr=errors, fmt=marker, color=LIGHT[colour],
-        markersize=3, capsize=1.5, linewidth=0.8, linestyle="none", label=f"h{entry}, 95 %",
-    )  # fmt: skip
-
-
-def _draw_model(axes: Axes, model: FrequencyModel | None, entry: str, part: str, label: bool) -> None:
-    """The model over the band as a line."""
-    if model is None:
-        return
-    f = np.linspace(*model.band, 200)
-    i, j = ("xy".index(letter) for letter in entry)
-    h = model.h(2 * np.pi * f)[:, i, j]
-    values = (h.real if part == "real" else h.imag) * per("stiffness")
-    axes.plot(f, values, color=LIGHT[_FRF_STYLE[entry][0]], linewidth=1.4, label=model.model if label else None)

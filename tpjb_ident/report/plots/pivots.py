@@ -15,19 +15,19 @@ from numpy.typing import ArrayLike
 from rigdata.arrays import FloatArray
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
-    DASHED,
-    DOTTED,
-    FONT_SIZE,
     GREY,
     INK,
     PAPER,
+    RULE,
+    SMALL,
+    Style,
     add_legend,
     from_zero,
+    in_house_style,
     label,
-    mark_extrapolated,
     new_picture,
     new_pictures,
-    style_of_pad,
+    style_of,
 )
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 _LAW_POINTS = 200
 
 
+@in_house_style
 def load_deflection(
     curves: PivotCurve | Sequence[PivotCurve],
     *,
@@ -73,40 +74,37 @@ def load_deflection(
 
 
 def _draw_steps(axes: Axes, curve: PivotCurve) -> None:
-    colour, _, marker = style_of_pad(curve.pad)
-    steps = curve.steps
+    steps, style = curve.steps, style_of(curve.pad - 1) | {"linestyle": "none"}
     deflection, load = per("length") * steps.deflection, per("load") * steps.load
+    errors = 1.96 * per("length") * steps.deflection_se
+    used = steps.weight > 0
     for mask, face, name in (
-        ((steps.weight > 0) & (steps.branch > 0), colour, f"pad #{curve.pad}, {curve.law.name}"),
-        ((steps.weight > 0) & (steps.branch < 0), PAPER, f"pad #{curve.pad}, unloading"),
+        (used & (steps.branch > 0), style["color"], f"pad #{curve.pad}, {curve.law.name}"),
+        (used & (steps.branch < 0), PAPER, f"pad #{curve.pad}, unloading"),
     ):
         if mask.any():
-            axes.errorbar(
-                deflection[mask], load[mask], xerr=1.96 * per("length") * steps.deflection_se[mask],
-                fmt=marker, color=colour, markerfacecolor=face, markersize=4.5, linewidth=0.9, capsize=0, label=name,
-                zorder=4,
-            )  # fmt: skip
-    bad = steps.weight == 0
-    if bad.any():
-        axes.plot(deflection[bad], load[bad], linestyle="none", marker="x", markersize=6,
-                  color=INK, label="step left out", zorder=5)  # fmt: skip
+            axes.errorbar(deflection[mask], load[mask], xerr=errors[mask], **style, markerfacecolor=face, label=name,
+                          capsize=0, zorder=4)  # fmt: skip
+    if not used.all():
+        axes.plot(deflection[~used], load[~used], "x", color=INK, label="step left out", zorder=5)
 
 
 def _draw_law(axes: Axes, curve: PivotCurve, top: float) -> None:
     """The law, its band, and the way into contact."""
-    colour, _, _ = style_of_pad(curve.pad)
+    colour = style_of(curve.pad - 1)["color"]
     load = np.linspace(0.0, top, _LAW_POINTS)[1:]
+    shown = load * per("load")
     reading, low, high = (per("length") * part for part in curve.reading_band(load))
-    measured = ~curve.is_extrapolated(load)
-    axes.fill_betweenx(load * per("load"), low, high, color=colour, alpha=0.25, linewidth=0)
     deflection = per("length") * curve.deflection(load)
-    axes.plot(deflection, load * per("load"), color=colour, linestyle=DOTTED, linewidth=1.2)
-    axes.plot(np.where(measured, deflection, np.nan), load * per("load"), color=colour, linewidth=1.5)
+    axes.fill_betweenx(shown, low, high, color=colour, alpha=0.25, linewidth=0)
+    axes.plot(deflection, shown, ":", color=colour)
+    axes.plot(np.where(curve.is_extrapolated(load), np.nan, deflection), shown, color=colour)
     if curve.law.contact:
         coming = load <= max(curve.onset_load, load[0])
-        axes.plot(reading[coming], load[coming] * per("load"), color=colour, linewidth=0.7)
+        axes.plot(reading[coming], shown[coming], color=colour, linewidth=0.7)
 
 
+@in_house_style
 def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) -> Figure:
     """Draw measured load and displacement vectors of every pad's test beside their projection (the paper's Fig. 10).
 
@@ -131,43 +129,38 @@ def pad_projection(curves: Sequence[PivotCurve], *, title: str | None = None) ->
     for curve in curves:
         steps = curve.steps
         used = steps.weight > 0
-        load, across_load = steps.load[used] * per("load"), steps.across_load[used] * per("load")
-        move, across = per("length") * steps.deflection[used], per("length") * steps.across_deflection[used]
-        _draw_vectors(forces, curve, load, across_load, curve.load_direction.angle)
-        _draw_vectors(places, curve, move, across, curve.displacement_direction.angle)
+        loads = np.column_stack([steps.load, steps.across_load])[used] * per("load")
+        moves = np.column_stack([steps.deflection, steps.across_deflection])[used] * per("length")
+        _draw_vectors(forces, curve, loads, curve.load_direction.angle)
+        _draw_vectors(places, curve, moves, curve.displacement_direction.angle)
     label(forces, f"horizontal load, {symbol('load')}", f"vertical load, {symbol('load')}", "static load")
     label(places, f"x, {symbol('length')}", f"y, {symbol('length')}", "displacement, shaft against housing")
-    for axes in (forces, places):
-        reach = 1.45 * max(float(np.max(np.abs(line.get_xydata()))) for line in axes.get_lines()) / 1.12
-        axes.set_xlim(-reach, reach)
-        axes.set_ylim(-reach, reach)
-        axes.set_aspect("equal", adjustable="box")
+    marks: Style = {"marker": "o", "linestyle": "none", "color": INK}
     handles = [
-        Line2D([], [], marker="o", linestyle="none", color=INK, markerfacecolor="none", label="measured"),
-        Line2D([], [], marker="o", linestyle="none", color=INK, label="on the pad's direction"),
+        Line2D([], [], **marks, markerfacecolor="none", label="measured"),
+        Line2D([], [], **marks, label="on the pad's direction"),
     ]
     for axes in (forces, places):
-        add_legend(axes, 2, handles)
+        reach = 1.3 * max(float(np.max(np.abs(line.get_xydata()))) for line in axes.get_lines())
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        axes.set_aspect("equal", adjustable="box")
+        add_legend(axes, handles)
     return figure
 
 
-def _draw_vectors(axes: Axes, curve: PivotCurve, along: FloatArray, across: FloatArray, off: float) -> None:
-    """One pad's points, measured and projected, and its direction."""
-    colour, _, marker = style_of_pad(curve.pad)
+def _draw_vectors(axes: Axes, curve: PivotCurve, vectors: FloatArray, off: float) -> None:
+    """One pad's points (n, 2) along and across its direction, measured and projected, and the direction."""
     axis = np.array([math.cos(curve.angle), math.sin(curve.angle)])
-    side = np.array([-axis[1], axis[0]])
-    projected = np.outer(along, axis)
-    measured = projected + np.outer(across, side)
-    end = 1.12 * float(np.max(along)) * axis
-    axes.plot([0.0, end[0]], [0.0, end[1]], color=GREY, linestyle=(0, (5, 3)), linewidth=0.9, zorder=1)
-    axes.plot(*measured.T, linestyle="none", marker=marker, markersize=5.5, markerfacecolor="none",
-              markeredgewidth=1.0, color=colour)  # fmt: skip
-    axes.plot(*projected.T, linestyle="none", marker=marker, markersize=3.0, color=colour)
+    projected = np.outer(vectors[:, 0], axis)
+    measured = projected + np.outer(vectors[:, 1], [-axis[1], axis[0]])
+    end = 1.12 * float(np.max(vectors[:, 0])) * axis
+    axes.plot([0.0, end[0]], [0.0, end[1]], "--", color=GREY, linewidth=0.9, zorder=1)
+    style = style_of(curve.pad - 1) | {"linestyle": "none"}
+    axes.plot(*measured.T, **style, markersize=5.5, markerfacecolor="none")
+    axes.plot(*projected.T, **style, markersize=3.0)
     text = f"#{curve.pad}\n{math.degrees(off):+.1f}°"
-    axes.annotate(
-        text, (end[0], end[1]), xytext=(12.0 * axis[0], 12.0 * axis[1]), textcoords="offset points", ha="center",
-        va="center", fontsize=FONT_SIZE - 1, color=INK,
-    )  # fmt: skip
+    axes.annotate(text, tuple(end), tuple(12.0 * axis), textcoords="offset points", ha="center", va="center",
+                  fontsize=SMALL)  # fmt: skip
 
 
 Formula = Callable[[int, float], tuple[float, float]]
@@ -177,6 +170,7 @@ _STIFFNESS_POINTS = 120
 _LOWEST = 0.04  # of the largest load: Hertz's stiffness has no value at zero
 
 
+@in_house_style
 def pivot_stiffness(
     curves: Sequence[PivotCurve],
     formula: Formula | None = None,
@@ -207,28 +201,31 @@ def pivot_stiffness(
     figure, axes = new_picture(
         f"load on the pad, {symbol('load')}", f"tangent stiffness, {symbol('stiffness')}", title=title
     )
+    shown = grid * per("load")
     for curve in curves:
         _draw_stiffness(axes, curve, grid)
     if formula is not None:
         printed = np.array([formula(curves[0].pad, float(load)) for load in grid]) * per("stiffness")
-        axes.plot(grid * per("load"), printed[:, 1], color=INK, linewidth=1.3, label="Kirk, tangent")
-        axes.plot(grid * per("load"), printed[:, 0], color=INK, linewidth=1.3, linestyle=DASHED,
-                  label="Kirk, printed")  # fmt: skip
+        axes.plot(shown, printed[:, 1], color=INK, label="Kirk, tangent")
+        axes.plot(shown, printed[:, 0], "--", color=INK, label="Kirk, printed")
     axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, float(grid[-1]) * per("load"))
-    mark_extrapolated(axes, top * per("load"))
+    axes.set_xlim(0.0, shown[-1])
+    if grid[-1] > top:
+        start = top * per("load")
+        axes.axvspan(start, shown[-1], color=RULE, alpha=0.35, linewidth=0, zorder=0)
+        axes.text(start, 0.02, " extrapolated", transform=axes.get_xaxis_transform(), fontsize=SMALL, color=GREY)
     add_legend(axes)
     return figure
 
 
 def _draw_stiffness(axes: Axes, curve: PivotCurve, grid: FloatArray) -> None:
-    colour, dashes, _ = style_of_pad(curve.pad)
+    style = style_of(curve.pad - 1) | {"marker": ""}
     value, band = curve.stiffness(grid) * per("stiffness"), curve.stiffness_band(grid)
     outside = curve.is_extrapolated(grid)
-    low, high = (np.where(outside, np.nan, b * per("stiffness")) for b in band)
-    axes.fill_between(grid * per("load"), low, high, color=colour, alpha=0.2, linewidth=0)
-    axes.plot(grid * per("load"), np.where(outside, np.nan, value), color=colour, linestyle=dashes, linewidth=1.7,
-              label=f"pad #{curve.pad}")  # fmt: skip
+    shown, low, high = (np.where(outside, np.nan, part) for part in (value, *(b * per("stiffness") for b in band)))
+    load = grid * per("load")
+    axes.fill_between(load, low, high, color=style["color"], alpha=0.2, linewidth=0)
+    axes.plot(load, shown, **style, linewidth=1.7, label=f"pad #{curve.pad}")
     # one point of overlap, so that the two lines meet
     extrapolated = np.where(outside | np.roll(outside, 1) | np.roll(outside, -1), value, np.nan)
-    axes.plot(grid * per("load"), extrapolated, color=colour, linestyle=(0, (1, 2)), linewidth=0.9)
+    axes.plot(load, extrapolated, color=style["color"], linestyle=(0, (1, 2)), linewidth=0.9)

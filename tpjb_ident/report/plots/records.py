@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.lib.stride_tricks import sliding_window_view
 
 from rigdata.arrays import FloatArray
 from rigdata.survey.spectrum import amplitude_spectrum
 from tpjb_ident.columns import per, symbol
 from tpjb_ident.report.drawing.picture import (
     BLUE,
-    DASHED,
-    FONT_SIZE,
     GREY,
     INK,
-    LIGHT,
     PAPER,
+    RED,
     RULE,
-    SHORT_DASHED,
+    SMALL,
     add_legend,
+    in_house_style,
     label,
+    logarithmic,
     new_picture,
     new_pictures,
+    style_of,
 )
 from tpjb_ident.report.drawing.series import as_table, set_point_ticks
+from tpjb_ident.rounding import listed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = 4000
 
 
+@in_house_style
 def orbit(run: Run, *, title: str | None = None) -> Figure:
     """Draw the shaft's path about its mean position, and the ellipse at the excitation frequency.
 
@@ -63,16 +66,16 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
     path = per("length") * (path - np.median(path[good], axis=0))
     figure, axes = new_picture(f"x, {symbol('length')}", f"y, {symbol('length')}", title=title)
     shown = path[:_MOST_SAMPLES]
-    axes.plot(shown[:, 0], shown[:, 1], color=GREY, linewidth=0.5, label="as measured")
+    axes.plot(*shown.T, color=GREY, linewidth=0.5, label="as measured")
     drive = run.point.excitation
     if drive:
-        time = np.asarray(record.time, float)[good]
-        waves = np.column_stack([np.ones_like(time), np.cos(drive * time), np.sin(drive * time)])
+        turns = drive * np.asarray(record.time, float)[good]
+        waves = np.column_stack([np.ones_like(turns), np.cos(turns), np.sin(turns)])
         _, cosine, sine = np.linalg.lstsq(waves, path[good], rcond=None)[0]
         turn = np.linspace(0.0, 2.0 * np.pi, 181)
         ellipse = np.outer(np.cos(turn), cosine) + np.outer(np.sin(turn), sine)
         name = f"at the excitation, {run.point.excitation_hz:g} Hz"
-        axes.plot(ellipse[:, 0], ellipse[:, 1], color=BLUE, linewidth=1.8, label=name)
+        axes.plot(*ellipse.T, color=BLUE, linewidth=1.8, label=name)
     axes.set_aspect("equal", adjustable="datalim")
     add_legend(axes)
     return figure
@@ -80,9 +83,7 @@ def orbit(run: Run, *, title: str | None = None) -> Figure:
 
 #: Quantity, how its amplitude is named, and its display unit in SI.
 _ROWS = (("displacement", "length"), ("force", "force"))
-
-_AXIS_STYLE: tuple[tuple[str, str, Any], ...] = (("horizontal", "blue", "-"), ("vertical", "red", DASHED))
-
+_AXES = ("horizontal", "vertical")
 #: Bins of a window's foot below which there is drift, not vibration.
 _DRIFT = 4
 
@@ -92,6 +93,13 @@ def _highest(run: Run, up_to: float | None, rate: float) -> float:
     return up_to or 4.0 * run.point.excitation_hz or 0.5 * rate
 
 
+def _mark_excitation(axes: Axes, run: Run) -> None:
+    hz = run.point.excitation_hz
+    if hz:
+        axes.axvline(hz, color=GREY, linewidth=0.9, zorder=0, label=f"excitation, {hz:g} Hz")
+
+
+@in_house_style
 def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -> Figure:
     """Draw the amplitudes of displacement and force over frequency (Hann window over the whole record).
 
@@ -113,30 +121,25 @@ def spectra(run: Run, *, up_to: float | None = None, title: str | None = None) -
     ValueError
         When the run is too short, or empty.
     """
-    drive, top = run.point.excitation_hz, _highest(run, up_to, run.sample_rate)
     figure, grid = new_pictures(2, 1, title=title, height=2.3)
-    for (axes,), (quantity, unit) in zip(grid, _ROWS, strict=True):
+    top = _highest(run, up_to, run.sample_rate)
+    for axes, (quantity, unit) in zip(grid[:, 0], _ROWS, strict=True):
         label(axes, "frequency, Hz", f"{quantity}, 0-peak, {symbol(unit)}")
-        largest = 0.0
         record = run.vector(quantity)
-        for values, (axis, colour, dashes) in zip(record.values.T, _AXIS_STYLE, strict=True):
-            frequency, amplitude = amplitude_spectrum(values * per(unit), record.rate)
+        largest = 0.0
+        for number, axis in enumerate(_AXES):
+            frequency, amplitude = amplitude_spectrum(record.values[:, number] * per(unit), record.rate)
             shown = (frequency <= top) & (np.arange(len(frequency)) >= _DRIFT)
             if not shown.any():
                 raise ValueError(f"run {run.id} has no spectrum of {quantity} up to {top:g} Hz")
-            axes.plot(frequency[shown], amplitude[shown], color=LIGHT[colour], linestyle=dashes, linewidth=1.0,
-                      label=axis)  # fmt: skip
+            style = style_of(number) | {"marker": "", "linewidth": 1.0}
+            axes.plot(frequency[shown], amplitude[shown], **style, label=axis)
             largest = max(largest, float(amplitude[shown].max()))
-        axes.set_yscale("log")
-        axes.minorticks_off()
-        axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
+        logarithmic(axes)
         axes.set_xlim(0.0, top)
         axes.set_ylim(top=3.0 * largest)
-        if drive:
-            axes.axvline(drive, color=GREY, linewidth=0.9, zorder=0)
-            axes.annotate(f"{drive:g} Hz", (drive, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -2),
-                          textcoords="offset points", va="top", fontsize=FONT_SIZE - 1, color=INK)  # fmt: skip
-    add_legend(grid[0][0])
+        _mark_excitation(axes, run)
+    add_legend(grid[0, 0])
     return figure
 
 
@@ -144,6 +147,7 @@ _FEWEST_SEGMENTS = 5
 _LEVEL = 0.95
 
 
+@in_house_style
 def coherence_spectrum(
     run: Run, *, up_to: float | None = None, segment: float | None = None, title: str | None = None
 ) -> Figure:
@@ -174,20 +178,16 @@ def coherence_spectrum(
     if piece < 16 or n < _FEWEST_SEGMENTS * piece // 2:
         raise ValueError(f"run {run.id} has {n} samples: too few for segments of {piece}; give a shorter segment")
     frequency, value, averages = _multiple_coherence(force, move, rate, piece)
-    drive, top = run.point.excitation_hz, _highest(run, up_to, rate)
     figure, axes = new_picture("frequency, Hz", "multiple coherence", title=title)
-    for row, (axis, colour, dashes) in zip(value, _AXIS_STYLE, strict=True):
-        axes.plot(frequency, row, color=LIGHT[colour], linestyle=dashes, linewidth=1.3, label=f"{axis} force")
+    for number, (axis, row) in enumerate(zip(_AXES, value, strict=True)):
+        axes.plot(frequency, row, **style_of(number) | {"marker": ""}, label=f"{axis} force")
     # under no coherence at all, two inputs and m averages: Beta(2, m - 2)
     from scipy.special import betaincinv
 
     chance = float(betaincinv(2, max(averages - 2, 1), _LEVEL))
-    axes.axhline(chance, color=INK, linestyle=SHORT_DASHED, linewidth=0.9, label="by chance, 95 %")
-    if drive:
-        axes.axvline(drive, color=GREY, linewidth=0.9)
-        axes.text(drive, 0.03, f" {drive:g} Hz", color=INK, fontsize=FONT_SIZE - 1, va="bottom")
-    axes.set_xlim(0.0, top)
-    axes.set_ylim(0.0, 1.02)
+    axes.axhline(chance, color=INK, linestyle=":", linewidth=0.9, label="by chance, 95 %")
+    axes.set(xlim=(0.0, _highest(run, up_to, rate)), ylim=(0.0, 1.02))
+    _mark_excitation(axes, run)
     add_legend(axes)
     return figure
 
@@ -199,21 +199,23 @@ def _multiple_coherence(
     good = np.isfinite(force).all(axis=1) & np.isfinite(move).all(axis=1)
     signals = np.column_stack([move, force])
     signals = np.where(np.asarray(good)[:, None], signals, signals[good].mean(axis=0))
-    pieces = sliding_window_view(signals, piece, axis=0)[:: piece // 2]
-    spectra = np.fft.rfft((pieces - pieces.mean(axis=-1, keepdims=True)) * np.hanning(piece))
-    cross = np.einsum("kif,kjf->fij", spectra.conj(), spectra)
+    from scipy.signal import csd
+
+    frequency, cross = csd(signals.T[:, None], signals.T[None], rate, "hann", piece, detrend="constant")
+    cross = np.moveaxis(cross, -1, 0)
     inputs, joint, power = cross[:, :2, :2], cross[:, :2, 2:], np.einsum("fii->fi", cross[:, 2:, 2:]).real
     explained = np.einsum("fij,fij->fj", joint.conj(), np.linalg.pinv(inputs, rcond=1e-10, hermitian=True) @ joint).real
     value = np.clip(explained / np.maximum(power, 1e-300), 0.0, 1.0)
     # half-overlapping Hann windows: about 11/9 of the pieces that fit side by side count as independent
-    averages = max(math.floor(11.0 / 18.0 * len(spectra)), 3)
-    return np.asarray(np.fft.rfftfreq(piece, 1.0 / rate), float), np.asarray(value.T, float), averages
+    pieces = (len(signals) - piece) // (piece - piece // 2) + 1
+    return np.asarray(frequency, float), np.asarray(value.T, float), max(math.floor(11.0 / 18.0 * pieces), 3)
 
 
 _FLAGGED = 0.9
 _SMALLEST = 1e-7
 
 
+@in_house_style
 def coherence(identification: Identification | pd.DataFrame, *, title: str | None = None) -> Figure:
     """Draw what part of the force the displacements do not explain, 1 - coherence, for every operating point.
 
@@ -238,13 +240,11 @@ def coherence(identification: Identification | pd.DataFrame, *, title: str | Non
     figure, axes = new_picture(place, "1 - coherence", title=title, width=width, height=3.4)
     low = unexplained > 1.0 - _FLAGGED
     at = np.arange(len(rows))
-    for mask, colour, marker, name in ((~low, "blue", "o", "operating point"), (low, "red", "X", "flagged")):
+    for mask, colour, marker, name in ((~low, BLUE, "o", "operating point"), (low, RED, "X", "flagged")):
         if mask.any():
-            axes.plot(at[mask], unexplained[mask], linestyle="none", marker=marker, markersize=6, color=LIGHT[colour],
-                      label=name)  # fmt: skip
-    axes.axhline(1.0 - _FLAGGED, color=INK, linestyle=DASHED, linewidth=1.0, label="flagged above")
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")  # powers of ten are set by a parser that takes longer than the picture
+            axes.plot(at[mask], unexplained[mask], marker, markersize=6, color=colour, label=name)
+    axes.axhline(1.0 - _FLAGGED, color=INK, linestyle="--", linewidth=1.0, label="flagged above")
+    logarithmic(axes)
     axes.set_ylim(0.5 * float(unexplained.min()), 1.0)
     set_point_ticks(axes, rows)
     axes.grid(axis="x", visible=False)
@@ -256,6 +256,7 @@ _REJECTED = 0.3
 _NAMED = 6  # rejected windows that are named in the picture
 
 
+@in_house_style
 def window_weights(result: PointResult | DynamicStiffness, *, title: str | None = None) -> Figure:
     """Draw the final weight of every record window, 1 fully used, 0 thrown out.
 
@@ -271,26 +272,20 @@ def window_weights(result: PointResult | DynamicStiffness, *, title: str | None 
         raise ValueError("the estimate has no windows")
     figure, axes = new_picture("window, in the order of the runs", "robust weight", title=title, width=6.4)
     at = np.arange(1, len(weights) + 1)
-    equal_weights = bool(np.allclose(weights[:, 0], weights[:, 1], equal_nan=True))
-    for axis, colour, marker, name in ((0, "blue", "o", "horizontal force"), (1, "red", "s", "vertical force")):
-        if equal_weights and axis:
-            break
-        values = weights[:, axis]
-        axes.vlines(at, 0.0, values, color=LIGHT[colour], linewidth=0.6, alpha=0.5)
-        axes.plot(
-            at, values, linestyle="none", marker=marker, markersize=3.5 if axis else 4.5, color=LIGHT[colour],
-            markerfacecolor=LIGHT[colour if axis else "paper"], label="both forces" if equal_weights else name,
-        )  # fmt: skip
-    axes.axhline(_REJECTED, color=INK, linestyle=DASHED, linewidth=0.9, label="counted as outlier below")
-    axes.set_ylim(-0.03, 1.08)
-    axes.set_xlim(0.0, len(weights) + 1)
+    names = ["horizontal force", "vertical force"]
+    if np.allclose(weights[:, 0], weights[:, 1], equal_nan=True):
+        names = ["both forces"]
+    for number, name in enumerate(names):
+        style = style_of(number) | {"linestyle": "none", "markersize": 4.5 - number}
+        axes.vlines(at, 0.0, weights[:, number], color=style["color"], linewidth=0.6, alpha=0.5)
+        face = style["color"] if number else PAPER
+        axes.plot(at, weights[:, number], **style, markerfacecolor=face, label=name)
+    axes.axhline(_REJECTED, color=INK, linestyle="--", linewidth=0.9, label="counted as outlier below")
+    axes.set(xlim=(0.0, len(weights) + 1), ylim=(-0.03, 1.08))
     rejected = sorted(getattr(result, "rejected", ()), key=lambda w: w.weight)
     if rejected:
-        words = [f"{w.run} at {w.time:.2f} s: {w.reason}" for w in rejected[:_NAMED]]
-        if len(rejected) > _NAMED:
-            words.append(f"and {len(rejected) - _NAMED} more")
+        words = listed([f"{w.run} at {w.time:.2f} s: {w.reason}" for w in rejected], _NAMED, "\n")
         box = {"facecolor": PAPER, "edgecolor": RULE, "alpha": 0.85}
-        axes.text(0.015, 0.42, "\n".join(words), transform=axes.transAxes, fontsize=FONT_SIZE - 1.0, color=INK,
-                  va="bottom", bbox=box)  # fmt: skip
+        axes.text(0.015, 0.42, words, transform=axes.transAxes, fontsize=SMALL, va="bottom", bbox=box)
     add_legend(axes)
     return figure

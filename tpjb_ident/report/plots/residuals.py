@@ -19,28 +19,30 @@ from tpjb_ident.columns import symbol
 from tpjb_ident.compare.effect_words import label_in_words
 from tpjb_ident.diagnosis.observations.gap import gap_at, residuals
 from tpjb_ident.report.drawing.picture import (
+    BLUE,
     CHARACTER,
-    DASH_DOTTED,
     DIVERGING,
-    DOTTED,
-    FONT_SIZE,
     INK,
     LEFT,
     LIGHT,
+    MODEL_LABELS,
     PAPER,
     RED,
     RULE,
     SEQUENTIAL,
-    SHORT_DASHED,
-    VARIANT_LABEL,
+    SMALL,
+    Style,
     add_colour_bar,
     add_legend,
+    in_house_style,
     label,
     new_picture,
     new_pictures,
     shrink,
+    style_of,
 )
 from tpjb_ident.report.drawing.series import COEFFICIENTS, CURVE, as_table, axis_of, longest_series, set_point_ticks
+from tpjb_ident.rounding import plain
 from tpjb_ident.schema import POINT_KEY, coefficient_column
 
 if TYPE_CHECKING:
@@ -103,6 +105,7 @@ _HEIGHT = 2.9
 _LINEAR = 2.0  # within two standard deviations the colour hardly changes: that is noise
 
 
+@in_house_style
 def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | None = None) -> Figure:
     """Draw (measured - predicted) / sigma as a heat map: coefficients by rows, operating points by columns.
 
@@ -127,7 +130,7 @@ def residual_map(source: Diagnosis | Comparison | pd.DataFrame, *, title: str | 
     limit = max(float(np.nanmax(np.abs(frame["z"].to_numpy(float)))), 3.0 * _LINEAR)
     norm = SymLogNorm(linthresh=_LINEAR, linscale=0.6, vmin=-limit, vmax=limit, base=10)
     for (axes,), model in zip(grid, models, strict=True):
-        _draw_map(axes, frame[frame["model"] == model], points, norm, VARIANT_LABEL.get(model, str(model)))
+        _draw_map(axes, frame[frame["model"] == model], points, norm, MODEL_LABELS.get(model, str(model)))
     return figure
 
 
@@ -136,31 +139,28 @@ def _draw_map(axes: Axes, frame: pd.DataFrame, points: pd.DataFrame, norm: Any, 
     table = cells.reindex(index=COEFFICIENTS, columns=pd.MultiIndex.from_frame(points)).to_numpy()
     size = float(np.sqrt(np.nanmean(table**2)))
     label(axes, f"static load, {symbol('load')}, and excitation, Hz", "", f"{name}: root mean square {size:.3g} sigma")
-    image = axes.imshow(table, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
+    image = axes.imshow(table, cmap=DIVERGING, norm=norm)
     axes.grid(False)
     axes.set_yticks(range(len(COEFFICIENTS)), COEFFICIENTS)
     set_point_ticks(axes, points)
     axes.axhline(3.5, color=INK, linewidth=0.8)
     for (i, j), z in np.ndenumerate(table):
         if np.isfinite(z):
-            strong = abs(norm(z) - 0.5) > 0.3
-            text = f"{z:.0f}" if abs(z) >= 9.95 else f"{z:.1f}".replace("-0.0", "0.0")
-            axes.text(j, i, text, ha="center", va="center", fontsize=FONT_SIZE - 1.0,
-                      color="white" if strong else _ON_COLOUR)  # fmt: skip
-    add_colour_bar(axes, image, "(measured - predicted) / sigma")
-    bar = axes.figure.axes[-1]
+            colour = "white" if abs(norm(z) - 0.5) > 0.3 else _ON_COLOUR
+            axes.text(
+                j, i, plain(z, 0 if abs(z) >= 9.95 else 1), ha="center", va="center", fontsize=SMALL, color=colour
+            )
+    bar = add_colour_bar(axes, image, "(measured - predicted) / sigma")
     ticks = [t for t in (-1000, -100, -30, -10, -2, 0, 2, 10, 30, 100, 1000) if abs(t) <= norm.vmax]
     bar.set_yticks(ticks, [str(t) for t in ticks])
     bar.minorticks_off()
 
 
-_STYLE = (("blue", "o"), ("red", "s"), ("green", "^"), ("purple", "D"))
-
-#: Coefficients that are drawn of a diagnosis: those that disagree most.
+#: Coefficients that are drawn: those that disagree most.
 _WORST = 3
-_DASHES: tuple[Any, ...] = (SHORT_DASHED, "-", DOTTED, DASH_DOTTED)
 
 
+@in_house_style
 def residual_series(
     source: Diagnosis | Comparison | pd.DataFrame,
     over: str = "load",
@@ -197,20 +197,20 @@ def residual_series(
     chosen = list(entries or squares.sort_values(ascending=False).index[:_WORST])
     figure, axes = new_picture(text, "(measured - predicted) / sigma", title=title, width=5.2, height=3.4)
     axes.axhspan(-2, 2, color=RULE, alpha=0.6, linewidth=0)
-    for entry, (colour, marker) in zip(chosen, _STYLE, strict=False):
-        for number, model in enumerate(models):
+    for number, entry in enumerate(chosen):
+        colour, marker = style_of(number)["color"], style_of(number)["marker"]
+        for k, model in enumerate(models):
             rows = series[(series["entry"] == entry) & (series["model"] == model)].sort_values(column)
-            last = number == len(models) - 1
-            axes.plot(
-                rows[column] / scale, rows["z"], color=LIGHT[colour],
-                linestyle=_DASHES[number % len(_DASHES)] if len(rows) >= CURVE else "none",
-                marker=marker, markersize=4.5, markerfacecolor=LIGHT[colour] if last else PAPER, linewidth=1.3,
-                label=f"{entry}, {VARIANT_LABEL.get(model, str(model))}",
-            )  # fmt: skip
+            line = style_of(len(models) - 1 - k)["linestyle"] if len(rows) >= CURVE else "none"
+            face = colour if model == models[-1] else PAPER
+            name = f"{entry}, {MODEL_LABELS.get(model, model)}"
+            axes.plot(rows[column] / scale, rows["z"], color=colour, marker=marker, linestyle=line,
+                      markerfacecolor=face, markersize=4.5, label=name)  # fmt: skip
     add_legend(axes)
     return figure
 
 
+@in_house_style
 def gap(
     source: Diagnosis | Verdict | Mapping[str, Mapping[str, float]],
     *,
@@ -241,18 +241,16 @@ def gap(
     figure, axes = new_picture("gap, sigma", "", title=title, height=0.2 * len(words) + 1.3)
     shrink(axes, left=max(CHARACTER * max(len(w) for w in words) + 0.2 - LEFT, 0.0))
     y = np.arange(len(words))
-    bars = [(before, "orange", "////", "baseline"), (after, "blue", None, "with the effects found")]
-    bars = bars[:1] if np.array_equal(before, after) else bars  # nothing was added: there is no after
-    for number, (values, colour, hatch, name) in enumerate(bars):
-        places = y + 0.4 * number - 0.2 * (len(bars) - 1)
-        axes.barh(places, values, 0.38, color=LIGHT[colour] if hatch is None else PAPER, hatch=hatch,
-                  edgecolor=LIGHT[colour], linewidth=0.8, label=name)  # fmt: skip
+    added = not np.array_equal(before, after)  # else there is no after
+    baseline: Style = {"color": PAPER, "edgecolor": LIGHT["orange"], "hatch": "////", "label": "baseline"}
+    axes.barh(y - 0.2 * added, before, 0.38, linewidth=0.8, **baseline)
+    if added:
+        axes.barh(y + 0.2, after, 0.38, color=BLUE, label="with the effects found")
     axes.set_yticks(y, words)
     axes.invert_yaxis()
     axes.grid(axis="y", visible=False)
-    axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="noise and tolerance")
-    handles = axes.get_legend_handles_labels()[0]
-    add_legend(axes, 2, [*handles[1:], handles[0]], across=True)
+    axes.axvline(1.0, color=INK, linewidth=0.9, linestyle=":", label="noise and tolerance")
+    add_legend(axes, across=True)
     return figure
 
 
@@ -265,6 +263,7 @@ _CONFUSABLE = 3.0
 _VISIBLE = 6.0
 
 
+@in_house_style
 def isolability(
     plan: CampaignPlan | ArrayLike, names: Sequence[str] | None = None, *, title: str | None = None
 ) -> Figure:
@@ -293,11 +292,11 @@ def isolability(
     across, down = "could pass for (framed: closer than 3)", "effect at work"
     figure, axes = new_picture(across, down, title=title, width=width, height=height)
     shrink(axes, left=room - 0.1, bottom=room - 0.1)
-    image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE, aspect="auto", interpolation="nearest")
+    image = axes.imshow(matrix, cmap=SEQUENTIAL, vmin=0.0, vmax=_VISIBLE)
     axes.grid(False)
-    axes.set_xticks(range(k), words, rotation=90, fontsize=FONT_SIZE - 1)
-    axes.set_yticks(range(k), words, fontsize=FONT_SIZE - 1)
-    for i, j in zip(*np.nonzero(matrix < _CONFUSABLE), strict=True):
+    axes.set_xticks(range(k), words, rotation=90, fontsize=SMALL)
+    axes.set_yticks(range(k), words, fontsize=SMALL)
+    for i, j in np.argwhere(matrix < _CONFUSABLE):
         axes.add_patch(Rectangle((j - 0.45, i - 0.45), 0.9, 0.9, fill=False, edgecolor=RED, linewidth=1.2))
     add_colour_bar(axes, image, "distance, standard deviations")
     return figure
