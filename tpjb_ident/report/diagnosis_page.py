@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import jinja2
 
 from tpjb_ident.columns import size, symbol
 from tpjb_ident.compare.effect_words import Estimate, amount, finding, label_in_words, shown_unit, words_of
@@ -18,7 +21,7 @@ from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
-from tpjb_ident.report.page import Page, Section, Table, grouped, write_page
+from tpjb_ident.report.page import Page, Section, Table, grouped, plain_templates, write_page
 from tpjb_ident.report.panels import coefficient_panels
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
 from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from tpjb_ident.compare.coefficient_table import TableSource
     from tpjb_ident.diagnosis.campaign import CampaignDiagnosis
     from tpjb_ident.diagnosis.diagnose import Diagnosis
-    from tpjb_ident.diagnosis.verdict.verdict import Assumption, Verdict
+    from tpjb_ident.diagnosis.verdict.verdict import Assumption, FoundEffect, Verdict
 
 #: Parameters that number what there are several of.
 _PLACES = ("pad", "probe", "cell")
@@ -49,98 +52,54 @@ def verdict_sentences(
     name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None = None
 ) -> list[str]:
     """Say what came out, the answer first."""
-    sentences = [_answer(name, verdict, deviations), *verdict.beforehand]
-    if deviations and verdict.verdict != "consistent":
-        before, after = (
-            ", ".join(f"{c} {percent(deviations[c][end])}" for c in DIRECT if c in deviations) for end in (0, 1)
-        )
-        with_effects = f"; with it {after}" if verdict.effects else ""
-        sentences.append(f"The model was off by {before} (median over the points){with_effects}.")
-    if verdict.effects:
-        tested = "was tested on points left out of the fit"
-        if not verdict.gap.get("heldout_numbers", 1):
-            tested = "could not be tested, since no point can be left out; over all of them"
-        gap_within = verdict.gap.get("within_tolerances")
-        within = "" if gap_within is None else f", {gap_within:.1f} with it free within its tolerances"
-        sentences.append(
-            f"The sizes were fitted to these data; that they close the gap {tested}: "
-            f"{verdict.gap['heldout_before']:.1f} standard deviations before, {verdict.gap['heldout_after']:.1f} after "
-            f"with all else as stated{within}."
-        )
-        words = [words_of(effect.name) for effect in verdict.effects]
-        checks = [word.check for word in words if word is not None]
-        if checks:
-            sentences.append(f"Check first: {'; '.join(dict.fromkeys(checks))}.")
-    sentences += _remainder_sentences(verdict)
-    if verdict.verdict in {"unexplained", "partly-explained"}:
-        sentences += [f"Because {in_words(reason)}." for reason in verdict.reasons]
-    if verdict.verdict != "consistent" and verdict.disagreement:
-        worst = verdict.disagreement[0]
-        sentences.append(f"The model and the rig part most in {observable(worst.observable)}, {place(worst.where)}.")
     worse = []
-    for name_of_observable, gaps in verdict.gap_by_observable.items():
+    for observed, gaps in verdict.gap_by_observable.items():
         if gap_at(gaps, "_after") > max(gap_at(gaps, "_before") + 0.3, 1.0):
-            worse.append(observable(name_of_observable))
-    if verdict.effects and worse:
-        sentences.append(f"With the effect added, {' and '.join(worse)} fits worse than before.")
-    sentences += [_beyond(one) for one in verdict.assumptions if abs(one.deviation) > Deciding.visible]
-    if verdict.next_test and verdict.verdict in {"ambiguous", "unexplained", "partly-explained"}:
-        sentences.append(f"Next test: {in_words(verdict.next_test)}.")
-    if verdict.below_floor:
-        hidden = ", ".join(label_in_words(n) for n in verdict.below_floor)
-        sentences.append(f"This campaign could not have seen {hidden}: silence about that is no absence.")
-    return sentences
-
-
-def _beyond(one: Assumption) -> str:
-    """What is further out than its tolerance explains, with its size: no name, but to be looked at."""
-    unit, scale = shown_unit(one.unit)
-    sizes = ", ".join(signed(value / scale) for value in one.values)
-    return (
-        f"Beyond what is stated, without a name: {label_in_words(one.name)} {sizes} {unit}, "
-        f"{abs(one.deviation):.1f} standard deviations."
+            worse.append(observed)
+    words = [words_of(effect.name) for effect in verdict.effects]
+    text = (
+        _templates()
+        .get_template("verdict.txt")
+        .render(
+            name=name,
+            verdict=verdict,
+            deviations=deviations,
+            worst=max(deviations, key=lambda c: abs(deviations[c][0])) if deviations else "",
+            direct=DIRECT,
+            rivals=[effect for group in verdict.indistinguishable for effect in group[1:]],
+            checks=dict.fromkeys(word.check for word in words if word is not None),
+            worse=worse,
+            beyond=[a for a in verdict.assumptions if abs(a.deviation) > Deciding.visible],
+        )
     )
+    return text.splitlines()
 
 
-def _answer(name: str, verdict: Verdict, deviations: Mapping[str, tuple[float, float]] | None) -> str:
-    found = " and ".join(finding(e.name, e.parameters) for e in verdict.effects)
-    found = found[:1].upper() + found[1:]
-    if verdict.verdict == "consistent":
-        return f"{name}: model and measurement agree within noise and tolerance."
-    if verdict.verdict == "named":
-        return f"{name}: {found}. {_deciding(verdict)}"
-    if verdict.verdict == "ambiguous":
-        rivals = dict.fromkeys(label_in_words(n) for group in verdict.indistinguishable for n in group[1:])
-        return f"{name}: {found}; these data cannot tell it from {' or '.join(rivals)}."
-    if verdict.effects:
-        return f"{name}: {found}. That explains most of the disagreement, and something is left."
-    worst = ""
-    if deviations:
-        name_of_worst = max(deviations, key=lambda c: abs(deviations[c][0]))
-        worst = f", {name_of_worst} is off by {percent(deviations[name_of_worst][0])}"
-    return f"{name}: unexplained{worst}. Nothing in the library of effects closes the gap."
+@functools.cache
+def _templates() -> jinja2.Environment:
+    """Sentences as templates, with what makes words of a diagnosis' values."""
+    environment = plain_templates()
+    environment.filters |= {
+        "findings": _findings,
+        "fitted": _fitted,
+        "in_words": in_words,
+        "label": label_in_words,
+        "observable": observable,
+        "percent": percent,
+        "place": place,
+    }
+    return environment
 
 
-def _deciding(verdict: Verdict) -> str:
-    """What a name rests on: the gap along what the effects do."""
-    gap = verdict.gap
-    acting = "it acts" if len(verdict.effects) == 1 else "the less certain one acts"
-    where = "on points left out of the fit" if gap["touched_unseen"] else "over all points (none left out shows it)"
-    shrunk = f"from {gap['touched_before']:.1f} to {gap['touched_after']:.1f} standard deviations"
-    return f"That explains the disagreement: where {acting}, {where}, it shrinks {shrunk}."
+def _findings(effects: Sequence[FoundEffect]) -> str:
+    text = " and ".join(finding(effect.name, effect.parameters) for effect in effects)
+    return text[:1].upper() + text[1:]
 
 
-def _remainder_sentences(verdict: Verdict) -> list[str]:
-    """What is left and what it behaves like, where a diagnosis says so."""
-    sentences = [
-        f"What is left behaves like {in_words(term.words)} (within {100 * term.spread:.0f} %)."
-        for term in verdict.behaves_like
-    ]
-    return sentences + [
-        f"The {label_in_words(drift.parameter)} of {label_in_words(drift.effect)} {in_words(drift.words)}, from "
-        f"{drift.start:.3g} to {drift.end:.3g}."
-        for drift in verdict.drift
-    ]
+def _fitted(tolerance: Assumption) -> str:
+    """What the fit made of a tolerance, in the unit that people read."""
+    unit, scale = shown_unit(tolerance.unit)
+    return f"{', '.join(signed(value / scale) for value in tolerance.values)} {unit}"
 
 
 def observable(name: str) -> str:
@@ -367,9 +326,9 @@ def _evidence_sections(verdict: Verdict) -> list[Section]:
     return [Section("What is left", [left]), Section("What may be off", [note], tables=[table])]
 
 
-def _row(one: Assumption) -> list[str]:
+def _row(tolerance: Assumption) -> list[str]:
     """A tolerance in the units that people read; a ratio in per cent."""
-    unit, scale = shown_unit(one.unit)
-    fitted = ", ".join(signed(v / scale) for v in one.values)
-    far = signed(one.deviation) if one.deviation else ""
-    return [label_in_words(one.name), f"{one.stated / scale:.3g} {unit}", one.source, f"{fitted} {unit}", far]
+    unit, scale = shown_unit(tolerance.unit)
+    far = signed(tolerance.deviation) if tolerance.deviation else ""
+    stated = f"{tolerance.stated / scale:.3g} {unit}"
+    return [label_in_words(tolerance.name), stated, tolerance.source, _fitted(tolerance), far]

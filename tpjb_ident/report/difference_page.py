@@ -155,7 +155,7 @@ def _drawn(points: pd.DataFrame) -> Figure:
             x = place + 0.16 * (k - 1.5)
             axes.errorbar(x, value, yerr=errors, **style, markerfacecolor=PAPER, capsize=2.5, label=entry)
             changed = (points[f"{kind.symbol}{entry}_changed"] == "yes").to_numpy()
-            axes.plot(x[changed], value[changed], **style)
+            axes.plot(x[changed], value[changed], **style, zorder=3)
         if np.max(np.abs(axes.dataLim.intervaly)) > _BEYOND * half > 0.0:
             axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(half)), linscale=0.7)
             axes.yaxis.set_major_formatter("{x:g}")

@@ -15,7 +15,7 @@ from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.conditions import SEVERITIES
 from tpjb_ident.report.drawing.series import constant_along, longest_series, point_label, point_labels, points_table
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.page import Section, Table
+from tpjb_ident.report.page import Section, Table, plain_templates
 from tpjb_ident.report.plots.coefficients import frf
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra
 from tpjb_ident.rounding import counted, fixed, with_interval
@@ -171,27 +171,19 @@ def _by_pad(values: Iterable[str]) -> str:
 
 
 def _bearing_tables(bearing: Any) -> list[Table]:
-    """Geometry of the bearing, its pivots and its oil, as the bearing file states them; none without one."""
+    """Geometry of the bearing, its pivots and its oil; none without one."""
     if bearing is None:
         return []
-    oil = bearing.oil
-    arcs = _by_pad(f"{math.degrees(p.arc):.3g}" for p in bearing.pads)
-    rows = [
-        ["journal diameter", amount(bearing.journal_diameter, "size")],
-        ["pad length", amount(bearing.length, "size", ".4g")],
-        ["pads", f"{len(bearing.pads)}, {arcs}° of arc, pivots at "
-                 + ", ".join(f"{math.degrees(p.pivot_angle):g}°" for p in bearing.pads)],
-        ["assembled clearance (radial)",
-         _by_pad(amount(p.assembled_clearance, "length", ".4g") for p in bearing.pads)],
-        ["pad clearance (radial)", _by_pad(f"{amount(p.pad_clearance, 'length', '.4g')}, preload {p.preload:.3g}"
-                                           for p in bearing.pads)],
-        ["pivots", bearing.pivot.kind],
-        ["oil", f"{oil.grade or 'grade not stated'}, {1e3 * oil.viscosity_40:.3g} mPa s at {degrees(40.0)}, "
-                f"supplied at {degrees(oil.supply_temperature)}"],
-        [f"oil, at {degrees(40.0)}",
-         f"{oil.density_40:g} kg/m³, {oil.specific_heat:g} J/kg/K, {oil.conductivity:g} W/m/K"],
-    ]  # fmt: skip
-    return [Table("Bearing and oil", ["", "as stated"], rows)]
+    environment = plain_templates()
+    environment.filters |= {
+        "amount": amount,
+        "by_pad": _by_pad,
+        "celsius": degrees,
+        "degree": lambda angle, form: format(math.degrees(angle), form),
+        "figures": format,
+    }
+    lines = environment.get_template("bearing.txt").render(bearing=bearing).splitlines()
+    return [Table("Bearing and oil", ["", "as stated"], [line.split(": ", 1) for line in lines])]
 
 
 def _run_matrix(runs: Sequence[Run]) -> Table:

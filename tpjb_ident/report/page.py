@@ -160,11 +160,15 @@ def _printable_cell(value: object) -> object:
     return value if isinstance(value, markupsafe.Markup) else readable("none" if value is None else str(value))
 
 
-_TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-    autoescape=True,
-    undefined=jinja2.StrictUndefined,
-    finalize=_printable_cell,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
+_SETTINGS: dict[str, Any] = {
+    "loader": jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    "undefined": jinja2.StrictUndefined,
+    "trim_blocks": True,
+    "lstrip_blocks": True,
+}
+_TEMPLATES = jinja2.Environment(autoescape=True, finalize=_printable_cell, **_SETTINGS)
+
+
+def plain_templates() -> jinja2.Environment:
+    """Templates of plain text, of which a paragraph is a line: a value has no line of its own."""
+    return jinja2.Environment(finalize=lambda value: " ".join(str(value).splitlines()), **_SETTINGS)
