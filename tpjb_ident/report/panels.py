@@ -14,10 +14,9 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.picture import BLUE, INK, in_house_style, label, new_pictures
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series, thinned
 from tpjb_ident.report.figure import Panel, panel
-from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 from tpjb_ident.report.plots.coefficients import coefficient
-from tpjb_ident.report.plots.pivots import Formula, load_deflection, pad_projection, pivot_stiffness
 from tpjb_ident.report.plots.residuals import isolability
+from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
 from tpjb_ident.runtime.tables import printable
 from tpjb_ident.schema import KINDS
 
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from rigdata.survey.spectrum import Look
     from tpjb_ident.clearance.locus import Locus
     from tpjb_ident.clearance.measure import ClearancePolygon
+    from tpjb_ident.compare.predictions import Formula
     from tpjb_ident.diagnosis.plan import CampaignPlan
     from tpjb_ident.pivot import PivotCurve
 

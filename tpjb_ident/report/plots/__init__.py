@@ -5,11 +5,10 @@ are in the axis labels, bands and bars are 95 % intervals, and line and marker t
 each function shows, and which figure of the paper it is, docs/plots.md tells.
 """
 
-from tpjb_ident.report.plots.clearance_and_locus import clearance_and_locus
 from tpjb_ident.report.plots.coefficients import coefficient, direct_coefficients, frf
-from tpjb_ident.report.plots.pivots import load_deflection, pad_projection, pivot_stiffness
 from tpjb_ident.report.plots.records import coherence, coherence_spectrum, orbit, spectra, window_weights
 from tpjb_ident.report.plots.residuals import gap, isolability, residual_map, residual_series
+from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
 
 __all__ = [
     "clearance_and_locus",

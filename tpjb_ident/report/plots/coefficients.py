@@ -16,6 +16,7 @@ from tpjb_ident.report.drawing.picture import (
     ENTRY_STYLES,
     INK,
     MODEL_LABELS,
+    PAPER,
     add_legend,
     from_zero,
     in_house_style,
@@ -164,7 +165,8 @@ def direct_coefficients(
         drawn = True
         rows = series.drop_duplicates(column).sort_values(column)
         for entry in entries:
-            style = ENTRY_STYLES[entry] | {"color": style_of(number)["color"]}
+            colour = style_of(number)["color"]
+            style = ENTRY_STYLES[entry] | {"color": colour, "markerfacecolor": colour if entry == "yy" else PAPER}
             style |= {} if len(rows) >= CURVE else {"linestyle": "none"}
             value, errors = with_errors(rows, kind.column(entry), kind.display_scale)
             axes.errorbar(rows[column] / axis_scale, value, yerr=errors, **style, label=f"{name}, {part}{entry}")
