@@ -14,7 +14,6 @@ from tests.command_line import tpjb
 from tests.good_campaigns import rocker_rig, written
 from tpjb_ident.compare.comparison import CompareSettings, compare_campaign
 from tpjb_ident.compare.predictions import (
-    beside_measured,
     counted_twice,
     counts_from_measured,
     refuse_counted_twice,
@@ -40,7 +39,6 @@ deflection_m = [0.0, 4e-6, 9e-6]
 
 def test_only_effects_on_how_pivots_give_way_are_what_a_dry_test_holds():
     assert counted_twice([SOFTER, GROWN, SOFTER]) == ("pivot_flexibility",)
-    assert beside_measured([SOFTER, GROWN]) == (GROWN,)
 
 
 def test_compare_leaves_them_out_beside_measured_pivots_alone():

@@ -18,7 +18,6 @@ from tpjb_ident.compare.coefficient_table import TableSource
 from tpjb_ident.compare.predictions import (
     ModelSettings,
     Progress,
-    beside_measured,
     counted_twice,
     measured_laws,
     predict_points,
@@ -88,8 +87,8 @@ class CompareSettings:
         pivots : str
             Name of the pivot model.
         """
-        counts_twice = pivots == "measured" and not self.from_measured
-        return beside_measured(self.effects) if counts_twice else self.effects
+        twice = counted_twice(self.effects) if pivots == "measured" and not self.from_measured else ()
+        return tuple(effect for effect in self.effects if effect.name not in twice)
 
 
 @dataclass(frozen=True, repr=False)
@@ -338,14 +337,15 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     if static.locus is None:
         return None
     frames = []
-    for name, rows in predictions.items():
-        frame = static.locus.to_frame()
+    measured = static.locus.to_frame()
+    for rows in predictions.values():
         places = rows.loc[_stations(static), ["x_m", "y_m"]].to_numpy(float)
         if static.clearance is None:
-            places += (frame[["x_m", "y_m"]] - places).mean().to_numpy()
-        frame.insert(0, "pivots", name)
-        frames.append(frame.assign(x_m_predicted=places[:, 0], y_m_predicted=places[:, 1]))
-    return pd.concat(frames, ignore_index=True)
+            places += (measured[["x_m", "y_m"]] - places).mean().to_numpy()
+        frames.append(measured.assign(x_m_predicted=places[:, 0], y_m_predicted=places[:, 1]))
+    table = pd.concat(frames, ignore_index=True)
+    table.insert(0, "pivots", np.repeat(list(predictions), len(measured)))
+    return table
 
 
 def predicted_loci(loci: pd.DataFrame | None) -> dict[str, FloatArray]:

@@ -47,11 +47,6 @@ def counted_twice(effects: Sequence[Effect]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(e.name for e in effects if e.name in _PIVOT_EFFECTS))
 
 
-def beside_measured(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Effects without those that measured pivots hold already."""
-    return tuple(e for e in effects if e.name not in _PIVOT_EFFECTS)
-
-
 def counts_from_measured(path: Path | None) -> bool:
     """Whether an effects file says that its sizes are meant beside measured pivots."""
     if path is None:

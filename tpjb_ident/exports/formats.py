@@ -92,8 +92,8 @@ def turning_counter_clockwise(table: pd.DataFrame) -> pd.DataFrame:
     mirrored = (180.0 - table["static_load_direction_deg"] + 180.0) % 360.0 - 180.0
     turned.loc[clockwise, "static_load_direction_deg"] = mirrored[clockwise]
     for name in (COLUMNS[short] for short in _CROSS):
-        for end, opposite in zip(ENDS, ("", "_hi", "_lo"), strict=True):
-            turned.loc[clockwise, name + end] = -table.loc[clockwise, name + opposite]
+        ends = [name, f"{name}_hi", f"{name}_lo"]
+        turned.loc[clockwise, [name + end for end in ENDS]] = -table.loc[clockwise, ends].to_numpy()
     return turned
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -46,8 +46,18 @@ class Grid:
     """What one file holds: coefficients of one static load over n shaft speeds and m excitation frequencies."""
 
     rows: pd.DataFrame  #: n m of them, by speed and frequency
-    speed: FloatArray  #: (n,) [Hz]
-    excitation: FloatArray  #: (m,) [Hz]; NaN where it is the running speed
+
+    @functools.cached_property
+    def speed(self) -> FloatArray:
+        """(n,) [Hz]."""
+        return np.asarray(self.rows["shaft_speed_Hz"].unique())
+
+    @functools.cached_property
+    def excitation(self) -> FloatArray:
+        """(m,) [Hz]; NaN where it is the running speed."""
+        if len(self.rows) == len(self.speed) and (self.rows["line"] == _SYNCHRONOUS).all():
+            return np.full(1, np.nan)
+        return self.rows["excitation_Hz"].to_numpy()[: len(self.rows) // len(self.speed)]
 
     @property
     def values(self) -> FloatArray:
@@ -103,32 +113,21 @@ def grids(points: pd.DataFrame, axes: str) -> list[Grid]:
         line = rows["excitation_Hz"].round(9)
         line = line.mask(abs(line - rows["shaft_speed_Hz"]) < _SAME * line, _SYNCHRONOUS)
         rows = rows.assign(line=line).sort_values(["shaft_speed_Hz", "excitation_Hz"])
-        by_speed = [part for _, part in rows.groupby("shaft_speed_Hz")]
-        if axes == "speed":
-            parts += [part for _, part in rows.groupby("line")]
-        elif axes == "both" and (_alike(by_speed) or (line == _SYNCHRONOUS).all()):
+        if axes == "both" and ((line == _SYNCHRONOUS).all() or _alike(rows)):
             parts.append(rows)
         else:
-            parts += by_speed
-    return [_grid(part) for part in parts]
+            parts += [part for _, part in rows.groupby("line" if axes == "speed" else "shaft_speed_Hz")]
+    return [Grid(part) for part in parts]
 
 
 #: Line of the running speed, at which files over speed are told apart from those at a frequency.
 _SYNCHRONOUS = -1.0
 
 
-def _alike(by_speed: Sequence[pd.DataFrame]) -> bool:
+def _alike(rows: pd.DataFrame) -> bool:
     """Whether all speeds were run at the same frequencies."""
-    first, *rest = (part["excitation_Hz"].to_numpy() for part in by_speed)
+    first, *rest = (axis.to_numpy() for _, axis in rows.groupby("shaft_speed_Hz")["excitation_Hz"])
     return all(len(axis) == len(first) and np.allclose(axis, first, rtol=_SAME, atol=0.0) for axis in rest)
-
-
-def _grid(rows: pd.DataFrame) -> Grid:
-    """Grid of rows that have the same frequencies at every speed, or only the running speed."""
-    speed = rows["shaft_speed_Hz"].unique()
-    if len(rows) == len(speed) and (rows["line"] == _SYNCHRONOUS).all():
-        return Grid(rows, speed, np.full(1, np.nan))
-    return Grid(rows, speed, rows["excitation_Hz"].to_numpy()[: len(rows) // len(speed)])
 
 
 def ross_version(chosen: int | None = None) -> tuple[int, str]:
