@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from tpjb_ident.report.drawing.series import longest_series
-from tpjb_ident.report.panels import coefficient_panels, position_panels
+from tpjb_ident.report.panels import coefficient_sections, position_panels
 
 NAMES = [f"{s}{e}_{u}" for s, u in (("k", "N_per_m"), ("c", "Ns_per_m")) for e in ("xx", "xy", "yx", "yy")]
 
@@ -29,6 +29,10 @@ def table(points, variants=("rigid", "kirk")):
     return pd.DataFrame(rows)
 
 
+def coefficient_panels(points):
+    return [panel for section in coefficient_sections(table(points)) for panel in section.panels]
+
+
 def test_the_longest_series_is_taken():
     frame = table([(1e3, 25.0), (2e3, 25.0), (3e3, 25.0), (2e3, 10.0), (3e3, 10.0)])
     over_load = longest_series(frame, "load")
@@ -39,13 +43,13 @@ def test_the_longest_series_is_taken():
 
 
 def test_nothing_is_drawn_over_what_does_not_vary():
-    panels = coefficient_panels(table([(1e3, 25.0), (2e3, 25.0)]))
+    panels = coefficient_panels([(1e3, 25.0), (2e3, 25.0)])
     assert {p.name for p in panels} == {f"{n[:3]}-over-load" for n in NAMES}
-    assert coefficient_panels(table([(1e3, 25.0)])) == []
+    assert coefficient_panels([(1e3, 25.0)]) == []
 
 
 def test_measured_points_have_their_intervals_and_predictions_their_lines():
-    panel = next(p for p in coefficient_panels(table([(2e3, 25.0), (1e3, 25.0)])) if p.name == "kyy-over-load")
+    panel = next(p for p in coefficient_panels([(2e3, 25.0), (1e3, 25.0)]) if p.name == "kyy-over-load")
     (axes,) = panel.figure.axes
     lines = {line.get_label(): line for line in axes.get_lines()}
     assert np.allclose(lines["rigid pivots"].get_xydata(), [[1.0, 8e3 / 1e6], [2.0, 16e3 / 1e6]])

@@ -339,7 +339,7 @@ def _loci(static: StaticTests, predictions: Predictions) -> pd.DataFrame | None:
     frames = []
     measured = static.locus.to_frame()
     for rows in predictions.values():
-        places = rows.loc[_stations(static), ["x_m", "y_m"]].to_numpy(float)
+        places = rows.loc[_stations(static)][["x_m", "y_m"]].to_numpy(float)
         if static.clearance is None:
             places += (measured[["x_m", "y_m"]] - places).mean().to_numpy()
         frames.append(measured.assign(x_m_predicted=places[:, 0], y_m_predicted=places[:, 1]))

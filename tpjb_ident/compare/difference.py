@@ -179,7 +179,7 @@ def _random(frame: pd.DataFrame, name: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _judged(
-    name: str, frames: Sequence[pd.DataFrame], systematic: pd.Series | float, none: pd.Series, number: int
+    name: str, frames: Sequence[pd.DataFrame], systematic: pd.Series | FloatArray | float, none: pd.Series, number: int
 ) -> dict[str, Any]:
     """Columns of one quantity: both values, their difference, each with its interval, and whether it changed.
 

@@ -27,8 +27,8 @@ from tpjb_ident.report.laboratory_sections import (
     tested_facts,
     values_table,
 )
-from tpjb_ident.report.page import Page, Section, Table, grouped, table_of, write_page
-from tpjb_ident.report.panels import coefficient_panels, pivot_panels, position_panels
+from tpjb_ident.report.page import Page, Section, Table, table_of, write_page
+from tpjb_ident.report.panels import coefficient_sections, pivot_panels, position_panels
 from tpjb_ident.rounding import fixed, percent, signed
 from tpjb_ident.schema import DAMPING, KINDS, STIFFNESS, coefficient_column
 
@@ -114,7 +114,7 @@ def deviations_table(table: pd.DataFrame) -> Table:
 
 
 def _sections(comparison: Comparison, frame: pd.DataFrame, flagged: Sequence[tuple[str, Condition]]) -> list[Section]:
-    sections = [*grouped(coefficient_panels(frame)), *_pivot_sections(comparison), *_position_sections(comparison)]
+    sections = [*coefficient_sections(frame), *_pivot_sections(comparison), *_position_sections(comparison)]
     campaign: Any = comparison.campaign
     tables = [measured_table(comparison.identification)]
     if comparison.has_records:

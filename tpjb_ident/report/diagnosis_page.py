@@ -21,8 +21,8 @@ from tpjb_ident.diagnosis.observations.gap import gap_at
 from tpjb_ident.report.drawing.series import DIRECT
 from tpjb_ident.report.figure import Panel, panel
 from tpjb_ident.report.laboratory_sections import flags_line, tested_facts, values_table
-from tpjb_ident.report.page import Page, Section, Table, grouped, plain_templates, write_page
-from tpjb_ident.report.panels import coefficient_panels
+from tpjb_ident.report.page import Page, Section, Table, plain_templates, write_page
+from tpjb_ident.report.panels import coefficient_sections
 from tpjb_ident.report.plots.residuals import gap, residual_frame, residual_map, residual_series
 from tpjb_ident.rounding import MINUS, fixed, percent, signed, significant
 
@@ -198,7 +198,7 @@ def write_diagnosis_report(
         key_table=Table(_EFFECTS, ["effect", "parameter", "value"], parameter_rows(verdict))
         if verdict.effects
         else _gap_table(verdict),
-        sections=_sections(result, coefficient_panels(table) if len(table) else []),
+        sections=_sections(result, coefficient_sections(table) if len(table) else []),
         settings=settings,
         inputs=inputs,
     )
@@ -258,7 +258,7 @@ def _rivals(verdict: Verdict) -> list[str]:
     return notes or [f"No other explanation that was fitted comes within odds of 1 to {odds:.0f} of it."]
 
 
-def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[Section]:
+def _sections(result: CampaignDiagnosis, coefficients: list[Section]) -> list[Section]:
     verdict = result.diagnosis.verdict
     note = (
         "Sigma joins measurement noise and the stated model tolerance. Held-out points are whole operating points that "
@@ -273,7 +273,7 @@ def _sections(result: CampaignDiagnosis, coefficients: Sequence[Panel]) -> list[
         [in_words(c.name), f"{c.score:.1f}", f"{c.heldout_gap:.2f}", f"{c.probability:.2f}"] for c in verdict.candidates
     ]
     columns = ["observable", "where", "size, sigma", "share"]
-    sections = _effect_sections(verdict) + grouped(coefficients) + _other_explanations(verdict)
+    sections = _effect_sections(verdict) + coefficients + _other_explanations(verdict)
     sections.append(
         Section(
             _GROUP,
@@ -298,13 +298,13 @@ def _diagnosis_panels(diagnosis: Diagnosis) -> list[Panel]:
     frame = residual_frame(diagnosis)
     for over, name, title in OVER:
         try:
-            panels.append(panel(name, title, residual_series(frame, over), _GROUP))
+            panels.append(panel(name, title, residual_series(frame, over)))
         except ValueError:  # nothing varies over it
             continue
     title = "Gap by observable, held-out points where there are any (* fitted points)"
-    panels.append(panel("gap-by-observable", title, gap(diagnosis.verdict), _GROUP))
+    panels.append(panel("gap-by-observable", title, gap(diagnosis.verdict)))
     if len(frame):
-        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame), _GROUP))
+        panels.append(panel("residual-map", "Residuals of every coefficient and point", residual_map(frame)))
     return panels
 
 

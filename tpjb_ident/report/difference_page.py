@@ -99,7 +99,7 @@ def _sections(difference: Difference) -> list[Section]:
     points, pivots, clearance = difference.points, difference.pivots, difference.clearance
     if len(points):
         tables = [_coefficient_table(points, kind) for kind in (STIFFNESS, DAMPING)]
-        panels = [panel("difference", _TITLE, _drawn, "", points)]
+        panels = [panel("difference", _TITLE, _drawn, points)]
         sections.append(Section("Coefficients", panels=panels, tables=tables))
     if len(pivots):
         loads = (per("load") * pivots["force_N"]).map("{:.3g}".format)

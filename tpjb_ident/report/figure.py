@@ -22,7 +22,7 @@ from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
-from tpjb_ident.report.drawing.picture import LIGHT
+from tpjb_ident.report.drawing.picture import LIGHT, in_house_style
 from tpjb_ident.rounding import significant
 from tpjb_ident.runtime.executors import cores, local_workers, map_ordered
 from tpjb_ident.runtime.tables import printable, write_atomic, write_text
@@ -46,7 +46,6 @@ class Panel:
     name: str
     title: str
     drawing: Callable[[], Figure]
-    group: str
 
     @functools.cached_property
     def figure(self) -> Figure:
@@ -69,11 +68,12 @@ _TOGETHER, _MOST_HANDS = 6, 4
 _drawn: list[Panel] = []
 
 
-def panel(name: str, title: str, figure: Figure | Callable[..., Figure], group: str, *arguments: Any) -> Panel:
+def panel(name: str, title: str, figure: Figure | Callable[..., Figure], *arguments: Any) -> Panel:
     """Make a panel of a picture, or of a function that draws it and its arguments."""
-    return Panel(name, title, functools.partial(figure, *arguments) if callable(figure) else lambda: figure, group)
+    return Panel(name, title, functools.partial(figure, *arguments) if callable(figure) else lambda: figure)
 
 
+@in_house_style
 def svg_text(figure: Figure, name: str) -> str:
     """Draw a figure as SVG with text as text, markers with their values; the same figure gives the same bytes."""
     buffer = io.StringIO()

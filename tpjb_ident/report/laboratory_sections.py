@@ -219,7 +219,7 @@ def evidence_sections(campaign: Campaign, result: Identification) -> list[Sectio
     panels = [*_run_panels(campaign, result), *_stiffness_panels(result)]
     if result.points:
         title = "Force that the displacements do not explain"
-        panels.append(panel("coherence-points", title, coherence, _EVIDENCE, result))
+        panels.append(panel("coherence-points", title, coherence, result))
     return [Section(_EVIDENCE, panels=panels)] if panels else []
 
 
@@ -233,10 +233,10 @@ def _run_panels(campaign: Campaign, result: Identification) -> list[Panel]:
             label = f"run {run.id}, {point_label(point)}"
             return [
                 panel("orbit", f"Orbit of the shaft in the housing, {label}; thick: its part at the excitation",
-                      orbit(run), _EVIDENCE),
+                      orbit(run)),
                 panel("coherence-spectrum", f"Multiple coherence of force and displacement, {label}",
-                      coherence_spectrum(run), _EVIDENCE),
-                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run), _EVIDENCE),
+                      coherence_spectrum(run)),
+                panel("spectra", f"Amplitudes of displacement and force, {label}", spectra(run)),
             ]  # fmt: skip
         except (RigDataError, ValueError):  # a damaged or short run: the next one shows the same
             continue
@@ -251,12 +251,12 @@ def _stiffness_panels(result: Identification) -> list[Panel]:
         title = (
             f"Dynamic stiffness h over frequency, {constant_along(series, 'frequency')}; a line: the model that fits"
         )
-        panels.append(panel("h-over-frequency", title, frf, _EVIDENCE, result))
+        panels.append(panel("h-over-frequency", title, frf, result))
     for number, band in enumerate(result.bands, start=1):
         key = band.key()
         title = (f"Dynamic stiffness h over the band, {amount(key['static_load_N'], 'load')}, "
                  f"shaft at {spinning(key['shaft_speed_Hz'], key['rotation'])}, {key['excitation']}")  # fmt: skip
-        panels.append(panel(f"h-over-band-{number}", title, frf, _EVIDENCE, band))
+        panels.append(panel(f"h-over-band-{number}", title, frf, band))
     return panels
 
 

@@ -136,14 +136,6 @@ def write_page(folder: Path, page: Page) -> Path:
     return path
 
 
-def grouped(panels: Iterable[Panel]) -> list[Section]:
-    """A section for every group of panels, in their order."""
-    groups: dict[str, list[Panel]] = {}
-    for panel in panels:
-        groups.setdefault(panel.group, []).append(panel)
-    return [Section(heading, panels=group) for heading, group in groups.items()]
-
-
 def _elements(panels: Iterable[Panel], svg: Mapping[str, str]) -> tuple[dict[str, markupsafe.Markup], dict[str, str]]:
     """Drawings as elements of a page, and how each stands on it, by name."""
     elements = {}

@@ -14,6 +14,7 @@ from rigdata.arrays import FloatArray
 from tpjb_ident.report.drawing.picture import BLUE, INK, in_house_style, label, new_pictures
 from tpjb_ident.report.drawing.series import CROSS, DIRECT, constant_along, longest_series, thinned
 from tpjb_ident.report.figure import Panel, panel
+from tpjb_ident.report.page import Section
 from tpjb_ident.report.plots.coefficients import coefficient
 from tpjb_ident.report.plots.residuals import isolability
 from tpjb_ident.report.plots.static_tests import clearance_and_locus, load_deflection, pad_projection, pivot_stiffness
@@ -32,19 +33,21 @@ if TYPE_CHECKING:
     from tpjb_ident.pivot import PivotCurve
 
 
-def coefficient_panels(table: pd.DataFrame) -> list[Panel]:
+def coefficient_sections(table: pd.DataFrame) -> list[Section]:
     """Draw every series of at least two points."""
-    panels = []
+    sections = []
     for over in ("load", "frequency"):
         series = longest_series(table, over)
         if series is None:
             continue
         for names, kind in ((DIRECT, "Stiffness and damping"), (CROSS, "Cross-coupled stiffness and damping")):
+            panels = []
             for name in names:
                 title = f"{name} ({KINDS[name[0]].quantity}) over {over}, at {constant_along(series, over)}"
                 figure = functools.partial(coefficient, table, name, over=over)
-                panels.append(panel(f"{name}-over-{over}", title, figure, f"{kind} over {over}"))
-    return panels
+                panels.append(panel(f"{name}-over-{over}", title, figure))
+            sections.append(Section(f"{kind} over {over}", panels=panels))
+    return sections
 
 
 def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -> list[Panel]:
@@ -54,11 +57,10 @@ def pivot_panels(curves: Sequence[PivotCurve], formula: Formula | None = None) -
     bands = "Pivot tangent stiffness over load, 95 % bands"
     steps = "Load steps and fitted laws, pivot and housing together"
     across = "Load and displacement vectors, and what of them lies on each pad's direction"
-    group = "Pivots, from the dry tests"
     return [
-        panel("pivot-stiffness", bands, pivot_stiffness, group, curves, formula),
-        panel("pivot-steps", steps, load_deflection, group, curves),
-        panel("pivot-projection", across, pad_projection, group, curves),
+        panel("pivot-stiffness", bands, pivot_stiffness, curves, formula),
+        panel("pivot-steps", steps, load_deflection, curves),
+        panel("pivot-projection", across, pad_projection, curves),
     ]
 
 
@@ -79,15 +81,12 @@ def position_panels(
     polygons = None if polygon is None else {"measured": polygon} | {f"run {p.run}": p for p in others}
     shown = None if nothing else measured
     figure = functools.partial(clearance_and_locus, polygons, shown, predicted, drawing=drawn)
-    return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure,
-                  "Clearance and shaft centre locus")]  # fmt: skip
+    return [panel("locus-and-clearance", "Shaft centre locus inside the clearance polygon", figure)]
 
 
 def isolability_panels(plans: Mapping[str, CampaignPlan]) -> list[Panel]:
     """Draw the isolability matrix of every plan."""
-    return [
-        panel(name.replace("_", "-"), f"Isolability, {name}", isolability, "", plan) for name, plan in plans.items()
-    ]
+    return [panel(name.replace("_", "-"), f"Isolability, {name}", isolability, plan) for name, plan in plans.items()]
 
 
 #: A picture of more channels could not be read.
@@ -98,7 +97,7 @@ _POINTS = 4000
 
 def quick_look(title: str, series: Sequence[Series], looks: Mapping[str, Look]) -> Panel:
     """Draw one row per channel: left over time (minima and maxima where samples are many), right its spectrum."""
-    return panel("quick-look", title, _quick_look, "", title, list(series)[:_MOST], looks)
+    return panel("quick-look", title, _quick_look, title, list(series)[:_MOST], looks)
 
 
 @in_house_style

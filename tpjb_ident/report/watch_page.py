@@ -130,7 +130,7 @@ def _panels(snapshot: Snapshot) -> list[Panel]:
     for over, set_point in (("load", "static_load"), ("frequency", "excitation")):
         if len({getattr(p.point, set_point) for p in good}) > 1:
             figure = direct_coefficients({identification.campaign: identification}, part="k", over=over)
-            panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure, "K"))
+            panels.append(panel(f"k-over-{over}", f"Direct stiffness over {over}, 95 % intervals", figure))
     return panels
 
 

@@ -122,7 +122,7 @@ def _show_channels(records: Sequence[Record], plots: dict[str, Any], data: dict[
 def _orbit(run: Run) -> str:
     """The path of the shaft, as the report draws it; of a run whose probes give none nothing."""
     try:
-        picture = panel("orbit", "Orbit of the shaft in the housing", orbit(run), "")
+        picture = panel("orbit", "Orbit of the shaft in the housing", orbit(run))
     except (RigDataError, ValueError):
         return ""
     return render_section(Section("Shaft in the housing", panels=[picture]))

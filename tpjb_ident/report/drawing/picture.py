@@ -6,9 +6,11 @@ their own stays as it is. Margins are fixed in inches, so that pictures line up 
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,9 +88,19 @@ _LINE = 0.172  # height of one line of text with its leading [inches]
 CHARACTER = 0.074  # mean width of a character [inches]
 _NOTEBOOK_DPI = 120
 
-_STYLE_FILE = Path(__file__).with_name("house.mplstyle")
-#: Decorator of what draws: the look of the house, and the user's again behind it.
-in_house_style = matplotlib.rc_context(matplotlib.rc_params_from_file(_STYLE_FILE, use_default_template=False))
+_LOOK = matplotlib.rc_params_from_file(Path(__file__).with_name("house.mplstyle"), use_default_template=False)
+_ALONE = threading.RLock()
+
+
+@contextlib.contextmanager
+def _house_style() -> Iterator[None]:
+    """The look of the house, and the user's again behind it; settings are the process', so one thread draws."""
+    with _ALONE, matplotlib.rc_context(_LOOK):
+        yield
+
+
+#: Decorator of what draws.
+in_house_style = _house_style()
 
 
 class Picture(Figure):
