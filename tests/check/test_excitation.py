@@ -1,4 +1,4 @@
-"""What drives a run is judged beside the runs of its own operating point, along force or displacement."""
+"""Runs beside one another: what drives them, along force or displacement, and what turns with the shaft."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from rigdata.operating_point import OperatingPoint
 from rigdata.vector import directions
 from tpjb_ident.check.findings import Reporter
+from tpjb_ident.check.positions import check_shaft_lines
 from tpjb_ident.check.set_points import check_excitation
 
 
@@ -44,3 +45,24 @@ def test_strength_is_that_of_the_operating_point():
 )
 def test_force_or_displacement_acts_along_the_stated_direction(force, displacement, named):
     assert findings([observation(5000.0, 1000.0, 0.0, force, displacement)]) == [named]
+
+
+@pytest.mark.parametrize(
+    ("frequency", "load", "gain", "named"),
+    [(35.0, 5000.0, 0.5, 4), (35.0, 5000.0, 1.1, 4), (25.0, 8000.0, 0.5, 4), (25.0, 8000.0, 0.85, 0)],
+)
+def test_a_probe_whose_range_changed_is_told_by_what_turns_with_the_shaft(frequency, load, gain, named):
+    """At one frequency of several by little, at one load of several by what no change of the film explains."""
+    rng = np.random.default_rng(4)
+    runs = []
+    for place in [(5000.0, f) for f in (15.0, 25.0, 35.0, 45.0)] + [(2500.0, 25.0), (8000.0, 25.0)]:
+        for _ in range(4):
+            run = observation(place[0], 1000.0, frequency=place[1])
+            size = 4e-6 * (1 + 0.003 * rng.standard_normal()) * (place[0] / 5000.0) ** -0.2
+            run.shaft_line = np.array([size * (gain if place == (load, frequency) else 1.0), 3e-6])
+            run.channels, run.pick = [SimpleNamespace(name="X1A"), SimpleNamespace(name="X1B")], lambda quantity: [0, 1]
+            runs.append(run)
+    check_shaft_lines(runs)
+    reports = [finding for run in runs for finding in run.report.findings]
+    assert len(reports) == named
+    assert {finding.key for finding in reports} <= {"shaft line X1A"}

@@ -15,7 +15,7 @@ from tpjb_ident.arguments import as_campaign
 from tpjb_ident.check.findings import is_shared, merge
 from tpjb_ident.check.magnitudes import check_magnitudes
 from tpjb_ident.check.observation import Observation, observe
-from tpjb_ident.check.positions import check_positions
+from tpjb_ident.check.positions import check_positions, check_shaft_lines
 from tpjb_ident.check.response import check_responses
 from tpjb_ident.check.rig_fit import check_accelerometers, rig_fit
 from tpjb_ident.check.rotation import check_rotation
@@ -89,6 +89,7 @@ def judged(campaign: Campaign, observations: Sequence[Observation]) -> tuple[lis
     _spread_doubts(observations)
     check_responses(sines, campaign.housing_mass, of_kind("clearance"))
     check_rotation(sines)
+    check_shaft_lines(sines)
     check_sweeps(of_kind("clearance"))
     check_locus(of_kind("locus"))
     _check_duplicates(observations)

@@ -57,6 +57,17 @@ def excitation_line(phasors: RunPhasors, line: int, channels: Sequence[Channel])
     return RecordLines(mean, floor, scatter, np.array([omega]), row[None])
 
 
+def shaft_line(phasors: RunPhasors, channels: Sequence[Channel]) -> FloatArray:
+    """Size of what turns with the shaft in every channel (m,); NaN where it is not told from the excitation."""
+    place = phasors.lines.place("1X")
+    sizes = np.full(len(channels), np.nan)
+    if place is None:
+        return sizes
+    shown = np.ma.median(np.ma.masked_invalid(np.abs(phasors.z[:, place])), axis=0).filled(np.nan)
+    by_name = {channel.name: size for channel, size in zip(phasors.channels, shown)}
+    return np.array([by_name.get(channel.name, np.nan) for channel in channels])
+
+
 def steady_level(values: FloatArray, rate: float, frequencies: Sequence[float]) -> RecordLines:
     """Mean and scatter of a run without an excitation line, others taken off; `values` (n, m)."""
     positive = np.array([f for f in frequencies if f > 0])

@@ -15,7 +15,7 @@ from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError, Severity
 from rigdata.run import Run
 from tpjb_ident.check.findings import Reporter
-from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, other_line, steady_level
+from tpjb_ident.check.lines import RecordLines, band_lines, excitation_line, other_line, shaft_line, steady_level
 from tpjb_ident.check.rotation import shaft_force
 from tpjb_ident.check.signals import check_clock, check_signal, needed
 from tpjb_ident.check.wiring import plane_of
@@ -53,6 +53,9 @@ class Observation:
     digest: str = ""
     speed: float = math.nan
     other_line: float = math.nan
+    shaft_line: FloatArray = field(
+        default_factory=lambda: np.empty(0), repr=False
+    )  #: (m,): size at 1X, SI; empty: unknown
     shaft_force: float = math.nan  #: see `tpjb_ident.check.rotation`
 
     def pick(self, quantity: str) -> list[int]:
@@ -130,7 +133,8 @@ def observe(run: Run, phasors: RunPhasors | None = None, line: int = 0) -> Obser
     if phasors is None:
         return observation
     astray = [k for k in range(len(phasors.lines.excitation)) if not _near_set_point(run, phasors, k)]
-    return replace(observation, other_line=other_line(phasors, astray), shaft_force=shaft_force(phasors))
+    observation = replace(observation, shaft_line=shaft_line(phasors, live), shaft_force=shaft_force(phasors))
+    return replace(observation, other_line=other_line(phasors, astray))
 
 
 def _is_timed(report: Reporter, run: Run, length: int) -> bool:

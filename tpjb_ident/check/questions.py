@@ -205,6 +205,12 @@ QUESTIONS = {
         "reads {off:+.0f} um on average beside the other runs at this operating point",
         "Check probe and amplifier: moved, or another gain in this run?",
     ),
+    "shaft line": Question(
+        _WARNING,
+        _CHANNEL,
+        "shows {size:.2g} times the motion at running speed that it shows in the other runs",
+        "Check the range of its amplifier in this run; or the shaft's balance changed",
+    ),
     "signs": Question(
         (_NEVER, 0.0, 1.0), _CHANNELS, "answer the force as no film does, to the other side or before it acts", _WIRING
     ),

@@ -5,19 +5,27 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.special import stdtrit
 
-from rigdata.arrays import ComplexArray
+from rigdata.arrays import ComplexArray, FloatArray
 from tpjb_ident.estimate.blocks import Blocks, Rig
-from tpjb_ident.estimate.equation import State, film_force_rows
+from tpjb_ident.estimate.equation import State, entry_forces, film_force_rows
 from tpjb_ident.estimate.term import Additive, Parameter, of_groups
-from tpjb_ident.terms.load_turn import LoadTurn
+from tpjb_ident.terms.load_turn import PLAUSIBLE, LoadTurn
 
-#: Least standard deviation of a run's load against its set point: actuators are no better (relative, and rad).
-_LEAST = 1e-4
+#: Entries of k and of omega c.
+_ENTRIES = 8
+
+#: Scatter of a run's load against its set point before the runs tell it (relative, and rad), as of usual actuators, and
+#: the degrees of freedom that it counts as.
+_USUAL, _FREEDOM = 3e-3, 4.0
 
 
 class Load(Additive):
-    """The runs' scatter over the root of their number is how well their mean is known."""
+    """The runs' scatter over the root of their number is how well their mean is known.
+
+    What a common turn does to H is what is plausible: the runs' own misses tell it or not.
+    """
 
     name = "load miss"
     never_estimated = True
@@ -34,18 +42,23 @@ class Load(Additive):
             mine = self._family[blocks.point] == k
             _, first = np.unique(blocks.run[mine], return_index=True)
             misses = blocks.miss[mine][first]
-            root = math.sqrt(max(len(misses), 1))
-            for part, values in (("size", misses.real), ("turn", misses.imag)):
-                deviation = max(float(np.sqrt(np.mean(values**2))), _LEAST) / root
-                parameters.append(Parameter(f"{part} at {direction:g} deg", "1", deviation))
+            size, turn = _mean_error(misses.real), PLAUSIBLE[0] * _mean_error(misses.imag)
+            parameters.append(Parameter(f"size at {direction:g} deg", "1", size))
+            parameters += [Parameter(f"turn at {direction:g} deg, {i}", "1", turn) for i in range(_ENTRIES)]
         self.parameters = tuple(parameters)
 
     def columns(self, blocks: Blocks, state: State) -> ComplexArray:
-        """DH / d ln W d, and dH / d alpha d, in the cells."""
+        """DH / d ln W d, and the entries of k and omega c by their own size, in the cells."""
         d = state.u[:, :2]
         force = np.einsum("nij,nj->ni", state.slope[blocks.point], d)
-        size = film_force_rows(self.rig, blocks, state, force[:, :, None])[:, :, 0]
-        numbers = state.parameters.get(self.turn.name)
-        turn = self.turn.turned(blocks, state, numbers) if numbers is not None and len(numbers) else 0 * size
-        rows = np.stack([size, turn], axis=2)
+        entries = entry_forces(self.turn.entry_sizes(blocks, state), d)
+        rows = film_force_rows(self.rig, blocks, state, np.concatenate([force[:, :, None], entries], axis=2))
         return of_groups(rows, self._family[blocks.point], len(self.turn.families))
+
+
+def _mean_error(misses: FloatArray) -> float:
+    """Deviation of what some runs miss together, by how their misses (n,) differ, of few runs by Student's t."""
+    n = max(len(misses), 1)
+    spare = _FREEDOM + n - 1
+    variance = (_FREEDOM * _USUAL**2 + float(np.sum((misses - misses.mean()) ** 2))) / spare
+    return math.sqrt(variance / n) * float(stdtrit(spare, 0.975) / stdtrit(np.inf, 0.975))

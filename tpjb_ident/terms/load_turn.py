@@ -48,8 +48,7 @@ class LoadTurn(Additive):
 
     def per_radian(self, blocks: Blocks, state: State) -> ComplexArray:
         """Readings of a load turned by one radian, (n, m + 2, q)."""
-        direct, log_load = self._direct(blocks, state), self._aside(blocks)[:, None]
-        size = np.repeat(direct * [1.0, 1j], 4, axis=1)
+        size, log_load = self.entry_sizes(blocks, state), self._aside(blocks)[:, None]
         force = entry_forces(np.concatenate([size, log_load * size], axis=1), state.u[:, :2])
         rows = film_force_rows(self.rig, blocks, state, force)
         return of_groups(rows, self._family[blocks.point], len(self.families))
@@ -65,6 +64,10 @@ class LoadTurn(Additive):
         stiffness, damping = np.moveaxis(self._direct(blocks, state)[:, :, None, None] * change, 1, 0)
         return np.asarray(blocks.miss.imag[:, None, None] * (stiffness + 1j * damping))
 
+    def entry_sizes(self, blocks: Blocks, state: State) -> ComplexArray:
+        """What the entries of k and of omega c are measured by: i for those of damping, (n, 8)."""
+        return np.repeat(self._direct(blocks, state) * [1.0, 1j], 4, axis=1)
+
     def _direct(self, blocks: Blocks, state: State) -> FloatArray:
         """Mean direct coefficients k and omega c of every block's point, (n, 2)."""
         diagonal = state.h[blocks.point][:, [0, 1], [0, 1]]
@@ -73,7 +76,3 @@ class LoadTurn(Additive):
     def _aside(self, blocks: Blocks) -> FloatArray:
         """Ln W of every block beside the middle of its family, (n,)."""
         return (self._log_load - self._middle[self._family])[blocks.point]
-
-    def turned(self, blocks: Blocks, state: State, value: FloatArray) -> ComplexArray:
-        """Readings of a load turned by one radian with the numbers (q,) found, (n, m + 2)."""
-        return np.asarray(self.per_radian(blocks, state) @ value)
