@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 
 from tpjb_ident.pivot import law_fit
-from tpjb_ident.pivot.blocks import PivotSettings
-from tpjb_ident.pivot.fit import contact_onset, contact_onset_se
+from tpjb_ident.pivot.fit import CONTACT_TOLERANCE, contact_onset
 from tpjb_ident.pivot.law_fit import (
     ALIKE,
     HOPELESS,
     SMALLEST_SHARE,
     FitData,
     LawFit,
+    informed_law,
     keep_likely,
     posterior_weights,
-    shared_priors,
     with_shared_shape,
 )
 from tpjb_ident.pivot.laws import LAWS
@@ -44,11 +43,9 @@ def test_a_pad_alone_weighs_evidence_with_the_stated_priors():
     np.testing.assert_allclose(weights, by_hand / by_hand.sum(), rtol=1e-12)
 
 
-PADS = (
-    [("linear", False, 0.3), ("linear", True, 0.9), ("power", False, 0.0), ("spline", False, 1.0)],
-    [("linear", False, 0.5), ("linear", True, 0.1), ("power", False, 1.2), ("power", True, 1.1)],
-    [("linear", False, 1.4), ("power", False, 0.2), ("spline", False, 2.0)],
-)
+TRIED = (("linear", False), ("linear", True), ("power", False), ("power", True), ("spline", False))
+EVIDENCE = ((0.3, 0.9, 0.0, -9.0, 1.0), (0.5, 0.1, 1.2, 1.1, -9.0), (1.4, -9.0, 0.2, -9.0, 2.0))
+PADS = [[(*variant, size) for variant, size in zip(TRIED, sizes)] for sizes in EVIDENCE]
 
 
 def test_pads_of_one_bearing_vote_for_each_other():
@@ -90,56 +87,31 @@ def test_what_is_kept_is_sorted_and_sums_to_one():
 
 def test_the_onset_of_a_straight_pivot_is_a_logarithm():
     """gap / F0 exp(-F / F0) = tolerance times the compliance, which is constant."""
-    gap, decay, scale, tolerance = 3e-6, 400.0, 4e-9, 0.05
+    gap, decay, scale = 3e-6, 400.0, 4e-9
     covariance = np.diag([1e-14, 1e-6, 0.02, 1e-7, 0.05]) ** 2
     covariance[3, 4] = covariance[4, 3] = -0.3e-7 * 0.05
     fit = fitted("linear", contact=True, gap=gap, decay=decay, scale=scale, covariance=covariance)
-    onset = decay * math.log(gap / (decay * tolerance * scale))
-    assert contact_onset(fit, tolerance) == pytest.approx(onset, rel=1e-5)
+    onset = decay * math.log(gap / (decay * CONTACT_TOLERANCE * scale))
     slope = np.array([0.0, 0.0, -decay, decay / gap, onset - decay])
-    assert contact_onset_se(fit, tolerance) == pytest.approx(math.sqrt(slope @ covariance @ slope), rel=0.01)
+    load, error = contact_onset(fit)
+    assert load == pytest.approx(onset, rel=1e-5)
+    assert error == pytest.approx(math.sqrt(slope @ covariance @ slope), rel=0.01)
 
 
 @pytest.mark.parametrize(("name", "shape"), [("power", (0.6,)), ("hertz-point", ()), ("hertz-line", (0.1,))])
 def test_at_the_onset_the_missing_contact_adds_its_share(name, shape):
     fit = fitted(name, contact=True, shape=shape, gap=4e-6)
-    for tolerance in (0.02, 0.05, 0.2):
-        at = np.array([contact_onset(fit, tolerance)])
-        assert at[0] > 0.0
-        decay = np.exp(fit.theta[-1])
-        missing = fit.theta[-2] / decay * np.exp(-at / decay)
-        assert missing == pytest.approx(tolerance * fit.compliance(at), rel=1e-4)
+    at, decay = np.array([contact_onset(fit)[0]]), np.exp(fit.theta[-1])
+    assert at[0] > 0.0
+    missing = fit.theta[-2] / decay * np.exp(-at / decay)
+    assert missing == pytest.approx(CONTACT_TOLERANCE * fit.compliance(at), rel=1e-4)
 
 
 def test_contact_that_lacks_nothing_has_no_onset():
-    assert contact_onset(fitted("linear"), 0.05) == 0.0
-    assert contact_onset_se(fitted("linear"), 0.05) == 0.0
-    assert contact_onset(fitted("linear", contact=True, gap=0.0), 0.05) == 0.0
-    assert contact_onset(fitted("linear", contact=True, gap=-1e-6), 0.05) == 0.0
-    # a gap so small that even at no load it adds less than the share
-    assert contact_onset(fitted("linear", contact=True, gap=1e-9), 0.05) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"laws": ("hertz",)}, r"laws must name some of hertz-line, .*spline, got \['hertz'\]"),
-        ({"laws": ()}, "got none"),
-        ({"block": 0.0}, "block must be positive, got 0.0"),
-        ({"longest_glitch": 0}, "longest_glitch must be positive, got 0"),
-        ({"lag_allowance": -1.0}, "lag_allowance must be positive"),
-        ({"contact_tolerance": math.nan}, "contact_tolerance must be positive"),
-        ({"drift_rate": 0.0}, "drift_rate must be positive"),
-    ],
-)
-def test_settings_without_sense_are_refused(fields, message):
-    with pytest.raises(ValueError, match=message):
-        PivotSettings(**fields)
-
-
-def test_settings_with_sense_are_taken():
-    assert PivotSettings(laws=("linear",), block=0.02, drift_rate=1e-12).laws == ("linear",)
-    assert set(PivotSettings().laws) == set(LAWS)
+    assert contact_onset(fitted("linear")) == (0.0, 0.0)
+    # the last gap is so small that even at no load it adds less than the share
+    for gap in (0.0, -1e-6, 1e-9):
+        assert contact_onset(fitted("linear", contact=True, gap=gap))[0] == 0.0
 
 
 def with_information(information, own, shape, law="power", share_evidence=0.0):
@@ -164,24 +136,19 @@ def test_a_shape_known_from_other_pads_is_a_mean_of_random_effects(name):
         root = rng.standard_normal((k, k))
         information = 2000.0 * (root @ root.T + np.eye(k))
         mode = np.linalg.solve(information + own, information @ estimate + own @ law.prior_mean)
-        fits.append([with_information(information, own, mode, name), fitted("linear")])
+        fits += [(with_information(information, own, mode, name), share[0]), (fitted("linear"), share[1])]
         told = share[0] * np.linalg.inv(np.linalg.inv(information) + spread)
         precision, pull = precision + told, pull + told @ estimate
-    asked = [fitted(name, shape=law.prior_mean, covariance=np.eye(3 + k)), fitted("linear")]
-    prior = shared_priors([*fits, asked], [*shares, np.array([0.5, 0.5])], pad=3)
-    assert set(prior) == {name}
-    np.testing.assert_allclose(prior[name].mean, np.linalg.solve(precision, pull), rtol=1e-9)
-    np.testing.assert_allclose(prior[name].precision, np.linalg.inv(np.linalg.inv(precision) + spread), rtol=1e-9)
+    told = informed_law(law, fits)
+    np.testing.assert_allclose(told.prior_mean, np.linalg.solve(precision, pull), rtol=1e-9)
+    np.testing.assert_allclose(told.prior_precision, np.linalg.inv(np.linalg.inv(precision) + spread), rtol=1e-9)
 
 
 @pytest.mark.parametrize(("share", "asked"), [(0.9 * SMALLEST_SHARE, False), (1.1 * SMALLEST_SHARE, True)])
 def test_a_law_that_no_other_pad_likes_has_no_shape_to_share(share, asked):
-    own = LAWS["power"].prior_precision
-    pad = [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]
-    weights = [np.array([share, 1.0 - share]), np.array([0.5, 0.5])]
-    assert ("power" in shared_priors([pad, pad], weights, pad=1)) is asked
-    # what the pad itself likes does not count
-    assert "power" not in shared_priors([pad, pad], [np.array([0.0, 1.0]), np.array([1.0, 0.0])], pad=1)
+    law = LAWS["power"]
+    fit = with_information(np.array([[900.0]]), law.prior_precision, [0.7])
+    assert (informed_law(law, [(fit, share), (fitted("linear"), 1.0 - share)]) is not None) is asked
 
 
 def test_both_priors_count_alike_and_the_better_fit_stays(monkeypatch):
@@ -204,7 +171,7 @@ def test_a_hopeless_law_is_not_fitted_again(behind, asked, monkeypatch):
     pads = [[poor, fitted("linear")], [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]]
     calls = []
 
-    def refit(law, contact, data, prior, start):
+    def refit(law, contact, data, start):
         calls.append(data)
         return poor if data == "first" else pads[1][0]
 
@@ -237,10 +204,6 @@ def test_a_pad_that_shows_half_its_law_takes_the_shape_from_the_others():
 
 
 def test_evidence_is_that_of_the_prior_given():
-    one = blocks_of_a_sphere(0.3)
-    law = LAWS["point-in-series"]
-    known = law_fit.ShapePrior(law.prior_mean, law.prior_precision)
-    plain = law_fit.fit_law(law, False, one).log_evidence
-    assert law_fit.fit_law(law, False, one, known).log_evidence == pytest.approx(plain)
-    sharp = dataclasses.replace(known, mean=np.array([0.3]), precision=np.array([[400.0]]))
-    assert law_fit.fit_law(law, False, one, sharp).log_evidence > plain
+    one, law = blocks_of_a_sphere(0.3), LAWS["point-in-series"]
+    sharp = dataclasses.replace(law, prior_mean=np.array([0.3]), prior_precision=np.array([[400.0]]))
+    assert law_fit.fit_law(sharp, False, one).log_evidence > law_fit.fit_law(law, False, one).log_evidence

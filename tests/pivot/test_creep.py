@@ -31,7 +31,7 @@ def campaign(creep=0.0, drift=0.0, pads=5):
         deflection += np.linalg.cholesky(NOISE.covariance(time, duration)) @ rng.standard_normal(n)
         hold, branch = np.repeat(np.arange(len(LEVELS)), PER), np.ones(n, dtype=int)
         blocks = Blocks(time, duration, load, zeros, deflection, zeros, zeros, zeros, hold, branch)
-        holds = tuple(Hold(LONG * k, LONG * (k + 1), level, 1) for k, level in enumerate(LEVELS))
+        holds = tuple(Hold(LONG * k, LONG * (k + 1), level) for k, level in enumerate(LEVELS))
         made.append(replace(one, blocks=blocks, holds=holds, good=np.ones(n, dtype=bool)))
     return made
 
@@ -39,7 +39,7 @@ def campaign(creep=0.0, drift=0.0, pads=5):
 @pytest.mark.parametrize(("creep", "drift"), [(0.0, 0.0), (0.0, 2e-9), (0.02, 0.0), (0.02, 2e-9)])
 def test_what_all_holds_show_alike_is_taken_off_and_drift_is_not(creep, drift):
     given = campaign(creep, drift)
-    less, _, conditions = without_creep(given, NOISE, 1e-8)
+    less, _, conditions = without_creep(given, NOISE)
     assert [str(c) for c in conditions] == (["deflection-creeps"] if creep else [])
     if not creep:
         assert less == given
@@ -52,4 +52,4 @@ def test_what_all_holds_show_alike_is_taken_off_and_drift_is_not(creep, drift):
 
 def test_records_without_holds_tell_no_creep():
     ramps = [replace(one, holds=()) for one in campaign(0.02)]
-    assert without_creep(ramps, NOISE, 1e-8) == (ramps, NOISE, ())
+    assert without_creep(ramps, NOISE) == (ramps, NOISE, ())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tpjb_ident.phasors.slow_samples import good_samples
-from tpjb_ident.pivot.blocks import MOST_BLOCKS, Hold, Samples, cut_blocks, find_holds
+from tpjb_ident.pivot.blocks import MOST_BLOCKS, Hold, cut_blocks, find_holds
 
 RATE = 500.0
 
@@ -108,29 +108,15 @@ def test_a_record_may_begin_and_end_within_a_ramp(slope):
 
 def samples(load, start=0.0, rate=RATE, keep=slice(None)):
     time = start + np.arange(len(load)) / rate
-    vector = np.column_stack([0.5 * load, -load])
-    return Samples(time[keep], vector[keep], 1e-9 * vector[keep], -np.pi / 2)
-
-
-@pytest.mark.parametrize("angle", [-1.2, 0.4, 2.9])
-def test_a_vector_is_taken_apart(angle):
-    load, across = np.linspace(100.0, 3000.0, 500), angle + np.pi / 2
-    forces = np.outer(load, [np.cos(angle), np.sin(angle)])
-    moves = np.outer(1e-9 * load, [np.cos(across), np.sin(across)])
-    one = Samples(np.arange(500) / RATE, forces, moves, angle)
-    np.testing.assert_allclose(one.along, load)
-    blocks = cut_blocks(one, (), 0.1)
-    np.testing.assert_allclose(blocks.load, 100.0 + 2900.0 / 499 * RATE * blocks.time)
-    np.testing.assert_allclose(blocks.across_load, 0.0, atol=1e-9)
-    np.testing.assert_allclose(blocks.deflection, 0.0, atol=1e-15)
-    np.testing.assert_allclose(blocks.across, 1e-9 * blocks.load)
+    vector = np.column_stack([load, 0.5 * load])
+    return time[keep], np.hstack([vector, 1e-9 * vector])[keep]
 
 
 @pytest.mark.parametrize("start", [0.0, 500.0])
 def test_a_ramp_is_cut_into_halves_of_the_length(start):
     """Ten seconds in pieces of a twentieth, each with its exact mean, whenever the clock started."""
     load = 100.0 + 0.8 * np.arange(5001)
-    blocks = cut_blocks(samples(load, start), (), 0.1)
+    blocks = cut_blocks(*samples(load, start), (), 0.1)
     assert len(blocks) == 200
     np.testing.assert_allclose(np.diff(blocks.time), 0.05, atol=2e-3)
     np.testing.assert_allclose(blocks.duration, 0.05, atol=2.1e-3)
@@ -143,7 +129,7 @@ def test_a_ramp_is_cut_into_halves_of_the_length(start):
     np.testing.assert_allclose(blocks.load_spread, 0.0, atol=1e-9)
     assert set(blocks.hold) == {-1}
     assert set(blocks.branch) == {1}
-    assert set(cut_blocks(samples(load[::-1], start), (), 0.1).branch) == {-1}
+    assert set(cut_blocks(*samples(load[::-1], start), (), 0.1).branch) == {-1}
     some = blocks.take(np.arange(200) % 3 == 0)
     assert len(some) == 67
     np.testing.assert_array_equal(some.load, blocks.load[::3])
@@ -151,8 +137,8 @@ def test_a_ramp_is_cut_into_halves_of_the_length(start):
 
 def test_holds_have_pieces_of_their_own():
     load = np.interp(np.arange(3000) / RATE, [0, 2, 3, 4, 6], [0, 1000, 1000, 2000, 0])
-    holds = (Hold(2.0, 3.0, 1000.0, 1), Hold(4.0, 4.05, 2000.0, -1))
-    blocks = cut_blocks(samples(load), holds, 0.1)
+    holds = (Hold(2.0, 3.0, 1000.0), Hold(4.0, 4.05, 2000.0))
+    blocks = cut_blocks(*samples(load), holds, 0.1)
     first = blocks.hold == 0
     assert first.sum() == 10
     np.testing.assert_allclose(blocks.duration[first], 0.1, atol=2.1e-3)
@@ -161,7 +147,6 @@ def test_holds_have_pieces_of_their_own():
     assert (blocks.branch[first] == 1).all()
     # half a piece's length is one piece
     assert (blocks.hold == 1).sum() == 1
-    assert blocks.branch[blocks.hold == 1] == -1
     np.testing.assert_allclose(blocks.duration[blocks.hold < 0], 0.05, atol=2.1e-3)
     up, down = blocks.time < 2.0, blocks.time > 4.1
     assert (up.sum(), down.sum()) == (40, 38)
@@ -171,13 +156,13 @@ def test_holds_have_pieces_of_their_own():
 
 @pytest.mark.parametrize(("hold", "pieces"), [(0.19, 0), (0.21, 1), (0.74, 1), (0.76, 2), (1.24, 2), (1.26, 3)])
 def test_pieces_are_about_as_long_as_asked(hold, pieces):
-    blocks = cut_blocks(samples(np.full(3001, 500.0)), (Hold(2.0, 2.0 + hold, 500.0, 1),), 0.5)
+    blocks = cut_blocks(*samples(np.full(3001, 500.0)), (Hold(2.0, 2.0 + hold, 500.0),), 0.5)
     assert (blocks.hold == 0).sum() == pieces
 
 
 def test_a_level_in_noise_has_the_spread_of_its_mean():
     load = 1000.0 + 20.0 * noise(20_000)
-    blocks = cut_blocks(samples(load), (Hold(0.0, 40.0, 1000.0, 1),), 0.2)
+    blocks = cut_blocks(*samples(load), (Hold(0.0, 40.0, 1000.0),), 0.2)
     np.testing.assert_allclose(blocks.load_spread, 20.0 / np.sqrt(100.0), rtol=0.03)
     assert np.std(blocks.load) == pytest.approx(2.0, rel=0.15)
 
@@ -186,21 +171,21 @@ def test_a_level_in_noise_has_the_spread_of_its_mean():
 def test_a_piece_with_half_of_its_samples_stays(lost, kept):
     keep = np.ones(5001, dtype=bool)
     keep[2000 : 2000 + lost] = False
-    blocks = cut_blocks(samples(np.full(5001, 500.0), keep=keep), (Hold(0.0, 10.0, 500.0, 1),), 0.1)
+    blocks = cut_blocks(*samples(np.full(5001, 500.0), keep=keep), (Hold(0.0, 10.0, 500.0),), 0.1)
     assert len(blocks) == (100 if kept else 99)
 
 
 def test_three_samples_make_a_piece_and_two_do_not():
-    hold = (Hold(0.0, 10.0, 500.0, 1),)
-    assert len(cut_blocks(samples(np.full(401, 500.0), rate=40.0), hold, 0.1)) == 100
-    assert len(cut_blocks(samples(np.full(151, 500.0), rate=15.0), hold, 0.1)) == 0
+    hold = (Hold(0.0, 10.0, 500.0),)
+    assert len(cut_blocks(*samples(np.full(401, 500.0), rate=40.0), hold, 0.1)) == 100
+    assert len(cut_blocks(*samples(np.full(151, 500.0), rate=15.0), hold, 0.1)) == 0
 
 
 @pytest.mark.parametrize(("held", "seconds"), [(0.0, 440.0), (440.0, 440.0), (220.0, 440.0), (30.0, 40.0)])
 def test_long_records_have_as_many_pieces_as_can_be_borne(held, seconds):
     n = int(seconds * 100)
     load = np.interp(np.arange(n + 1) / 100.0, [0, held, seconds], [100.0, 100.0, 5000.0])
-    blocks = cut_blocks(samples(load, rate=100.0), (Hold(0.0, held, 100.0, 1),) if held else (), 0.2)
+    blocks = cut_blocks(*samples(load, rate=100.0), (Hold(0.0, held, 100.0),) if held else (), 0.2)
     assert len(blocks) == pytest.approx(min(MOST_BLOCKS, held / 0.2 + (seconds - held) / 0.1), abs=2)
 
 
@@ -209,15 +194,25 @@ def test_the_load_turns_where_it_was_farthest():
     knots = ([0, 4, 4.06, 8, 12], [0.0, 1000.0, 970.0, 2000.0, 500.0])
     time = np.arange(6001) / RATE
     load = 300.0 + np.interp(time, *knots)
-    blocks = cut_blocks(samples(load), (), 0.1)
+    blocks = cut_blocks(*samples(load), (), 0.1)
     assert (blocks.branch[blocks.time < 7.99] == 1).all()
     assert (blocks.branch[blocks.time > 8.01] == -1).all()
-    mirrored = cut_blocks(samples(5000.0 - load), (), 0.1)
+    mirrored = cut_blocks(*samples(5000.0 - load), (), 0.1)
     np.testing.assert_array_equal(mirrored.branch, -blocks.branch)
-    again = cut_blocks(samples(300.0 + np.interp(time, *np.array([[0, 3, 6, 9, 12], [0, 900, 100, 1000, 0]]))), (), 0.1)
+    again = cut_blocks(
+        *samples(300.0 + np.interp(time, *np.array([[0, 3, 6, 9, 12], [0, 900, 100, 1000, 0]]))), (), 0.1
+    )
     turns = again.time[1:][np.diff(again.branch) != 0]
     np.testing.assert_allclose(turns, [3.025, 6.025, 9.025], atol=0.06)
     assert again.branch[0] == 1
+
+
+def reached(time, load, holds):
+    """Whether each hold was reached from below, +1, or from above."""
+    blocks = cut_blocks(time, np.outer(load, [1.0, 0.0, 1e-9, 0.0]), holds)
+    senses = [set(blocks.branch[blocks.hold == k].tolist()) for k in range(len(holds))]
+    assert {len(sense) for sense in senses} == {1}
+    return [sense.pop() for sense in senses]
 
 
 def staircase(rng=None, hold=1.0, ramp=0.5, levels=(1000.0, 2000.0, 3000.0), rate=RATE):
@@ -232,9 +227,10 @@ def staircase(rng=None, hold=1.0, ramp=0.5, levels=(1000.0, 2000.0, 3000.0), rat
 
 def test_holds_without_noise_have_their_exact_level_branch_and_length():
     levels = (1000.0, 2000.0, 3000.0, 2000.0, 1000.0)
-    holds = find_holds(*staircase(levels=levels))
+    time, load = staircase(levels=levels)
+    holds = find_holds(time, load)
+    assert reached(time, load, holds) == [1, 1, 1, -1, -1]
     assert [hold.level for hold in holds] == pytest.approx(levels)
-    assert [hold.branch for hold in holds] == [1, 1, 1, -1, -1]
     for k, hold in enumerate(holds):
         begin = 0.5 + 1.5 * k
         assert begin - 1e-9 <= hold.start < begin + 0.1
@@ -252,7 +248,6 @@ def test_time_and_load_may_be_counted_from_anywhere_and_in_any_unit():
     for a, b in zip(base, later, strict=True):
         assert (b.start - 32.0, b.stop - 32.0) == pytest.approx((a.start, a.stop), abs=1e-9)
         assert b.level == pytest.approx(1024.0 * a.level)
-        assert b.branch == a.branch
 
 
 @pytest.mark.parametrize(("start", "hold"), [(1e3, 1.0), (0.0, 20.0)])
@@ -317,7 +312,7 @@ def test_noise_does_not_decide_how_a_first_hold_was_reached(levels, branches):
         time, load = staircase(np.random.default_rng(seed), levels=levels)
         late = time > 0.5  # the record starts when the first level has been reached
         found = find_holds(time[late], load[late])
-        assert [hold.branch for hold in found] == branches
+        assert reached(time[late], load[late], found) == branches
 
 
 @pytest.mark.parametrize("sense", [1, -1])
@@ -359,7 +354,6 @@ def test_a_record_that_leaves_its_only_hold_has_one():
     kept = (time > 0.5) & (time < 1.9)
     (hold,) = find_holds(time[kept], load[kept])
     assert hold.level == pytest.approx(2000.0)
-    assert abs(hold.branch) == 1
 
 
 def programme(levels, holds, ramp=0.3, overshoot=0.0, leak=0.0, start=250.0):

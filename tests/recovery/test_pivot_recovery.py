@@ -31,7 +31,7 @@ from rigdata.virtual_rig import (
 from tpjb_ident.clearance.locus import measure_locus
 from tpjb_ident.clearance.measure import measure_clearance
 from tpjb_ident.conditions import sentences
-from tpjb_ident.pivot import PivotSettings, fit_pivots
+from tpjb_ident.pivot import fit_pivots
 
 ANGLES = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 LOADS = np.array([1000.0, 2000.0, 4000.0])
@@ -258,7 +258,7 @@ def test_mistakes_on_the_mirror_line_show_in_the_pickup_alone(tmp_path, fault):
 def test_a_refused_run_can_be_left_out(tmp_path):
     fault = Fault("wrong_pad", "p-2-up", value=4)
     source, _ = campaign(tmp_path / "c.h5", bearing("sphere", 3), 3, faults=(fault,))
-    curves = fit_pivots(source, ANGLES, PivotSettings(on_refusal="skip"))
+    curves = fit_pivots(source, ANGLES, on_refusal="skip")
     assert [c.pad for c in curves] == [1, 3, 4, 5]
     assert all(any(s.startswith("runs-refused: p-2-up") for s in sentences(c.status)) for c in curves)
 

@@ -44,7 +44,7 @@ def curve(pad: int = 1, softer: float = 1.0, gap: float = 0.0, down: bool = Fals
     branch = np.ones(10)
     if down:
         load, branch = np.r_[load, load[-2::-1]], np.r_[branch, -np.ones(9)]
-    reading = law.reading(load / (1.0 - 0.004 * branch), branch)
+    reading, _ = law.reading_gradient(load / (1.0 - 0.004 * branch), branch)
     weight = np.ones(len(load))
     weight[4] = 0.0
     reading[4] += 0.8e-6

@@ -17,7 +17,6 @@ from tpjb_ident.check.wiring import explanation, indefiniteness, plane_of, point
 from tpjb_ident.clearance.sweep import sweep_samples
 from tpjb_ident.errors import BadInputError
 from tpjb_ident.phasors.slow_samples import live_run
-from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.dry_record import DryRecord, read_dry_run
 from tpjb_ident.pivot.refusals import refused_records
 
@@ -43,13 +42,12 @@ _ASIDE, _MANY = 0.7, 5.0
 
 def check_dry(runs: Sequence[Observation]) -> None:
     """Dry pivot runs: what the fit of the pivots refuses, contradicting numbers of pads."""
-    settings = PivotSettings()
     observations, records = [], []
     for observation in runs:
         run = observation.run
         direction = run.point.static_load_direction if "static_load_direction" in run.stated else None
         try:
-            records.append(read_dry_run(run, direction, settings))
+            records.append(read_dry_run(run, direction))
             observations.append(observation)
         except RigDataError as error:
             _take(observation, error.problems)
@@ -57,7 +55,7 @@ def check_dry(runs: Sequence[Observation]) -> None:
     for record in records:
         angles[record.pad - 1] = record.angle
     try:
-        records, problems, _ = refused_records(records, settings, angles)
+        records, problems, _ = refused_records(records, angles)
     except BadInputError:  # holds too short for the fit
         return
     first = {problem.run: problem for problem in reversed(problems)}

@@ -40,12 +40,12 @@ class StaticTests:
 def measure_static(campaign: Campaign, bearing: Bearing, with_pivots: bool = True) -> StaticTests:
     """Measure what the campaign holds of pivot curves, clearance polygon and locus."""
     from tpjb_ident.clearance.locus import measure_locus
-    from tpjb_ident.pivot import PivotSettings, fit_pivots
+    from tpjb_ident.pivot import fit_pivots
 
     angles = [pad.pivot_angle for pad in bearing.pads]
     curves: tuple[PivotCurve, ...] = ()
     if with_pivots and campaign.of_kind("dry_pivot"):
-        curves = fit_pivots(campaign, angles, PivotSettings(on_refusal="few"))
+        curves = fit_pivots(campaign, angles, on_refusal="few")
     clearance, excluded = _clearance(campaign, angles, curves)
     locus = measure_locus(campaign, clearance) if campaign.of_kind("locus") else None
     excluded += [c for part in (*curves[:1], locus) if part is not None for c in part.status if c == "runs-refused"]

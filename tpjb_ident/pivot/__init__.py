@@ -1,6 +1,5 @@
 """Dry pivot tests to load-deflection curves per pad (paper, Sec. 5)."""
 
-from tpjb_ident.pivot.blocks import PivotSettings
 from tpjb_ident.pivot.curve import Hysteresis, PivotCurve, PivotSteps
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.tables import pads_table, pivot_table, pivots_text, write_pivots
@@ -8,7 +7,6 @@ from tpjb_ident.pivot.tables import pads_table, pivot_table, pivots_text, write_
 __all__ = [
     "Hysteresis",
     "PivotCurve",
-    "PivotSettings",
     "PivotSteps",
     "fit_pivots",
     "pads_table",

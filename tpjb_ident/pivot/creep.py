@@ -10,16 +10,18 @@ at the largest load counts as an error of all deflections alike.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import special
 
 from rigdata.arrays import FloatArray
 from tpjb_ident.conditions import Condition
 from tpjb_ident.phasors.slow_noise import NoiseModel
-from tpjb_ident.pivot.dry_record import DryRecord, noise_within_holds
+from tpjb_ident.pivot.dry_record import DryRecord, pooled_noise
 
 _PLAUSIBLE = 0.03  # share of the deflection that liners and joints creep: what holds hardly show is not made large
 _TIMES = (0.3, 1.0, 3.0, 10.0)  # time constants over the usual length of a hold
@@ -29,7 +31,7 @@ _ROUNDS = 4
 
 
 def without_creep(
-    records: Sequence[DryRecord], noise: NoiseModel, drift_rate: float
+    records: Sequence[DryRecord], noise: NoiseModel
 ) -> tuple[list[DryRecord], NoiseModel, tuple[Condition, ...]]:
     """Records less the creep that their holds show alike, their noise, and a condition.
 
@@ -38,7 +40,8 @@ def without_creep(
     held = [record for record in records if record.holds]
     if not held:
         return list(records), noise, ()
-    times = np.median([hold.duration for record in held for hold in record.holds]) * np.array(_TIMES)
+    durations = [hold.duration for hold in itertools.chain.from_iterable(record.holds for record in held)]
+    times = np.median(durations) * np.array(_TIMES)
     less = list(records)
     condition: tuple[Condition, ...] = ()
     for _ in range(_ROUNDS):  # what noise there is shows when the creep is off: until then it takes much for drift
@@ -51,11 +54,9 @@ def without_creep(
         best = int(np.argmax(share / error))
         if share[best] < max(_LEAST * error[best], _ALIKE * math.sqrt(scatter[best] / total[best])):
             break
-        gain = np.where(share > 0.0, (share / error) ** 2, 0.0)
-        weight = np.exp(0.5 * (gain - gain.max()))
-        weight /= weight.sum()
+        weight = special.softmax(0.5 * np.where(share > 0.0, (share / error) ** 2, 0.0))
         less = [_less(record, _courses(record, times) @ (share * weight)) for record in records]
-        noise = noise_within_holds(less, drift_rate)
+        noise = pooled_noise(less)
         percent, seconds = f"{100 * share[best]:.1f} % (se {100 * error[best]:.1f} %)", times[best % len(times)]
         detail = f"{percent} of the deflection follow a step within some {seconds:.2g} s"
         condition = (Condition("deflection-creeps", detail),)
@@ -84,13 +85,11 @@ def _held_to_light(record: DryRecord, noise: NoiseModel, times: FloatArray) -> t
     load = blocks.load - level @ (level.T @ blocks.load / level.sum(axis=0))  # a load that wanders moves the pivot too
     if np.any(load):
         level = np.column_stack([level, load / np.abs(load).max()])
-    covariance = noise.covariance(blocks.time, blocks.duration) + record.quantisation**2 * np.eye(len(blocks))
-    columns = np.column_stack([blocks.deflection, _courses(record, times)[used]])
-    whitened = np.linalg.solve(np.linalg.cholesky(covariance), np.column_stack([level, columns]))
-    basis, _ = np.linalg.qr(whitened[:, : level.shape[1]])
-    free = whitened[:, level.shape[1] :]
-    free = free - basis @ (basis.T @ free)
-    return np.sum(free[:, 1:] ** 2, axis=0), free[:, 1:].T @ free[:, 0]
+    root = np.linalg.cholesky(blocks.covariance(noise, record.quantisation))
+    levels, courses = np.linalg.solve(root, level), np.linalg.solve(root, _courses(record, times)[used])
+    basis, _ = np.linalg.qr(levels)
+    free = courses - basis @ (basis.T @ courses)
+    return np.sum(free**2, axis=0), free.T @ np.linalg.solve(root, blocks.deflection)
 
 
 def _less(record: DryRecord, creep: FloatArray) -> DryRecord:

@@ -55,33 +55,29 @@ def measure_loop(
     load: FloatArray, deflection: FloatArray, covariance: FloatArray, branch: IntArray
 ) -> Hysteresis | None:
     """Area between loading and unloading points (n,) at loads [N]; covariance (n, n) of the deflections [m]."""
-    up, down = branch > 0, branch < 0
+    down, up = branch < 0, branch > 0
     if up.sum() < 2 or down.sum() < 2:
         return None
     low = float(max(load[up].min(), load[down].min()))
     high = float(min(load[up].max(), load[down].max()))
     if not high > low:
         return None
-    grid = np.linspace(low, high, 200)
-    width = np.zeros(len(grid))
-    gain = np.zeros((200, len(load)))
+    grid, step = np.linspace(low, high, 200, retstep=True)
+    trapezoid = np.full(len(grid), step)
+    trapezoid[[0, -1]] *= 0.5
+    # trapezoid weights times interpolation weights: the area is linear in the points, so is its error
+    sensitivity, ends = np.zeros(len(load)), np.zeros(2)
     for sign, members in ((1.0, down), (-1.0, up)):
         order = np.flatnonzero(members)[np.argsort(load[members], kind="stable")]
         # equal loads are set apart by a hair
         knots = load[order] + 1e-9 * max(float(np.ptp(load[order])), 1.0) * np.arange(len(order))
-        weights = interpolation(grid, knots)
-        gain[:, order] = sign * weights
-        width += sign * (weights @ deflection[order])
-    # trapezoid weights times interpolation weights: the area is linear in the points, so is its error
-    trapezoid = np.full(len(grid), grid[1] - grid[0])
-    trapezoid[[0, -1]] *= 0.5
-    energy = float(trapezoid @ width)
-    sensitivity = trapezoid @ gain
-    energy_se = math.sqrt(max(float(sensitivity @ covariance @ sensitivity), 0.0))
-    ends = np.interp([low, high], np.sort(load[up]), deflection[up][np.argsort(load[up])])
+        sensitivity[order] = sign * (trapezoid @ interpolation(grid, knots))
+        ends = np.interp([low, high], load[order], deflection[order])
     stored = math.pi / 4.0 * (high - low) * abs(float(ends[1] - ends[0]))
     if stored == 0.0:
         return None
+    energy = float(sensitivity @ deflection)
+    energy_se = math.sqrt(max(float(sensitivity @ covariance @ sensitivity), 0.0))
     return Hysteresis(energy, energy_se, energy / stored, energy_se / stored, (low, high))
 
 
@@ -196,8 +192,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        values = _loads(load)
-        return self.law.deflection(values.ravel()).reshape(values.shape)
+        return self.law.deflection(_positive("load", load))
 
     def load(self, deflection: ArrayLike) -> FloatArray:
         """Pad load [N] at deflections [m] (the inverse of `deflection`).
@@ -207,18 +202,14 @@ class PivotCurve(Presented):
         deflection : array_like
             [m], not negative.
         """
-        values = np.asarray(deflection, dtype=float)
-        if np.any(~(values >= 0.0)):
-            raise ArgumentError("deflection must be zero or positive, and not NaN")
-        return np.array([self._invert(float(x)) for x in values.ravel()]).reshape(values.shape)
-
-    def _invert(self, deflection: float) -> float:
-        if deflection == 0.0:
-            return 0.0
-        top = self.valid_to
-        while float(self.deflection(top)) < deflection:
+        values, top = _positive("deflection", deflection), self.valid_to
+        while self.deflection(top) < np.max(values, initial=0.0):
             top *= 2.0
-        return float(optimize.brentq(lambda w: float(self.deflection(w)) - deflection, 0.0, top, xtol=1e-9 * top))
+
+        def load_at(deflection: float) -> float:
+            return float(optimize.brentq(lambda w: self.deflection(w) - deflection, 0.0, top, xtol=1e-12 * top))
+
+        return np.array([load_at(value) for value in values.ravel()]).reshape(values.shape)
 
     def stiffness(self, load: ArrayLike) -> FloatArray:
         """Tangent stiffness dW/d delta [N/m] at pad loads [N], what small vibrations feel (paper, Eq. 18).
@@ -228,8 +219,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        values = _loads(load)
-        return np.asarray(1.0 / self.law.compliance(values.ravel())).reshape(values.shape)
+        return np.asarray(1.0 / self.law.compliance(_positive("load", load)))
 
     def secant(self, load: ArrayLike) -> FloatArray:
         """Secant stiffness W/delta [N/m] at pad loads [N], what the printed formulas mean (Eq. 16, 17).
@@ -239,8 +229,7 @@ class PivotCurve(Presented):
         load : array_like
             [N], not negative.
         """
-        values = _loads(load)
-        return np.asarray(values / self.deflection(values))
+        return np.asarray(_positive("load", load) / self.deflection(load))
 
     def stiffness_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the tangent stiffness.
@@ -258,7 +247,8 @@ class PivotCurve(Presented):
             [N/m], shape of `load`. Random errors, drift, friction and the choice of the law; calibration is
             in `relative_calibration`.
         """
-        return self._band(_loads(load), level, secant=False)
+        factor = np.exp(_quantile(level) * self.relative_stiffness_se(load))
+        return np.asarray(self.stiffness(load) / factor), np.asarray(self.stiffness(load) * factor)
 
     def secant_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Interval of the secant stiffness [N/m]; as `stiffness_band`.
@@ -270,7 +260,8 @@ class PivotCurve(Presented):
         level : float, optional
             Of the interval, 0 to 1.
         """
-        return self._band(_loads(load), level, secant=True)
+        factor = np.exp(_quantile(level) * self._log_se(load, secant=True))
+        return np.asarray(self.secant(load) / factor), np.asarray(self.secant(load) * factor)
 
     def relative_stiffness_se(self, load: ArrayLike) -> FloatArray:
         """Standard error of ln(tangent stiffness) at pad loads [N].
@@ -280,20 +271,34 @@ class PivotCurve(Presented):
         load : array_like
             [N]
         """
-        return self._spread(_loads(load), secant=False)
+        return self._log_se(load, secant=False)
 
-    def relative_stiffness_covariance(self, load: ArrayLike) -> FloatArray:
-        """Covariance of ln(tangent stiffness) between pad loads (n,) [N], (n, n).
+    def relative_stiffness_covariance(self, load: ArrayLike, secant: bool = False) -> FloatArray:
+        """Covariance of ln(stiffness) between pad loads (n,) [N], (n, n).
 
-        A curve that is off is off as a whole: contact and friction bend it, noise hardly scatters it.
+        A curve that is off is off as a whole: contact and friction bend it, noise hardly scatters it. Each law's own,
+        the laws' about the leading one, and what extrapolation by so many e-folds adds.
 
         Parameters
         ----------
         load : (n,) array_like
             [N]
+        secant : bool
+            Of the secant stiffness instead of the tangent one.
         """
-        values = np.maximum(_loads(load).ravel(), 1e-6 * self.valid_to)
-        return self._log_covariance(values, secant=False)
+        loads = np.maximum(_positive("load", load).ravel(), 1e-6 * self.valid_to)
+        total = np.zeros((len(loads), len(loads)))
+        leading, _ = self.law.log_softness(loads, secant)
+        for fit, weight in zip(self.fits, self.weights, strict=True):
+            log, gradient = fit.log_softness(loads, secant)
+            difference = log - leading
+            total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
+        outside = np.maximum(loads / self.valid_to, float(np.min(self.steps.load)) / loads)
+        return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
+
+    def _log_se(self, load: ArrayLike, secant: bool) -> FloatArray:
+        variance = np.diag(self.relative_stiffness_covariance(load, secant))
+        return np.asarray(np.sqrt(variance)).reshape(np.shape(load))
 
     def reading_band(self, load: ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Deflection that the steps should show while loading, and its interval.
@@ -313,19 +318,16 @@ class PivotCurve(Presented):
         value, lo, hi : ndarray
             [m], shape of `load`.
         """
-        values = _loads(load)
-        flat, up = values.ravel(), np.ones(values.size)
-        applied = flat / (1.0 - self.law.theta[FRICTION])
-        centre = self.law.reading(applied, up)
-        variance = np.zeros(len(flat))
+        values = _positive("load", load)
+        applied, up = values.ravel() / (1.0 - self.law.theta[FRICTION]), np.ones(values.size)
+        centre, _ = self.law.reading_gradient(applied, up)
+        variance = np.zeros(len(applied))
         for fit, weight in zip(self.fits, self.weights, strict=True):
             reading, gradient = fit.reading_gradient(applied, up)
-            fit_variance = np.einsum("ij,jk,ik->i", gradient, fit.covariance, gradient)
-            variance += weight * (fit_variance + (reading - centre) ** 2)
-        half = self._quantile(level) * np.sqrt(variance)
-        value = centre - self.law.theta[OFFSET]
-        shape = values.shape
-        return value.reshape(shape), (value - half).reshape(shape), (value + half).reshape(shape)
+            variance += weight * (np.sum(gradient @ fit.covariance * gradient, axis=1) + (reading - centre) ** 2)
+        half = (_quantile(level) * np.sqrt(variance)).reshape(values.shape)
+        value = (centre - self.law.theta[OFFSET]).reshape(values.shape)
+        return value, value - half, value + half
 
     def is_extrapolated(self, load: ArrayLike) -> BoolArray:
         """True where a load lies outside what was measured with full contact.
@@ -335,37 +337,8 @@ class PivotCurve(Presented):
         load : array_like
             [N]
         """
-        values = _loads(load)
+        values = _positive("load", load)
         return np.asarray((values < self.valid_from) | (values > self.valid_to))
-
-    def _spread(self, load: FloatArray, secant: bool) -> FloatArray:
-        """Standard deviation of ln(stiffness): each law's own, and the laws' about the leading one."""
-        flat = np.maximum(load.ravel(), 1e-6 * self.valid_to)
-        return np.asarray(np.sqrt(np.diag(self._log_covariance(flat, secant)))).reshape(load.shape)
-
-    def _band(self, load: FloatArray, level: float, secant: bool) -> tuple[FloatArray, FloatArray]:
-        half = self._quantile(level) * self._spread(load, secant)
-        centre = self.secant(load) if secant else self.stiffness(load)
-        return np.asarray(centre * np.exp(-half)), np.asarray(centre * np.exp(half))
-
-    def _log_covariance(self, load: FloatArray, secant: bool) -> FloatArray:
-        """Covariance (n, n) of ln(stiffness) at loads (n,) [N].
-
-        Each law's own, the laws' about the leading one, and what extrapolation by so many e-folds adds.
-        """
-        total = np.zeros((len(load), len(load)))
-        leading, _ = self.law.log_softness(load, secant)
-        for fit, weight in zip(self.fits, self.weights, strict=True):
-            log, gradient = fit.log_softness(load, secant)
-            difference = log - leading
-            total += weight * (gradient @ fit.covariance @ gradient.T + np.outer(difference, difference))
-        outside = np.maximum(load / self.valid_to, float(np.min(self.steps.load)) / load)
-        return total + np.diag((EXTRAPOLATION_SPREAD * np.log(np.maximum(outside, 1.0))) ** 2)
-
-    def _quantile(self, level: float) -> float:
-        if not 0.0 < level < 1.0:
-            raise ArgumentError(f"level must lie between 0 and 1, got {level}")
-        return float(special.ndtri(0.5 + 0.5 * level))
 
     def to_frame(self) -> pd.DataFrame:
         """Rows of ``pivot_curves.csv``."""
@@ -386,16 +359,15 @@ class PivotCurve(Presented):
         return pivot_stiffness([self], **options)
 
     def __str__(self) -> str:
-        errors = np.sqrt(np.diag(self.law.covariance))
-        estimates = list(zip(self.law.names, self.law.theta, errors, strict=True))[SCALE:]
-        parameters = ", ".join(f"{name} = {estimate:.4g} (se {se:.2g})" for name, estimate, se in estimates)
+        parameters = []
+        for name, value, variance in zip(self.law.names, self.law.theta, np.diag(self.law.covariance), strict=True):
+            parameters.append(f"{name} = {value:.4g} (se {math.sqrt(variance):.2g})")
         middle = 0.5 * self.valid_to
-        lo, hi = (float(limit) for limit in self.stiffness_band(middle))
-        share = f"{100 * self.weights[0]:.0f} %"
-        value = float(self.stiffness(middle))
+        lo, hi = self.stiffness_band(middle)
+        law = f"{self.law.name} ({100 * self.weights[0]:.0f} %)"
         lines = [
-            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {self.law.name} ({share}), {parameters}",
-            f"  tangent stiffness at {middle:.0f} N: {value:.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
+            f"pad {self.pad} at {math.degrees(self.angle):g} deg: {law}, {', '.join(parameters[SCALE:])}",
+            f"  tangent stiffness at {middle:.0f} N: {self.stiffness(middle):.4g} N/m (95 %: {lo:.4g} to {hi:.4g})",
             f"  holds from {self.valid_from:.0f} to {self.valid_to:.0f} N; load {self.load_direction}",
         ]
         if self.onset_load > 0.0:
@@ -407,8 +379,16 @@ class PivotCurve(Presented):
         return "\n".join(lines)
 
 
-def _loads(load: ArrayLike) -> FloatArray:
-    values = np.asarray(load, dtype=float)
-    if np.any(~(values >= 0.0)):
-        raise ArgumentError("load must be zero or positive, and not NaN: a pivot can only be pressed")
-    return values
+def _positive(name: str, values: ArrayLike) -> FloatArray:
+    """Loads or deflections as an array; refused where one is negative or none: a pivot can only be pressed."""
+    numbers = np.asarray(values, dtype=float)
+    if np.any(~(numbers >= 0.0)):
+        raise ArgumentError(f"{name} must be zero or positive, and not NaN: a pivot can only be pressed")
+    return numbers
+
+
+def _quantile(level: float) -> float:
+    """Standard deviations on either side of a normal interval of this coverage."""
+    if not 0.0 < level < 1.0:
+        raise ArgumentError(f"level must lie between 0 and 1, got {level}")
+    return float(special.ndtri(0.5 + 0.5 * level))

@@ -13,13 +13,15 @@ pad's own affair.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from rigdata.arrays import FloatArray
-from tpjb_ident.pivot.laws import Law
+from tpjb_ident.pivot.laws import Law, Shape
 
 OFFSET, FRICTION, SCALE = 0, 1, 2  # places of the parameters that every law has; the shape follows
 CONTACT_GAP = 3.0e-6  # [m], plausible size of the missing contact (prior standard deviation)
@@ -79,14 +81,16 @@ class LawFit:
         return self.theta[_shape(self.law)]
 
     def deflection(self, load: FloatArray) -> FloatArray:
-        """Deflection (n,) [m] of the pivot alone at pad loads (n,) [N]."""
-        u = np.maximum(load, 0.0) / self.reference_load
-        return np.asarray(np.exp(self.theta[SCALE]) * self.reference_load * self.law.phi(u, self.shape)[0])
+        """Deflection [m] of the pivot alone at pad loads [N], of any shape."""
+        return self.reference_load * self._at(load, self.law.phi)
 
     def compliance(self, load: FloatArray) -> FloatArray:
-        """Tangent compliance d delta / dW (n,) [m/N] at pad loads (n,) [N]."""
+        """Tangent compliance d delta / dW [m/N] at pad loads [N], of any shape."""
+        return self._at(load, self.law.psi)
+
+    def _at(self, load: FloatArray, shape: Shape) -> FloatArray:
         u = np.maximum(load, 0.0) / self.reference_load
-        return np.asarray(np.exp(self.theta[SCALE]) * self.law.psi(u, self.shape)[0])
+        return np.asarray(np.exp(self.theta[SCALE]) * shape(np.ravel(u), self.shape)[0]).reshape(np.shape(u))
 
     def log_softness(self, load: FloatArray, secant: bool) -> tuple[FloatArray, FloatArray]:
         """Logarithm (n,) of deflection (`secant`) or compliance at loads (n,) [N], its derivative (n, p) by `theta`."""
@@ -97,29 +101,25 @@ class LawFit:
         gradient[:, _shape(self.law)] = derivative / np.maximum(value, 1e-300)[:, None]
         return np.log(self.deflection(load) if secant else self.compliance(load)), gradient
 
-    def reading(self, load: FloatArray, branch: FloatArray) -> FloatArray:
-        """Expected displacement reading (n,) [m] at applied loads (n,) [N], contact loss included."""
-        return self.reading_gradient(load, branch)[0]
-
     def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Expected reading (n,) [m] at applied loads (n,) [N] and its derivative (n, p) with respect to `theta`."""
+        """Expected reading (n,) [m] at applied loads (n,) [N], contact loss included, its derivative (n, p)."""
         theta, law = self.theta, self.law
         scale = np.exp(theta[SCALE])
         u = np.maximum(load * (1.0 - theta[FRICTION] * branch), 0.0) / self.reference_load
         phi, phi_q = law.phi(u, self.shape)
         psi, _ = law.psi(u, self.shape)
+        deflection = scale * self.reference_load * phi
         jacobian = np.zeros((len(load), len(theta)))
         jacobian[:, OFFSET] = 1.0
         jacobian[:, FRICTION] = -scale * psi * load * branch
-        jacobian[:, SCALE] = scale * self.reference_load * phi
+        jacobian[:, SCALE] = deflection
         jacobian[:, _shape(law)] = scale * self.reference_load * phi_q
-        value = theta[OFFSET] + scale * self.reference_load * phi
+        value = theta[OFFSET] + deflection
         if self.contact:
-            load_0 = np.exp(theta[-1])
-            decay = np.exp(-load / load_0)
+            decay = np.exp(-load / np.exp(theta[-1]))
             value = value - theta[-2] * decay
             jacobian[:, -2] = -decay
-            jacobian[:, -1] = -theta[-2] * decay * load / load_0
+            jacobian[:, -1] = -theta[-2] * decay * load / np.exp(theta[-1])
         return np.asarray(value), jacobian
 
 
@@ -129,186 +129,156 @@ def _shape(law: Law) -> slice:
 
 
 @dataclass(frozen=True)
-class ShapePrior:
-    """Gaussian prior of a law's shape parameters: mean (k,) and precision (k, k)."""
-
-    mean: FloatArray
-    precision: FloatArray
-
-
-@dataclass(frozen=True)
 class _Prior:
-    """Gaussian prior and bounds of all p parameters; flat ones have zero precision."""
+    """Gaussian prior and bounds of all p parameters: `root` takes off the mean to independent unit normals."""
 
     mean: FloatArray  #: (p,)
-    precision: FloatArray  #: (p, p)
+    root: FloatArray  #: (p, p); zero for what is flat, else upper triangular
     low: FloatArray  #: (p,)
     high: FloatArray  #: (p,)
 
 
-def _prior(law: Law, contact: bool, data: FitData, shape_prior: ShapePrior | None) -> _Prior:
+def _prior(law: Law, contact: bool, data: FitData) -> _Prior:
     p = SCALE + 1 + len(law.parameters) + (2 if contact else 0)
-    mean, precision = np.zeros(p), np.zeros((p, p))
-    low, high = np.full(p, -np.inf), np.full(p, np.inf)
-    mean[FRICTION], precision[FRICTION, FRICTION] = data.friction[0], data.friction[1] ** -2
-    low[FRICTION], high[FRICTION] = -0.2, 0.2
+    prior = _Prior(np.zeros(p), np.zeros((p, p)), np.full(p, -np.inf), np.full(p, np.inf))
     shape = _shape(law)
-    mean[shape] = law.prior_mean if shape_prior is None else shape_prior.mean
-    precision[shape, shape] = law.prior_precision if shape_prior is None else shape_prior.precision
-    low[shape], high[shape] = law.bounds
+    prior.mean[shape], (prior.low[shape], prior.high[shape]) = law.prior_mean, law.bounds
+    prior.root[shape, shape] = np.linalg.cholesky(law.prior_precision).T
+    single = {FRICTION: (*data.friction, -0.2, 0.2)}
     if contact:
         largest = float(np.max(data.load))
-        precision[-2, -2] = CONTACT_GAP**-2
-        low[-2] = 0.0
-        mean[-1], precision[-1, -1] = np.log(0.1 * largest), CONTACT_LOAD_SPREAD**-2
-        low[-1], high[-1] = np.log(0.01 * largest), np.log(largest)
-    return _Prior(mean, precision, low, high)
+        single[p - 2] = (0.0, CONTACT_GAP, 0.0, np.inf)
+        ends = np.log(0.01 * largest), np.log(largest)
+        single[p - 1] = (np.log(0.1 * largest), CONTACT_LOAD_SPREAD, *ends)
+    for k, (mean, spread, low, high) in single.items():
+        prior.mean[k], prior.root[k, k], prior.low[k], prior.high[k] = mean, 1.0 / spread, low, high
+    return prior
 
 
-def fit_law(
-    law: Law, contact: bool, data: FitData, shape_prior: ShapePrior | None = None, start: FloatArray | None = None
-) -> LawFit:
+def fit_law(law: Law, contact: bool, data: FitData, start: FloatArray | None = None) -> LawFit:
     """Fit one law by its posterior mode; `start` (p,) as `LawFit.theta`."""
-    prior = _prior(law, contact, data, shape_prior)
+    prior = _prior(law, contact, data)
     theta = _start(prior, contact, data) if start is None else np.clip(start, prior.low, prior.high)
     unit = np.ones(len(theta))
     unit[OFFSET] = np.ptp(data.deflection)  # metres and pure numbers in one matrix: scale the metres
     if contact:
         unit[-2] = CONTACT_GAP
     freedom = len(data.load) - len(theta)
-    initial = LawFit(law, data.reference_load, contact, theta, np.zeros_like(prior.precision), 0.0, 0.0, freedom)
-    theta, hessian, chi_square = _minimise(initial, data, prior, unit)
-    difference = theta - prior.mean
-    quadratic = float(difference @ prior.precision @ difference)
-    proper = np.diag(prior.precision) > 0.0  # the part of the prior that is not flat
-    log_prior = float(np.linalg.slogdet(prior.precision[np.ix_(proper, proper)])[1])
+    initial = LawFit(law, data.reference_load, contact, theta, np.zeros_like(prior.root), 0.0, 0.0, freedom)
+    theta, residual, jacobian = _minimise(initial, data, prior, unit)
+    hessian = jacobian.T @ jacobian
+    diagonal = np.diag(prior.root)  # the part of the prior that is not flat
+    log_prior = 2.0 * float(np.sum(np.log(diagonal[diagonal > 0.0])))
     # the offset's unit enters every law alike; the others' units cancel against the prior's determinant
     log_hessian = float(np.linalg.slogdet(hessian)[1]) - 2.0 * float(np.sum(np.log(unit[1:])))
-    evidence = 0.5 * (log_prior - log_hessian - chi_square - quadratic)
-    covariance = np.linalg.inv(hessian) * np.outer(unit, unit)
-    return replace(initial, theta=theta, covariance=covariance, log_evidence=evidence, chi_square=chi_square)
+    return replace(
+        initial,
+        theta=theta,
+        covariance=np.linalg.inv(hessian) * np.outer(unit, unit),
+        log_evidence=0.5 * (log_prior - log_hessian - float(residual @ residual)),
+        chi_square=float(np.sum(residual[: len(data.load)] ** 2)),
+    )
 
 
 def _start(prior: _Prior, contact: bool, data: FitData) -> FloatArray:
     """Prior shape; a straight line through the upper loads, where contact is complete, for scale and zero."""
     theta = prior.mean.copy()
     upper = data.load >= 0.3 * np.max(data.load)
-    slope, zero = np.polyfit(data.load[upper], data.deflection[upper], 1)
+    slope, theta[OFFSET] = np.polyfit(data.load[upper], data.deflection[upper], 1)
     theta[SCALE] = np.log(max(slope, 1e-3 * np.ptp(data.deflection) / np.ptp(data.load)))
-    theta[OFFSET] = zero
     if contact:
         theta[-2] = 0.3 * CONTACT_GAP
     return theta
 
 
-def _minimise(initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Levenberg-Marquardt to the posterior mode: theta (p,), Hessian (p, p) in units of `unit` (p,), chi-square."""
-    precision = prior.precision * np.outer(unit, unit)
-    whitened = data.whitener @ data.deflection
+def _minimise(
+    initial: LawFit, data: FitData, prior: _Prior, unit: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Levenberg-Marquardt to the posterior mode: theta (p,), residuals of data and prior (m + p,), their slopes.
 
-    def evaluate(theta: FloatArray) -> tuple[float, float, FloatArray, FloatArray]:
-        value, jacobian = replace(initial, theta=theta).reading_gradient(data.load, data.branch)
-        residual = whitened - data.whitener @ value
-        difference = (theta - prior.mean) / unit
-        chi_square = float(residual @ residual)
-        cost = chi_square + float(difference @ precision @ difference)
-        return cost, chi_square, residual, data.whitener @ (jacobian * unit)
-
-    damping = 1e-3
+    The slopes (m + p, p) are those of the model, in units of `unit` (p,).
+    """
     theta = initial.theta
-    cost, chi_square, residual, jacobian = evaluate(theta)
+
+    def evaluate(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        value, jacobian = replace(initial, theta=theta).reading_gradient(data.load, data.branch)
+        misfit = np.r_[data.whitener @ (data.deflection - value), prior.root @ (prior.mean - theta)]
+        return misfit, np.vstack([data.whitener @ (jacobian * unit), prior.root * unit])
+
+    residual, jacobian = evaluate(theta)
+    damping = 1e-3
     for _ in range(_ITERATIONS):
-        hessian = jacobian.T @ jacobian + precision
-        gradient = jacobian.T @ residual - precision @ ((theta - prior.mean) / unit)
+        hessian, gradient = jacobian.T @ jacobian, jacobian.T @ residual
         # a parameter that stands at its bound and wants to go on takes no part in the step
-        at_bound = ((theta <= prior.low) & (gradient < 0.0)) | ((theta >= prior.high) & (gradient > 0.0))
-        damped = hessian + damping * np.diag(np.diag(hessian))
-        damped[at_bound] = damped[:, at_bound] = 0.0
-        damped[at_bound, at_bound] = 1.0
-        step = np.linalg.solve(damped, np.where(at_bound, 0.0, gradient)) * unit
+        free = ~((theta <= prior.low) & (gradient < 0.0) | (theta >= prior.high) & (gradient > 0.0))
+        damped = (hessian + damping * np.diag(np.diag(hessian)))[np.ix_(free, free)]
+        step = np.zeros(len(theta))
+        step[free] = np.linalg.solve(damped, gradient[free])
         # shapes and logarithms: a contact gap near zero leaves its decay load free to run away
-        step *= min(1.0, _LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:] / unit[SCALE:]))), 1e-300))
-        trial = np.clip(theta + step, prior.low, prior.high)
-        trial_state = evaluate(trial)
-        if trial_state[0] <= cost:
-            gain = cost - trial_state[0]
-            theta, (cost, chi_square, residual, jacobian) = trial, trial_state
+        step *= min(1.0, _LONGEST_STEP / max(float(np.max(np.abs(step[SCALE:]))), 1e-300))
+        trial = np.clip(theta + step * unit, prior.low, prior.high)
+        trial_residual, trial_jacobian = evaluate(trial)
+        gain = float(residual @ residual - trial_residual @ trial_residual)
+        if gain >= 0.0:
+            theta, residual, jacobian = trial, trial_residual, trial_jacobian
             damping = max(damping * 0.2, 1e-9)
-            if gain < _CONVERGED:
-                break
         else:
             damping *= 8.0
-            if damping > 1e9:
-                break
-    return theta, jacobian.T @ jacobian + precision, chi_square
+        if 0.0 <= gain < _CONVERGED or damping > 1e9:
+            break
+    return theta, residual, jacobian
 
 
-def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> tuple[FloatArray, ...]:
-    """Posterior shares (n,) of the n fits of every pad."""
-    names = np.array(sorted({fit.name for candidates in fits for fit in candidates}))
-    prior = np.where(names == "spline", _SPLINE_PRIOR, 1.0)
-    prior *= _PSEUDO_PADS / prior.sum()
-    # the fits of a pad by rows, the laws by columns
-    of_law = [(np.array([[fit.name] for fit in candidates]) == names).astype(float) for candidates in fits]
-    heard = [np.array([_CONTACT_VOTE if fit.contact else 1.0 for fit in candidates]) for candidates in fits]
-    weights = [_pad_weights(*pad, prior) for pad in zip(fits, of_law, strict=True)]
-    for _ in range(30):
-        votes = np.array([(w * h) @ laws for w, h, laws in zip(weights, heard, of_law, strict=True)])
+def posterior_weights(fits: Sequence[Sequence[LawFit]]) -> FloatArray:
+    """Posterior shares (pads, n) of the n fits of every pad, which are those of the same laws in the same order."""
+    names, number = np.unique([fit.name for fit in fits[0]], return_inverse=True)
+    contact = np.array([fit.contact for fit in fits[0]])
+    evidence = np.array([[fit.log_evidence for fit in candidates] for candidates in fits])
+    of_law = np.eye(len(names))[number]
+    law_prior = np.where(names == "spline", _SPLINE_PRIOR, 1.0)
+    law_prior *= _PSEUDO_PADS / law_prior.sum()
+    contact_prior = np.where(contact, _CONTACT_LOSS_PRIOR, 1.0 - _CONTACT_LOSS_PRIOR)
+    votes, weights = np.zeros((len(fits), len(names))), np.zeros_like(evidence)
+    for _ in range(31):
         # the other pads only: a pad's own evidence must not count twice
-        law_priors = prior + votes.sum(axis=0) - votes
-        updated = [_pad_weights(*pad) for pad in zip(fits, of_law, law_priors, strict=True)]
-        change = max(float(np.max(np.abs(a - b))) for a, b in zip(updated, weights, strict=True))
+        shares = law_prior + votes.sum(axis=0) - votes
+        updated = special.softmax(np.log(shares @ of_law.T * contact_prior) + evidence, axis=1)
+        change = float(np.max(np.abs(updated - weights)))
         weights = updated
         if change < 1e-4:
             break
-    return tuple(weights)
-
-
-def _pad_weights(candidates: Sequence[LawFit], of_law: FloatArray, law_prior: FloatArray) -> FloatArray:
-    contact_prior = [_CONTACT_LOSS_PRIOR if fit.contact else 1 - _CONTACT_LOSS_PRIOR for fit in candidates]
-    logs = np.log(of_law @ law_prior * contact_prior) + [fit.log_evidence for fit in candidates]
-    weights = np.exp(logs - np.max(logs))
-    return np.asarray(weights / weights.sum())
+        votes = (weights * np.where(contact, _CONTACT_VOTE, 1.0)) @ of_law
+    return np.asarray(weights)
 
 
 def keep_likely(fits: Sequence[LawFit], weights: FloatArray) -> tuple[tuple[LawFit, ...], FloatArray]:
     """The fits that count, most likely first, with shares (n,) that sum to one."""
     order = [k for k in np.argsort(-weights, kind="stable") if weights[k] >= _SMALLEST_WEIGHT]
-    shares = weights[order]
-    return tuple(fits[k] for k in order), np.asarray(shares / shares.sum())
+    return tuple(fits[k] for k in order), np.asarray(weights[order] / weights[order].sum())
 
 
-def shared_priors(fits: Sequence[Sequence[LawFit]], weights: Sequence[FloatArray], pad: int) -> dict[str, ShapePrior]:
-    """Prior of each law's shape on one pad, from all other pads.
-
-    Laws without a shape, and laws that no other pad likes, are not in it.
-    """
-    priors = {}
-    others = [k for k in range(len(fits)) if k != pad]
-    for law in {fit.name: fit.law for fit in fits[pad] if fit.law.parameters and fit.name != "spline"}.values():
-        law_precision = law.prior_precision
-        spread = np.linalg.inv(law_precision) * ALIKE**2
-        spread_precision = np.linalg.inv(spread)
-        precision, pull, support = law_precision.copy(), law_precision @ law.prior_mean, 0.0
-        for k in others:
-            for fit, share in zip(fits[k], weights[k], strict=True):
-                if fit.name != law.name or share < 1e-6:
-                    continue
-                posterior = np.linalg.inv(fit.covariance[_shape(law), _shape(law)])
-                information = posterior - law_precision
-                # the data know a pad's own shape with `information`; it differs from the common one by `spread`
-                gain = spread_precision @ np.linalg.inv(information + spread_precision)
-                precision += share * (gain @ information)
-                pull += share * (gain @ (posterior @ fit.shape - law_precision @ law.prior_mean))
-                support += float(share)
-        if support > SMALLEST_SHARE:
-            common = np.linalg.inv(precision)
-            priors[law.name] = ShapePrior(common @ pull, np.linalg.inv(common + spread))
-    return priors
+def informed_law(law: Law, others: Sequence[tuple[LawFit, float]]) -> Law | None:
+    """A law with the prior of its shape that the fits of other pads give, each with its share; None without support."""
+    spread_precision = law.prior_precision / ALIKE**2
+    precision, pull, support = law.prior_precision.copy(), law.prior_precision @ law.prior_mean, 0.0
+    for fit, share in others:
+        if fit.name == law.name and share >= 1e-6:
+            posterior = np.linalg.inv(fit.covariance[_shape(law), _shape(law)])
+            information = posterior - law.prior_precision
+            # the data know a pad's own shape with `information`; it differs from the common one by that spread
+            gain = share * spread_precision @ np.linalg.inv(information + spread_precision)
+            precision += gain @ information
+            pull += gain @ (posterior @ fit.shape - law.prior_precision @ law.prior_mean)
+            support += share
+    if support <= SMALLEST_SHARE:
+        return None
+    common = np.linalg.inv(precision)
+    shared = np.linalg.inv(common + np.linalg.inv(spread_precision))
+    return replace(law, prior_mean=common @ pull, prior_precision=shared)
 
 
 def with_shared_shape(
-    fits: Sequence[Sequence[LawFit]], weights: Sequence[FloatArray], data: Sequence[FitData]
+    fits: Sequence[Sequence[LawFit]], weights: FloatArray, data: Sequence[FitData]
 ) -> list[list[LawFit]]:
     """All fits, each with the better of two priors of its shape: the law's own, and what the other pads say.
 
@@ -319,14 +289,18 @@ def with_shared_shape(
     with the shape that the other pads show, give or take what pads of one make may differ by, and both fits count
     alike: a pad of its own kind loses nothing but a factor of two in evidence.
     """
+    told = [list(zip(candidates, shares, strict=True)) for candidates, shares in zip(fits, weights, strict=True)]
     shared = []
     for pad, candidates in enumerate(fits):
-        priors = shared_priors(fits, weights, pad)
+        others = list(itertools.chain(*told[:pad], *told[pad + 1 :]))
+        laws = {fit.name: fit.law for fit in candidates if fit.law.parameters and fit.name != "spline"}
+        informed = {name: informed_law(law, others) for name, law in laws.items()}
         best = max(fit.log_evidence for fit in candidates)
         improved = []
         for fit in candidates:
-            if fit.name in priors and fit.log_evidence > best - HOPELESS:
-                again = fit_law(fit.law, fit.contact, data[pad], priors[fit.name], start=fit.theta)
+            law = informed.get(fit.name)
+            if law is not None and fit.log_evidence > best - HOPELESS:
+                again = fit_law(law, fit.contact, data[pad], start=fit.theta)
                 mean = float(np.logaddexp(fit.log_evidence, again.log_evidence) - np.log(2.0))
                 fit = replace(again if again.log_evidence > fit.log_evidence else fit, log_evidence=mean)
             improved.append(fit)

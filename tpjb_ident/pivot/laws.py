@@ -29,6 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import integrate
 
 from rigdata.arrays import FloatArray
 
@@ -81,39 +82,25 @@ def _log(u: FloatArray) -> FloatArray:
     return np.log(np.maximum(u, 1e-9))
 
 
-def _raised(u: FloatArray, p: float) -> FloatArray:
-    """Integral of the compliance u^(p - 1)."""
-    return np.asarray(np.maximum(u, 0.0) ** p / p)
-
-
-def _compliance(u: FloatArray, p: float) -> FloatArray:
-    """Compliance u^(p - 1), finite at zero load."""
-    return np.asarray(np.maximum(u, 1e-9) ** (p - 1.0))
-
-
-#: Deflection or compliance of a contact whose deflection goes as W^p.
-_Contact = Callable[[FloatArray, float], FloatArray]
-
-
-def _fixed(contact: _Contact, p: float, u: FloatArray, q: FloatArray) -> WithDerivative:
-    """Constant compliance at p = 1, sphere on a flat at p = 2/3 (paper, Eq. 16)."""
-    return contact(u, p), np.zeros((len(u), 0))
-
-
-def _in_series(contact: _Contact, u: FloatArray, q: FloatArray) -> WithDerivative:
-    """Sphere on flat with a linear compliance in series: q is the linear share at the reference load."""
-    point, line = contact(u, _SPHERE), contact(u, 1.0)
-    return (1.0 - q[0]) * point + q[0] * line, (line - point)[:, None]
-
-
 def _power_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
-    value = _raised(u, q[0])
+    value = np.maximum(u, 0.0) ** q[0] / q[0]
     return value, (value * (_log(u) - 1.0 / q[0]))[:, None]
 
 
 def _power_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
-    value = _compliance(u, q[0])
+    value = np.maximum(u, 1e-9) ** (q[0] - 1.0)
     return value, (value * _log(u))[:, None]
+
+
+def _fixed(power: Shape, p: float, u: FloatArray, q: FloatArray) -> WithDerivative:
+    """Constant compliance at p = 1, sphere on a flat at p = 2/3 (paper, Eq. 16)."""
+    return power(u, np.array([p]))[0], np.zeros((len(u), 0))
+
+
+def _in_series(power: Shape, u: FloatArray, q: FloatArray) -> WithDerivative:
+    """Sphere on flat with a linear compliance in series: q is the linear share at the reference load."""
+    point, line = _fixed(power, _SPHERE, u, q)[0], _fixed(power, 1.0, u, q)[0]
+    return (1.0 - q[0]) * point + q[0] * line, (line - point)[:, None]
 
 
 def _line_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
@@ -163,10 +150,7 @@ BEND_SPREAD = 0.2  # change of that slope from node to node, standard deviation
 
 def _spline_precision() -> FloatArray:
     """Precision (k, k) of the prior: a slope at the reference load, and small bends (k: free nodes)."""
-    slopes = np.zeros((len(NODES) - 1, len(NODES)))
-    gaps = np.diff(NODES)
-    for j in range(len(NODES) - 1):
-        slopes[j, j], slopes[j, j + 1] = -1.0 / gaps[j], 1.0 / gaps[j]
+    slopes = np.diff(np.eye(len(NODES)), axis=0) / np.diff(NODES)[:, None]
     bends = np.diff(slopes, axis=0) / BEND_SPREAD
     rows = np.delete(np.vstack([bends, slopes[FIXED] / SLOPE_SPREAD]), FIXED, axis=1)
     return np.asarray(rows.T @ rows)
@@ -182,28 +166,23 @@ def _spline_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
 def _spline_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
     """Integral of the compliance, which rises with the load whatever the nodes say."""
     logs = np.insert(q, FIXED, 0.0)
-    weighted = _GRID_LOAD * np.exp(_GRID_WEIGHTS @ logs)  # d phi / d ln u on the grid
-    columns = np.column_stack([weighted, weighted[:, None] * np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
+    # of d phi / d ln u on the grid: values, and their derivatives with respect to the nodes
+    columns = np.exp(_GRID + _GRID_WEIGHTS @ logs)[:, None] * _GRID_COLUMNS
     # below the grid the compliance is a power of the load, integrable whatever the slope says
-    slope = max((logs[1] - logs[0]) / (NODES[1] - NODES[0]), -0.9)
-    trapezoids = 0.5 * _GRID_STEP * (columns[1:] + columns[:-1])
-    total = np.vstack([np.zeros(columns.shape[1]), np.cumsum(trapezoids, axis=0)])
+    gap = NODES[1] - NODES[0]
+    slope = max((logs[1] - logs[0]) / gap, -0.9)
     below = columns[0] / (1.0 + slope)
     # that share changes with the slope, so with the first two nodes (both free: the fixed one lies higher up)
-    turn = below[0] / (1.0 + slope) / (NODES[1] - NODES[0])
-    below[1], below[2] = below[1] + turn, below[2] - turn
-    total += below
-    # between grid points the integral is a power of the load: interpolate its logarithm
-    x = np.clip((np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP, None, len(_GRID) - 1.0)
+    below[1:3] += np.array([1.0, -1.0]) * below[0] / (1.0 + slope) / gap
+    total = below + integrate.cumulative_trapezoid(columns, dx=_GRID_STEP, axis=0, initial=0.0)
+    table = np.column_stack([np.log(total[:, 0]), total[:, 1:] / total[:, :1]])
+    # between grid points, and beyond them, the integral is a power of the load: its logarithm is straight
+    x = (np.log(np.maximum(u, 1e-12)) - _GRID[0]) / _GRID_STEP
     cell = np.clip(x.astype(int), 0, len(_GRID) - 2)
-    part = x - cell
-    value = total[:, 0]
-    log = np.log(value)
-    phi = np.exp((1.0 - part) * log[cell] + part * log[cell + 1])
-    relative = total[:, 1:] / value[:, None]
-    jacobian = (1.0 - part)[:, None] * relative[cell] + part[:, None] * relative[cell + 1]
-    phi = np.where(u > 0.0, phi, 0.0)
-    return phi, jacobian * phi[:, None]
+    part = (x - cell)[:, None]
+    between = (1.0 - part) * table[cell] + part * table[cell + 1]
+    phi = np.where(u > 0.0, np.exp(between[:, 0]), 0.0)
+    return phi, between[:, 1:] * phi[:, None]
 
 
 def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
@@ -219,8 +198,8 @@ def interpolation(x: FloatArray, knots: FloatArray) -> FloatArray:
 
 # ln u on which the compliance is integrated
 _GRID, _GRID_STEP = np.linspace(np.log(2e-3), np.log(25.0), 320, retstep=True)
-_GRID_LOAD = np.exp(_GRID)
 _GRID_WEIGHTS = interpolation(_GRID, NODES)
+_GRID_COLUMNS = np.column_stack([np.ones(len(_GRID)), np.delete(_GRID_WEIGHTS, FIXED, axis=1)])
 
 
 def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, float, float, float]]) -> Law:
@@ -230,7 +209,7 @@ def _law(name: str, phi: Shape, psi: Shape, parameters: dict[str, tuple[float, f
 
 
 def _contact_law(name: str, p: float) -> Law:
-    return _law(name, functools.partial(_fixed, _raised, p), functools.partial(_fixed, _compliance, p), {})
+    return _law(name, functools.partial(_fixed, _power_phi, p), functools.partial(_fixed, _power_psi, p), {})
 
 
 _FREE_NODES = np.delete(NODES, FIXED)
@@ -242,8 +221,8 @@ _ALL = (
     _contact_law("linear", 1.0),
     _law(
         "point-in-series",
-        functools.partial(_in_series, _raised),
-        functools.partial(_in_series, _compliance),
+        functools.partial(_in_series, _power_phi),
+        functools.partial(_in_series, _power_psi),
         {"lam": (0.5, 0.25, 0.0, 1.0)},
     ),
     _law("bilinear", _bilinear_phi, _bilinear_psi, {"log r": (0.0, 0.5, -2.0, 2.0), "log b": (0.0, 0.5, -1.6, 1.0)}),

@@ -25,7 +25,7 @@ from tpjb_ident.clearance.measure import ClearancePolygon, measure_clearance
 from tpjb_ident.errors import TpjbError
 from tpjb_ident.identification.identify import identify
 from tpjb_ident.identification.settings import IdentifySettings
-from tpjb_ident.pivot import PivotSettings, fit_pivots
+from tpjb_ident.pivot import fit_pivots
 from tpjb_ident.pivot.curve import PivotCurve
 from tpjb_ident.results.identification import Identification
 from tpjb_ident.results.point_result import PointResult
@@ -227,7 +227,7 @@ class Watcher:
         settings = IdentifySettings(clearance=clearance, keep_weights=False)
         measures: dict[str, tuple[str, Callable[[], Any]]] = {
             "identification": ("dynamic", lambda: identify(good, settings, store=self.store)),
-            "curves": ("dry_pivot", lambda: fit_pivots(good, angles, PivotSettings(on_refusal="skip"))),
+            "curves": ("dry_pivot", lambda: fit_pivots(good, angles, on_refusal="skip")),
             "polygon": ("clearance", lambda: measure_clearance(good, angles)),
         }
         results: dict[str, Any] = {}

@@ -16,14 +16,14 @@ def pivot(c: Command, campaign: Path, bearing: Path | None = None) -> None:
     """
     from tpjb_ident.compare.predictions import printed_formula
     from tpjb_ident.compare.static_tests import bearing_problems
-    from tpjb_ident.pivot import PivotSettings, fit_pivots, pads_table, pivot_table, write_pivots
+    from tpjb_ident.pivot import fit_pivots, pads_table, pivot_table, write_pivots
     from tpjb_ident.report.comparison_page import pivot_stiffness_table
     from tpjb_ident.report.panels import pivot_panels
 
     source = c.open(campaign)
     drawing = c.bearing_of(source, bearing)
     with c.results("fitting pivot curves"):
-        curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], PivotSettings(on_refusal="few"))
+        curves = fit_pivots(source, [pad.pivot_angle for pad in drawing.pads], on_refusal="few")
         formula = printed_formula(drawing)
         c.table("pivot_curves", pivot_table(curves, formula=formula))
         c.table("pivot_pads", pads_table(curves))
