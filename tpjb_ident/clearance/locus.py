@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import ndimage, special
 
 from rigdata.arrays import FloatArray
 from rigdata.operating_point import OperatingPoint
@@ -50,7 +51,7 @@ class LocusPoint:
     position : (2,) ndarray
         From the bearing centre [m]; from the probes' own zero where no centre is known.
     covariance : (2, 2) ndarray
-        [m^2], the centre's own included.
+        [m^2], the centre's own included, and where repeats tell it how well the shaft comes back.
     """
 
     run: str
@@ -155,21 +156,19 @@ def measure_locus(campaign: Campaign, polygon: ClearancePolygon | None = None) -
     records, refused = _usable(runs)
     noise = _noise(list(records.values()))
     centre = np.zeros(2) if polygon is None else polygon.centre
-    drift, drift_variance = _drift(records, noise, centre)
-    correction = np.nan_to_num(drift)
+    repeats = _repeats(records, noise, centre)
     # with the bearing's centre from the same probes their zero falls out
     zero = np.diag(zero_uncertainty(campaign.channels.values(), "displacement") ** 2)
     centre_covariance = zero if polygon is None else polygon.centre_covariance
     points = []
     for order, record in records.items():
-        run = runs[order]
-        position = record.position - correction * order - centre
-        variance = (noise.mean_variance(record.span) + order**2 * drift_variance) * np.eye(2)
-        points.append(
-            LocusPoint(run.id, run.point, record.load, record.direction, position, variance + centre_covariance)
-        )
+        position = record.position - np.nan_to_num(repeats.drift) * order - centre
+        variance = noise.mean_variance(record.span) + repeats.scatter + order**2 * repeats.drift_variance
+        covariance = variance * np.eye(2) + centre_covariance
+        points.append(LocusPoint(runs[order].id, record.point, record.load, record.direction, position, covariance))
     points.sort(key=lambda p: (p.point.static_load, p.point.spin, _from_down(p.point.static_load_direction)))
-    return Locus(tuple(points), np.asarray(centre), drift, (*_status(points, polygon, drift), *refused))
+    status = (*_status(points, polygon, repeats.count), *refused)
+    return Locus(tuple(points), np.asarray(centre), repeats.drift, status)
 
 
 def _usable(runs: Sequence[Run]) -> tuple[dict[int, _Record], tuple[Condition, ...]]:
@@ -195,8 +194,17 @@ class _Record:
     load: float  #: [N]
     direction: float  #: [rad]
     span: float  #: [s]
-    block_time: FloatArray  #: (m,) [s]
-    blocks: FloatArray  #: (m, 2) [m]
+    blocks: tuple[NoiseSeries, NoiseSeries]  #: of either component
+
+
+@dataclass(frozen=True)
+class _Repeats:
+    """What runs at a set point that was there before say of all runs."""
+
+    count: int
+    drift: FloatArray  #: (2,) per run [m]; NaN without any
+    drift_variance: float = 0.0  #: of a component [m^2]
+    scatter: float = 0.0  #: variance by which the shaft comes back elsewhere [m^2]; zero where fewer than two tell it
 
 
 def _from_down(direction: float) -> float:
@@ -215,11 +223,6 @@ def _read(run: Run) -> _Record:
     turning = [speed, 2 * speed] if speed * (time[-1] - time[0]) > 2.0 else []
     design = line_design(time, np.array(turning), drift_order=0)
     mean = np.linalg.lstsq(design, np.hstack([place, force[good]]), rcond=None)[0]
-    steady = place - design[:, :-1] @ mean[:-1, :2]
-    label = np.floor((time - time[0]) / _BLOCK).astype(int)
-    count = np.bincount(label)
-    usual = np.median(count[count > 0])
-    parts = [label == k for k in np.flatnonzero(count > 0.5 * usual)]
     load = mean[-1, 2:]
     return _Record(
         point=run.point,
@@ -227,17 +230,25 @@ def _read(run: Run) -> _Record:
         load=float(np.hypot(*load)),
         direction=float(np.arctan2(load[1], load[0])),
         span=float(time[-1] - time[0]),
-        block_time=np.array([time[part].mean() for part in parts]),
-        blocks=np.array([steady[part].mean(axis=0) for part in parts]),
+        blocks=_blocks(time, place - design[:, :-1] @ mean[:-1, :2]),
     )
+
+
+def _blocks(time: FloatArray, place: FloatArray) -> tuple[NoiseSeries, NoiseSeries]:
+    """Both components of a steady place (n, 2) [m] in blocks, of which none is half empty."""
+    label = np.floor((time - time[0]) / _BLOCK).astype(int)
+    count = np.bincount(label)
+    whole = np.flatnonzero(count > 0.5 * np.median(count[count > 0]))
+    moment, *components = (ndimage.mean(values, label, whole) for values in (time, *place.T))
+    duration, constant = np.full(len(whole), _BLOCK), np.ones((len(whole), 1))
+    x, y = (NoiseSeries(moment, duration, values, constant) for values in components)
+    return x, y
 
 
 def _noise(records: list[_Record]) -> NoiseModel:
     """Noise of the probes, pooled over all runs."""
-    series = []
-    for record in records[:: max(1, len(records) // _NOISE_RUNS)]:
-        time, m = record.block_time, len(record.block_time)
-        series += [NoiseSeries(time, np.full(m, _BLOCK), values, np.ones((m, 1))) for values in record.blocks.T]
+    chosen = records[:: max(1, len(records) // _NOISE_RUNS)]
+    series = list(itertools.chain.from_iterable(record.blocks for record in chosen))
     if max(len(s.time) for s in series) <= 3:
         # records of a few tenths of a second show no noise over seconds: take the scatter within each run
         scatter = float(np.mean([np.var(s.values) for s in series])) + 1e-18
@@ -245,28 +256,41 @@ def _noise(records: list[_Record]) -> NoiseModel:
     return estimate_noise(series, _DRIFT_RATE)
 
 
-def _drift(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -> tuple[FloatArray, float]:
-    """Drift per run (2,) [m] from repeats of one set point, NaN without any, and the variance [m^2] of a component.
+def _repeats(records: dict[int, _Record], noise: NoiseModel, centre: FloatArray) -> _Repeats:
+    """Drift and scatter by least squares, with a place of its own for every set point.
 
     Runs are evenly spaced in time as far as anyone knows: the drift is taken as proportional to the run's number. A
     repeat meets its set point otherwise than the first time: by as much, times its distance from the centre, the shaft
-    may stand elsewhere without any drift.
+    may stand elsewhere without any drift. What two repeats or more leave beyond that and the noise is scatter; with
+    few of them it is as much larger as Student's interval is wider than the normal one.
     """
-    runs_between, shifts, variances = [], [], []
-    for (i, first), (j, repeat) in itertools.combinations(records.items(), 2):
-        if not _same_set_point(first.point, repeat.point):
-            continue
-        load_miss = repeat.load / max(first.load, 1e-300) - 1.0
-        miss = math.hypot(load_miss, math.remainder(repeat.direction - first.direction, 2 * math.pi))
-        elsewhere = miss * float(np.hypot(*(first.position - centre)))
-        runs_between.append(float(j - i))
-        shifts.append(repeat.position - first.position)
-        variances.append(noise.mean_variance(first.span) + noise.mean_variance(repeat.span) + elsewhere**2)
-    if not shifts:
-        return np.full(2, np.nan), 0.0
-    intervals = np.array(runs_between)
-    weight = intervals / (intervals @ intervals)
-    return weight @ np.array(shifts), float(weight**2 @ np.array(variances))
+    firsts: list[int] = []
+    variances = []
+    for record in records.values():
+        first = next(k for k, other in records.items() if _same_set_point(other.point, record.point))
+        turn = math.remainder(record.direction - records[first].direction, 2 * math.pi)
+        miss = math.hypot(record.load / max(records[first].load, 1e-300) - 1.0, turn)
+        elsewhere = miss * float(np.hypot(*(records[first].position - centre)))
+        firsts.append(first)
+        variances.append(noise.mean_variance(record.span) + elsewhere**2)
+    member = (np.array(firsts)[:, None] == np.unique(firsts)).astype(float)
+    count = len(member) - member.shape[1]
+    if count == 0:
+        return _Repeats(0, np.full(2, np.nan))
+    places = np.array([record.position for record in records.values()])
+    within = np.eye(len(member)) - member @ (member / member.sum(axis=0)).T
+    since = within @ np.array(list(records), dtype=float)
+    weight = since / (since @ since)
+    remainder, variance, scatter = within - np.outer(since, weight), np.array(variances), 0.0
+    if count > 1:
+        left = 0.5 * float(np.sum((remainder @ places) ** 2)) * _student(2 * (count - 1)) ** 2
+        scatter = max(left - float(np.diag(remainder) @ variance), 0.0) / (count - 1)
+    return _Repeats(count, weight @ places, float(weight**2 @ (variance + scatter)), scatter)
+
+
+def _student(freedom: int) -> float:
+    """Width of Student's 95 % interval over that of the normal one."""
+    return float(special.stdtrit(freedom, 0.975) / special.ndtri(0.975))
 
 
 def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
@@ -275,27 +299,23 @@ def _same_set_point(first: OperatingPoint, second: OperatingPoint) -> bool:
     return same and turn < _SAME_DIRECTION
 
 
-def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, drift: FloatArray) -> tuple[Condition, ...]:
-    status = []
-    if polygon is None:
-        status.append(Condition("no-centre", "positions from the probes' zero, no clearance polygon given"))
-    if np.isnan(drift).any():
-        status.append(Condition("drift-unknown", "no load direction was repeated"))
-    missed = []
+def _status(points: list[LocusPoint], polygon: ClearancePolygon | None, repeats: int) -> tuple[Condition, ...]:
+    """Named conditions of a locus."""
+    missed, behind = [], []
     for p in points:
         load_miss = abs(p.load - p.point.static_load) / max(p.point.static_load, 1.0)
         turn = abs(math.remainder(p.load_direction - p.point.static_load_direction, 2 * math.pi))
         if load_miss > _LOAD_MISS or turn > _DIRECTION_MISS:
             missed.append(p.run)
-    if missed:
-        status.append(Condition("load-off-set-point", ", ".join(missed)))
-    if polygon is not None:
-        behind = [p.run for p in points if _behind(p, polygon)]
-        if behind:
-            status.append(Condition("outside-polygon", ", ".join(behind)))
-    return tuple(status)
-
-
-def _behind(point: LocusPoint, polygon: ClearancePolygon) -> bool:
-    """True where the shaft lies behind a pad's unloaded face by more than any pivot deflects."""
-    return bool(np.nanmax(directions(polygon.angles) @ point.position - 1.5 * polygon.clearance) > 0.0)
+        # behind a pad's unloaded face by more than any pivot deflects
+        if polygon and np.nanmax(directions(polygon.angles) @ p.position - 1.5 * polygon.clearance) > 0.0:
+            behind.append(p.run)
+    not_held = "intervals do not hold how well the shaft comes back to a place"
+    conditions = [
+        (polygon is None, "no-centre", "positions from the probes' zero, no clearance polygon given"),
+        (repeats == 0, "drift-unknown", f"no load direction was repeated; {not_held}"),
+        (repeats == 1, "scatter-unknown", f"one load direction was repeated; {not_held}"),
+        (missed, "load-off-set-point", ", ".join(missed)),
+        (behind, "outside-polygon", ", ".join(behind)),
+    ]
+    return tuple(Condition(kind, detail) for holds, kind, detail in conditions if holds)
