@@ -11,10 +11,9 @@ import numpy as np
 from rigdata.arrays import FloatArray
 from rigdata.problem import refuse
 from rigdata.vector import directions
-from tpjb_ident.clearance.polygon import Centre, CentreRule, SideFit, corners, find_centre, fit_sides, gain_ratio
+from tpjb_ident.clearance.polygon import SideFit, corners, find_centre, fit_sides, gain_ratio
 from tpjb_ident.clearance.sweep import ContactIntervals, read_sweep
 from tpjb_ident.conditions import Condition, sentences
-from tpjb_ident.errors import ArgumentError
 from tpjb_ident.phasors.slow_noise import NoiseModel
 from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.curve import PivotCurve
@@ -34,6 +33,7 @@ _SAME_TEMPERATURE = 4.0  # [K]
 _IRREGULAR = 3.0  # standard errors
 _UNEQUAL = 0.02  # gains of two probes: twice what a usual certificate leaves open
 _GAIN_ERRORS = 4.0  # standard errors, of few sides
+_RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
 _DISAGREES = 0.1  # share: a shaft that slides into its corner slowly makes up for some per cent
 
 
@@ -50,7 +50,7 @@ class ClearancePolygon(Presented):
     angles : (n,) ndarray
         Nominal pad directions [rad].
     centre, centre_covariance : (2,), (2, 2) ndarray
-        Reading of the bearing centre [m], by `centre_rule`; see `tpjb_ident.clearance.polygon` for what that means. The
+        Reading of the bearing centre [m]; see `tpjb_ident.clearance.polygon` for what that means. The
         covariance holds the drift of the probes' zero from run to run, as far as this run's drift tells.
     clearance, clearance_se : (n,) ndarray
         Per pad at zero push load [m]; NaN where the pad was not reached.
@@ -69,8 +69,6 @@ class ClearancePolygon(Presented):
         Of the displacement channels in this run.
     temperature : float
         Mean of the run's temperature channels [K]; NaN without any. Tells hot from cold.
-    centre_rule : str
-        How the centre was chosen.
     status : tuple of Condition
         Named conditions.
     relative_calibration : (n,) ndarray
@@ -95,7 +93,6 @@ class ClearancePolygon(Presented):
     pivot_scale_se: float
     noise: NoiseModel = field(repr=False)
     temperature: float = np.nan
-    centre_rule: CentreRule = "least-absolute"
     status: tuple[Condition, ...] = ()
     relative_calibration: FloatArray | float = 0.0
 
@@ -145,7 +142,6 @@ def measure_clearance(
     campaign: Campaign,
     pivot_angles: Sequence[float],
     curves: Sequence[PivotCurve] | None = None,
-    rule: CentreRule = "least-absolute",
 ) -> ClearancePolygon:
     """Measure the cold clearance polygon: the first clearance run at rest with the smallest push load.
 
@@ -158,8 +154,6 @@ def measure_clearance(
     curves : sequence of PivotCurve, optional
         The pivots' deflection under the push load is taken off with them; without them it is extrapolated from the
         sweep itself, less surely.
-    rule : {"least-absolute", "least-squares"}
-        Convention for the centre, see `tpjb_ident.clearance.polygon`.
 
     Returns
     -------
@@ -180,48 +174,42 @@ def measure_clearance(
     runs = campaign.of_kind("clearance")
     if not runs:
         raise refuse("campaign.toml", "runs", "has no run of kind clearance", "Record a clearance sweep")
-    return measure_run(coldest_run(runs), pivot_angles, curves, rule)
+    return measure_run(coldest_run(runs), pivot_angles, curves)
 
 
 def measure_run(
-    run: Run,
-    pivot_angles: Sequence[float],
-    curves: Sequence[PivotCurve] | None = None,
-    rule: CentreRule = "least-absolute",
+    run: Run, pivot_angles: Sequence[float], curves: Sequence[PivotCurve] | None = None
 ) -> ClearancePolygon:
     """Measure the polygon of one run; parameters as `measure_clearance`."""
     angles, run = np.asarray(pivot_angles, dtype=float), live_run(run)
     contact = read_sweep(run, angles)
-    reached = np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS
-    if reached.sum() < 3:
-        what = f"clearance run {run.id} reaches {int(reached.sum())} of {len(angles)} pads"
+    pads = np.flatnonzero(np.bincount(contact.pad, minlength=len(angles)) >= _FEWEST_BLOCKS)
+    if len(pads) < 3:
+        what = f"clearance run {run.id} reaches {len(pads)} of {len(angles)} pads"
         raise refuse(run.file, "record", what, "Check pad angles and channels", run.id)
-    fit = fit_sides(contact, angles, reached, curves)
-    pads = np.flatnonzero(reached)
-    centre = find_centre(angles[pads], fit.distance[pads], fit.covariance[np.ix_(pads, pads)], rule)
-    polygon = _polygon(run, contact, angles, fit, centre)
+    fit = fit_sides(contact, angles, pads, curves)
+    polygon = _polygon(run, contact, angles, fit)
     probes = [c for c in axial_channels(run).values() if c.quantity == "displacement"]
-    status = (*polygon.status, *_gains_differ(probes, polygon), *_extrapolated(contact.push, curves))
+    status = (*_status(fit, polygon), *_gains_differ(probes, polygon), *_extrapolated(contact.push, curves))
     calibration = np.array([relative_calibration(probes, float(angle)) for angle in angles])
-    return replace(polygon, status=status, centre_rule=rule, relative_calibration=calibration)
+    return replace(polygon, status=status, relative_calibration=calibration)
 
 
-def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit, centre: Centre) -> ClearancePolygon:
-    """Clearances about the centre, with the errors of both."""
-    n = directions(angles)
-    pads = np.flatnonzero(np.isfinite(fit.distance))
-    clearance = fit.distance - n @ centre.position
+def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideFit) -> ClearancePolygon:
+    """Clearances about the centre, with the errors of both; NaN where a pad was not reached."""
+    n, covariance = directions(angles[fit.pads]), fit.covariance
+    centre = find_centre(angles[fit.pads], fit.distance, covariance)
     # clearance = (I - n G) distance on the reached pads: the centre's error is the same sides' error
-    map_ = np.eye(len(pads)) - n[pads] @ centre.gain[:2]
-    covariance = fit.covariance[np.ix_(pads, pads)]
-    se = np.full(len(angles), np.nan)
+    map_ = np.eye(len(n)) - n @ centre.gain[:2]
     # a centre that makes clearances equal hides their differences: none is better known than the common clearance
-    common = float(np.sqrt(centre.gain[2] @ covariance @ centre.gain[2]))
-    se[pads] = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
-    fitted = angles + fit.tilt
+    common = np.sqrt(centre.gain[2] @ covariance @ centre.gain[2])
+    se = np.maximum(np.sqrt(np.diag(map_ @ covariance @ map_.T)), common)
+    columns = np.full((6, len(angles)), np.nan)
+    columns[:, fit.pads] = np.array([fit.distance - n @ centre.position, se, fit.deflection, fit.deflection_se,
+                                     angles[fit.pads] + fit.tilt, fit.tilt_se])  # fmt: skip
+    clearance, clearance_se, deflection, deflection_se, fitted, fitted_se = columns
     # another run meets the probes' zero elsewhere: by about what it drifts within this one
     drift = (fit.noise.drift * float(np.ptp(contact.time))) ** 2 * np.eye(2)
-    reached_all = len(pads) == len(angles)
     return ClearancePolygon(
         run=run.id,
         point=run.point,
@@ -229,18 +217,17 @@ def _polygon(run: Run, contact: ContactIntervals, angles: FloatArray, fit: SideF
         centre=centre.position,
         centre_covariance=centre.gain[:2] @ covariance @ centre.gain[:2].T + drift,
         clearance=clearance,
-        clearance_se=se,
-        clearance_pushed=clearance + fit.deflection,
-        clearance_pushed_se=np.hypot(se, fit.deflection_se),
+        clearance_se=clearance_se,
+        clearance_pushed=clearance + deflection,
+        clearance_pushed_se=np.hypot(clearance_se, deflection_se),
         fitted_angle=fitted,
-        fitted_angle_se=fit.tilt_se,
-        corners=corners(fitted, clearance) if reached_all else np.full((len(angles), 2), np.nan),
+        fitted_angle_se=fitted_se,
+        corners=corners(fitted, clearance) if len(n) == len(angles) else np.full((len(angles), 2), np.nan),
         push_load=contact.push,
         pivot_scale=fit.scale,
         pivot_scale_se=fit.scale_se,
         noise=fit.noise,
         temperature=_mean_temperature(run),
-        status=_status(fit, clearance, se, len(pads)),
     )
 
 
@@ -289,61 +276,38 @@ def coldest_run(runs: Sequence[Run]) -> Run:
     return min(cold, key=lambda run: run.point.static_load)
 
 
-def _status(fit: SideFit, clearance: FloatArray, se: FloatArray, reached: int) -> tuple[Condition, ...]:
-    status = []
-    if reached < len(clearance):
-        missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(clearance)))
-        status.append(Condition("pads-not-reached", missing))
-    if np.isnan(fit.scale):
-        status.append(Condition("give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"))
-    elif abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES):
-        detail = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
-        status.append(Condition("pivots-disagree", detail))
-    spread = np.abs(clearance - np.nanmedian(clearance))
+def _status(fit: SideFit, polygon: ClearancePolygon) -> tuple[Condition, ...]:
+    """Named conditions of the sides and of the clearances."""
+    missing = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(polygon.clearance)))
+    disagrees = abs(fit.scale - 1.0) > max(_IRREGULAR * fit.scale_se, _DISAGREES)
+    give = f"they deflect {fit.scale:.2f} (se {fit.scale_se:.2f}) of what the dry tests say"
+    offsets = polygon.clearance - np.nanmedian(polygon.clearance)
     # below half a micrometre a difference between pads is of no consequence, however well it is measured
-    deviating = np.flatnonzero(spread > np.maximum(_IRREGULAR * se, 0.5e-6))
-    if len(deviating):
-        offsets = 1e6 * (clearance - np.nanmedian(clearance))
-        listed = ", ".join(f"pad #{k + 1} {offsets[k]:+.1f} µm" for k in deviating)
-        status.append(Condition("irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"))
-    turn = np.nanmean(fit.tilt)
-    if abs(turn) > _IRREGULAR * np.sqrt(np.nanmean(fit.tilt_se**2) / reached) and abs(turn) > 5e-3:
-        status.append(Condition("frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"))
-    if fit.misfit > 4.0:
-        status.append(Condition("misfit", "the scatter exceeds the noise"))
-    return tuple(status)
-
-
-_RISE = 0.2  # of the lighter push load: less tells nothing of the stiffness
-
-
-def radial_stiffness(light: ClearancePolygon, heavy: ClearancePolygon) -> tuple[float, FloatArray, FloatArray]:
-    """Secant between two push loads of the same bearing: mean load [N], stiffness (n,) [N/m] and its standard error."""
-    rise = heavy.push_load - light.push_load
-    if rise <= _RISE * light.push_load:
-        loads = f"{light.push_load:.0f} and {heavy.push_load:.0f} N"
-        raise ArgumentError(f"push loads must differ by a fifth at least, heavy after light; got {loads}")
-    # each about its own centre: a zero that drifted between the runs is no deflection
-    deflection = heavy.clearance_pushed - light.clearance_pushed
-    se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se)
-    stiffness = rise / deflection
-    return 0.5 * (heavy.push_load + light.push_load), stiffness, np.abs(stiffness / deflection) * se
-
-
-def clearance_change(before: ClearancePolygon, after: ClearancePolygon) -> tuple[FloatArray, FloatArray]:
-    """Growth (n,) [m] of the clearance at zero load per pad, as from cold to hot, and its standard error."""
-    if before.angles.shape != after.angles.shape or not np.allclose(before.angles, after.angles, atol=1e-6):
-        raise ArgumentError("both polygons must be of one bearing: their pad directions differ")
-    return after.clearance - before.clearance, np.hypot(before.clearance_se, after.clearance_se)
+    deviating = np.flatnonzero(np.abs(offsets) > np.maximum(_IRREGULAR * polygon.clearance_se, 0.5e-6))
+    listed = ", ".join(f"pad #{k + 1} {1e6 * offsets[k]:+.1f} µm" for k in deviating)
+    turn = float(np.mean(fit.tilt))
+    is_turned = abs(turn) > max(_IRREGULAR * np.sqrt(np.mean(fit.tilt_se**2) / len(fit.pads)), 5e-3)
+    conditions = [
+        (missing, "pads-not-reached", missing),
+        (np.isnan(fit.scale), "give-from-sweep", "no pivot curves, zero load extrapolated from the sweep alone"),
+        (disagrees, "pivots-disagree", give),
+        (listed, "irregular", f"{listed} from the median of all: worn, damaged or wrongly assembled"),
+        (is_turned, "frame-turned", f"all sides by {np.degrees(turn):+.2f} deg"),
+        (fit.misfit > 4.0, "misfit", "the scatter exceeds the noise"),
+    ]
+    return tuple(Condition(kind, detail) for holds, kind, detail in conditions if holds)
 
 
 def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> pd.DataFrame:
-    """Every other polygon against one: `clearance_pairs.csv`, one row per pad."""
+    """Every other polygon against one: `clearance_pairs.csv`, one row per pad.
+
+    The change of the clearance at zero load, as from cold to hot, and where the pushes differ alone the pivots' secant
+    between them; each about its own centre, since a zero that drifted between the runs is no deflection.
+    """
     import pandas as pd
 
     frames = []
     for polygon in others:
-        change, change_se = clearance_change(base, polygon)
         light, heavy = sorted((base, polygon), key=lambda p: p.push_load)
         # one speed and one temperature, or nobody knows better
         warmer = abs(base.temperature - polygon.temperature) > _SAME_TEMPERATURE
@@ -353,11 +317,15 @@ def pairs_frame(base: ClearancePolygon, others: Sequence[ClearancePolygon]) -> p
             "against": base.run,
             "compared": "push load" if same else "condition",
             "pad": np.arange(1, len(base.angles) + 1),
-            "change_m": change,
-            "change_m_se": change_se,
+            "change_m": polygon.clearance - base.clearance,
+            "change_m_se": np.hypot(base.clearance_se, polygon.clearance_se),
         }
-        if same and heavy.push_load - light.push_load > _RISE * light.push_load:
-            load, stiffness, stiffness_se = radial_stiffness(light, heavy)
-            columns |= {"load_N": load, TANGENT: stiffness, f"{TANGENT}_se": stiffness_se}
+        rise = heavy.push_load - light.push_load
+        if same and rise > _RISE * light.push_load:
+            deflection = heavy.clearance_pushed - light.clearance_pushed
+            relative_se = np.hypot(heavy.clearance_pushed_se, light.clearance_pushed_se) / np.abs(deflection)
+            stiffness = rise / deflection
+            load = 0.5 * (heavy.push_load + light.push_load)
+            columns |= {"load_N": load, TANGENT: stiffness, f"{TANGENT}_se": np.abs(stiffness) * relative_se}
         frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)

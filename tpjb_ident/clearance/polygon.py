@@ -12,22 +12,17 @@ the sweep correct its size and its shape, the same for all pads. Generalised lea
 *Centre.* The sweep gives one distance per pad from the probes' zero. Five distances hold five clearances and two
 coordinates of the centre: two too many. A shift of the centre by c changes the clearances by -n_k . c, and
 nothing in the polygon tells such a change from real differences between the pads. So the centre is a
-convention:
-
-``least-absolute`` (default): the centre that makes the clearances as equal as possible in the sense of the
-sum of absolute differences from their common value. A single pad that stands off is then found exactly, and
-all of its offset shows on that pad: which is what `physics.md` means by ``pad_offset``. Differences within
-the measurement error are averaged.
-
-``least-squares``: the centre of the best-fitting regular polygon. A single pad off by D shows as 0.6 D on
-that pad, 0.32 D on the two opposite and -0.12 D on the two beside it (five pads).
+convention: the one that makes the clearances as equal as possible in the sense of the sum of absolute differences
+from their common value. A single pad that stands off is then found exactly, and all of its offset shows on that pad,
+which is what `physics.md` means by ``pad_offset``. Differences within the measurement error are averaged. (By least
+squares a single pad off by D would show as 0.6 D on that pad, 0.32 D on the two opposite and -0.12 D on the two beside
+it, of five.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -39,7 +34,6 @@ from tpjb_ident.phasors.bad_samples import robust_deviation
 from tpjb_ident.phasors.slow_noise import NoiseModel, NoiseSeries, estimate_noise, flicker_kernel
 from tpjb_ident.pivot.curve import PivotCurve
 
-CentreRule = Literal["least-absolute", "least-squares"]
 _EQUAL_WITHIN = 2.0  # standard errors within which clearances count as equal for the least-absolute centre
 _DRIFT_RATE = 1.0e-8  # [m/s], centre of the prior
 _TILT_SPREAD = 0.03  # [rad], prior of a side's turn: machining and pad files are never further off unnoticed
@@ -48,7 +42,6 @@ _SHAPE_SPREAD = 1.0  # prior of m: from a third power more to a third power less
 _CURVATURE_SPREAD = 5.0e-6  # [m], prior of what a third power adds to the deflection, where no curve says it
 _CLIP = 5.0  # robust standard deviations
 _SLIDING = 0.03  # of the deflection: while the shaft slides, its next pad may already carry a little
-_ONE_SIGMA = 0.6826895
 
 
 @dataclass(frozen=True)
@@ -60,23 +53,18 @@ class Centre:
     gain: FloatArray  #: (3, n) of position and clearance with respect to the distances
 
 
-def find_centre(
-    angles: FloatArray, distances: FloatArray, covariance: FloatArray, rule: CentreRule = "least-absolute"
-) -> Centre:
+def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArray) -> Centre:
     """Centre of a clearance polygon: angles (n,) [rad], distances (n,) [m] with covariance (n, n)."""
     design = np.column_stack([directions(angles), np.ones(len(angles))])
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
-    weights = np.ones(len(angles))
+    weights, gain = np.ones(len(angles)), np.zeros((3, len(angles)))
     solution: FloatArray = np.zeros(3)
-    gain = np.zeros((3, len(angles)), dtype=float)
-    for _ in range(1 if rule == "least-squares" else 400):
+    for _ in range(400):
         gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
-        updated: FloatArray = np.asarray(gain @ distances, dtype=float)
-        change = float(np.max(np.abs(updated - solution)))
-        solution = updated
-        if change < 1e-12:
+        previous, solution = solution, gain @ distances
+        if np.max(np.abs(solution - previous)) < 1e-12:
             break
         # Huber's weights with the bend at the measurement error: absolute beyond it, square within
         weights = 1.0 / np.maximum(np.abs(distances - design @ solution) / error, 1.0)
@@ -123,14 +111,15 @@ def gain_ratio(
 
 @dataclass(frozen=True)
 class SideFit:
-    """The n sides of a polygon, from the probes' zero; NaN where a pad was not reached."""
+    """The r sides of the pads that a sweep reached, from the probes' zero."""
 
-    distance: FloatArray  #: (n,) [m]
-    tilt: FloatArray  #: (n,) [rad]
-    tilt_se: FloatArray  #: (n,) [rad]
-    covariance: FloatArray  #: (n, n) of the distances [m^2]
-    deflection: FloatArray  #: (n,) of the pivots under the push [m]
-    deflection_se: FloatArray  #: (n,) [m]
+    pads: IntArray  #: (r,) from 0
+    distance: FloatArray  #: (r,) [m]
+    covariance: FloatArray  #: (r, r) of the distances [m^2]
+    tilt: FloatArray  #: (r,) [rad]
+    tilt_se: FloatArray  #: (r,) [rad]
+    deflection: FloatArray  #: (r,) of the pivots under the push [m]
+    deflection_se: FloatArray  #: (r,) [m]
     scale: float  #: g; NaN without curves
     scale_se: float
     noise: NoiseModel
@@ -147,74 +136,64 @@ def _pivot_deflection(curves: Sequence[PivotCurve], pad: IntArray, load: FloatAr
 
 
 def fit_sides(
-    contact: ContactIntervals, angles: FloatArray, reached: BoolArray, curves: Sequence[PivotCurve] | None
+    contact: ContactIntervals, angles: FloatArray, pads: IntArray, curves: Sequence[PivotCurve] | None
 ) -> SideFit:
-    """Fit all sides of a sweep: angles (n,) [rad] of the pads, reached (n,)."""
-    place = _place_along_side(contact, angles, reached)
-    usable = reached[contact.pad] & _consistent(contact, place)
+    """Fit the sides of the pads (r,) that a sweep reached: angles (n,) [rad] of all pads."""
+    place = _place_along_side(contact, angles, pads)
+    usable = np.isin(contact.pad, pads) & _consistent(contact, place)
     used, place = contact.take(usable), place[usable]
     noise = _noise(used, place)
     carried = _pivot_deflection(curves or (), used.pad, used.load)
     whitener = _whitener(used, angles, noise, _SLIDING * carried * used.alone)
-    count, pads = len(angles), np.flatnonzero(reached)
     r, of_pad = len(pads), (used.pad[:, None] == pads).astype(float)
-    pivots, precision, mean = _pivot_terms(used, of_pad, curves, count)
-    design = np.hstack([of_pad, -of_pad * place[:, None], pivots])
+    full = _pivot_deflection(curves or (), pads, np.full(r, used.push))
+    columns, precision, mean = _pivot_terms(used, of_pad, carried, None if curves is None else full)
+    design = np.hstack([of_pad, -of_pad * place[:, None], columns])
     prior = np.r_[np.zeros(r), np.full(r, _TILT_SPREAD**-2), precision]
     beta, covariance, misfit = _least_squares(whitener, used.along, design, prior, np.r_[np.zeros(2 * r), mean])
-    columns = np.full((count, 5), np.nan)  # of every pad: distance, turn and its error, deflection and its error
-    errors = np.sqrt(np.diag(covariance))
-    columns[pads, :3] = np.column_stack([beta[:r], beta[r : 2 * r], errors[r : 2 * r]])
-    distances = np.full((count, count), np.nan)
-    distances[np.ix_(pads, pads)] = covariance[:r, :r]
+    distance, tilt, pivots = np.split(beta, [r, 2 * r])
+    _, tilt_se, errors = np.split(np.sqrt(np.diag(covariance)), [r, 2 * r])
+    distances, deflection, deflection_se = covariance[:r, :r], pivots[:r], errors[:r]
     scale = scale_se = np.nan
-    if curves is None:
-        columns[pads, 3:] = np.column_stack([beta[2 * r : 3 * r], errors[2 * r : 3 * r]])
-    else:
-        full, full_se = _under_push(curves, used.push, count)
-        scale, scale_se = float(beta[-1]), float(errors[-1])
-        columns[:, 3], columns[:, 4] = scale * full, full_se
+    if curves is not None:
+        scale, scale_se = float(pivots[-1]), float(errors[-1])
+        deflection, deflection_se = scale * full, full * _secant_errors(curves, pads, used.push)
         # an error of a curve shifts its side by the share of the deflection that the averages carry on the mean
         mean_carried = of_pad.T @ carried / of_pad.sum(axis=0)
-        share = np.divide(mean_carried, full[pads], out=np.zeros(r), where=full[pads] > 0)
-        distances[pads, pads] += (share * full_se[pads]) ** 2
-    distance, tilt, tilt_se, deflection, deflection_se = columns.T
+        share = np.divide(mean_carried, full, out=np.zeros(r), where=full > 0)
+        distances = distances + np.diag((share * deflection_se) ** 2)
     return SideFit(
-        distance, tilt, tilt_se, distances, deflection, deflection_se, scale, scale_se, noise, misfit,
+        pads, distance, distances, tilt, tilt_se, deflection, deflection_se, scale, scale_se, noise, misfit
     )  # fmt: skip
 
 
-def _under_push(curves: Sequence[PivotCurve], push: float, count: int) -> tuple[FloatArray, FloatArray]:
-    """Deflection of every pivot (n,) [m] under the push [N] by its curve, and its standard error."""
-    full, error = _pivot_deflection(curves, np.arange(count), np.full(count, push)), np.zeros(count)
+def _secant_errors(curves: Sequence[PivotCurve], pads: IntArray, load: float) -> FloatArray:
+    """Relative standard error (r,) of the deflection of pads (r,) at a load [N] by their curves."""
+    errors = np.zeros(len(pads))
     for curve in curves:
-        low, high = curve.secant_band(push, _ONE_SIGMA)
-        error[curve.pad - 1] = full[curve.pad - 1] * 0.5 * float(np.log(high / low))
-    return full, error
+        errors[pads == curve.pad - 1] = np.sqrt(curve.relative_stiffness_covariance(load, secant=True)[0, 0])
+    return errors
 
 
 def _pivot_terms(
-    contact: ContactIntervals, of_pad: FloatArray, curves: Sequence[PivotCurve] | None, count: int
+    contact: ContactIntervals, of_pad: FloatArray, carried: FloatArray, full: FloatArray | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What the pivots add to the design (m, k), with the precisions and the means (k,) of their prior.
 
-    Without curves every pivot's deflection in proportion to its load, and one curvature for all pads; with them the
-    curves' shape and size, each times one common factor.
+    Without curves every pivot's deflection in proportion to its load, and one curvature for all pads; with them (and
+    what they say under the `full` push (r,) [m]) the curves' shape and size, each times one common factor.
     """
     w = np.maximum(contact.load, 0.0) / contact.push
     bend = np.cbrt(w) ** 2 - w
-    if curves is None:
-        precision = np.zeros(of_pad.shape[1] + 1)
-        precision[-1] = _CURVATURE_SPREAD**-2
+    if full is None:
+        precision = np.r_[np.zeros(of_pad.shape[1]), _CURVATURE_SPREAD**-2]
         return np.column_stack([of_pad * w[:, None], bend]), precision, np.zeros(len(precision))
-    full = _pivot_deflection(curves, np.arange(count), np.full(count, contact.push))
-    columns = [full[contact.pad] * bend, _pivot_deflection(curves, contact.pad, contact.load)]
-    return np.column_stack(columns), np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])
+    columns = np.column_stack([of_pad @ full * bend, carried])
+    return columns, np.array([_SHAPE_SPREAD, _SCALE_SPREAD]) ** -2, np.array([0.0, 1.0])
 
 
-def _place_along_side(contact: ContactIntervals, angles: FloatArray, reached: BoolArray) -> FloatArray:
+def _place_along_side(contact: ContactIntervals, angles: FloatArray, pads: IntArray) -> FloatArray:
     """Place (m,) on each side, from the foot of the polygon's centre."""
-    pads = np.flatnonzero(reached)
     far = np.array([np.quantile(contact.along[contact.pad == k], 0.9) for k in pads])
     design = np.column_stack([directions(angles[pads]), np.ones(len(pads))])
     centre = np.linalg.lstsq(design, far, rcond=None)[0][:2]
@@ -231,21 +210,18 @@ def _consistent(contact: ContactIntervals, place: FloatArray) -> BoolArray:
     """False for averages that do not lie on their side: the shaft was on its way, or a glitch was left."""
     consistent, smooth = np.ones(len(contact.time), dtype=bool), _smooth_side(contact, place)
     for k in np.unique(contact.pad):
-        members = np.flatnonzero(contact.pad == k)
-        design = smooth[members]
-        good = np.ones(len(members), dtype=bool)
+        members = contact.pad == k
+        design, along = smooth[members], contact.along[members]
+        good = np.ones(len(along), dtype=bool)
         for _ in range(8):
             if good.sum() < 8:
                 break
-            beta = np.linalg.lstsq(design[good], contact.along[members][good], rcond=None)[0]
-            residual = contact.along[members] - design @ beta
-            centre = np.median(residual[good])
-            spread = robust_deviation(residual[good] - centre)
+            residual = along - design @ np.linalg.lstsq(design[good], along[good], rcond=None)[0]
+            residual -= np.median(residual[good])
             # ten nanometres: what 16 bits resolve, so that a noise-free record keeps its averages
-            updated = np.abs(residual - centre) < _CLIP * max(spread, 1e-8)
-            if np.array_equal(updated, good):
+            previous, good = good, np.abs(residual) < _CLIP * max(robust_deviation(residual[good]), 1e-8)
+            if np.array_equal(previous, good):
                 break
-            good = updated
         consistent[members] = good
     return consistent
 
@@ -270,8 +246,7 @@ def _whitener(contact: ContactIntervals, angles: FloatArray, noise: NoiseModel, 
         + noise.flicker * flicker_kernel(contact.time)
         + noise.drift**2 * np.outer(centred, centred)
     )
-    covariance[np.diag_indices_from(covariance)] *= 1.0 + 1e-9
-    covariance += np.diag(unsure**2)
+    covariance += np.diag(1e-9 * np.diag(covariance) + unsure**2)
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 

@@ -126,18 +126,17 @@ def _average(
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(time)]
     long = (stops - starts) >= _SHORTEST
     starts, stops = starts[long], stops[long]
-    count = (stops - starts).astype(float)
+    columns = np.column_stack([time, position, np.nan_to_num(carried), np.isnan(carried)])
+    means = piece_means(columns, starts, stops)
+    moment, place, (pad_load, lost) = means[:, 0], means[:, 1:3], np.split(means[:, 3:], 2, axis=1)
     period = float(time[-1] - time[0]) / (len(time) - 1)
-    moment = piece_means(time[:, None], starts, stops)[:, 0]
-    place = piece_means(position, starts, stops)
-    pad_load = piece_means(np.nan_to_num(carried), starts, stops)
-    lost = piece_means(np.isnan(carried).astype(float), starts, stops) > 0.0
     pads_touched = touched[starts]
-    row, pad = np.nonzero(pads_touched & ~lost & _settled(moment, place, pads_touched)[:, None])
+    settled = _settled(moment, place, pads_touched)[:, None]
+    row, pad = np.nonzero(pads_touched & ~(lost > 0.0) & settled)
     tangent = directions(angles + 0.5 * np.pi)
     return ContactIntervals(
         time=moment[row],
-        duration=count[row] * period,
+        duration=(stops - starts)[row] * period,
         pad=pad,
         along=np.sum(place[row] * directions(angles)[pad], axis=1),
         across=np.sum(place[row] * tangent[pad], axis=1),

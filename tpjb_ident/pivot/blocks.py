@@ -138,13 +138,13 @@ def cut_blocks(time: FloatArray, vectors: FloatArray, holds: tuple[Hold, ...], l
     period = span / max(len(time) - 1, 1)
     whole = last - first >= np.maximum(3, 0.5 * np.diff(edges)[:, 0] / period)
     first, last, number = first[whole], last[whole], number[whole]
-    moment, *columns = piece_means(np.column_stack([time, vectors]), first, last).T
-    count, load = last - first, columns[0]
+    moment, load, across_load, deflection, across = piece_means(np.column_stack([time, vectors]), first, last).T
+    count = last - first
     rate = np.gradient(load, moment) if len(load) > 1 else np.zeros(len(load))
     levels = np.array([hold.level for hold in holds] + [0.0])
     spread, rate = white_noise(vectors[:, 0]) / np.sqrt(count), np.where(number >= 0, 0.0, rate)
     branch = _directions(np.where(number >= 0, levels[number], load))
-    return Blocks(moment, count * period, *columns, spread, rate, number, branch)
+    return Blocks(moment, count * period, load, across_load, deflection, across, spread, rate, number, branch)
 
 
 def _edges(time: FloatArray, holds: tuple[Hold, ...], length: float) -> tuple[FloatArray, IntArray]:
