@@ -59,7 +59,8 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     if len(angles) < 3 or np.linalg.cond(design) > 1e3:
         raise ArgumentError(f"a centre needs three pads or more, all around the shaft; got {len(angles)}")
     error = _EQUAL_WITHIN * np.sqrt(np.maximum(np.diag(covariance), 1e-20))
-    weights, gain = np.ones(len(angles)), np.zeros((3, len(angles)))
+    weights = np.ones(len(angles))
+    gain: FloatArray = np.zeros((3, len(angles)))
     solution: FloatArray = np.zeros(3)
     for _ in range(400):
         gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
