@@ -121,39 +121,37 @@ def test_the_likeliest_mistake_is_named(turn, guess):
     assert re.search(guess, what)
 
 
-def campaign(**odd):
-    """One run per pad about a common centre somewhere; `odd` moves that of pad 3, along and beside its direction."""
-    centre = np.array([2e-5, -5e-5])
-    out = np.array([math.cos(ANGLES[2]), math.sin(ANGLES[2])])
-    moved = REACH * (odd.get("along", 0.0) * out + odd.get("aside", 0.0) * np.array([-out[1], out[0]]))
-    return [record(pad, shift=centre + (moved if pad == 3 else 0.0)) for pad in range(1, 6)]
+def campaign(odd=(0.0, 0.0), spread=0.0, zeroed=False):
+    """Runs of all pads about a common centre somewhere, `spread` to one side or the other; one of pad 3 is `odd`.
+
+    Places are shares of the reach, along and beside the pad's direction.
+    """
+    records = []
+    for pad, aside in [*((p, s) for p in range(1, 6) for s in {spread, -spread}), (3, None)]:
+        axes = REACH * pad_axes(ANGLES[pad - 1])
+        place = np.array([2e-5, -5e-5]) + (odd @ axes if aside is None else aside * axes[1]) - zeroed * axes[0]
+        records.append(record(pad, shift=place, name="odd" if aside is None else None))
+    return records
 
 
 @pytest.mark.parametrize(
-    ("odd", "named"),
-    [({}, False), ({"aside": 0.11}, False), ({"aside": 0.16}, True), ({"aside": -0.16}, True),
-     ({"along": 0.4}, False), ({"along": 0.65}, True), ({"along": -0.65}, True)],
+    ("options", "named"),
+    [({"odd": (0.0, 0.11)}, False), ({"odd": (0.0, 0.16)}, True), ({"odd": (0.0, -0.16)}, True),
+     ({"odd": (0.4, 0.0)}, False), ({"odd": (0.65, 0.0)}, True), ({"odd": (-0.65, 0.0)}, True),
+     # five robust standard deviations of where the campaign's own runs stand beside their pads
+     ({"odd": (0.0, 0.35), "spread": 0.08}, False), ({"odd": (0.0, 0.9), "spread": 0.08}, True),
+     # readings set to zero before each run tell no place
+     ({"zeroed": True}, False)],
 )  # fmt: skip
-def test_a_shaft_that_stands_elsewhere_is_named(odd, named):
-    found = check_placement(campaign(**odd))
-    assert [p.run for p in found] == (["p-3"] if named else [])
-    if named:
-        assert "toward pad 3" in found[0].what
+def test_a_shaft_that_stands_elsewhere_is_named(options, named):
+    records = campaign(**options)
+    found = check_placement(records)
+    assert [p.run for p in found] == (["odd"] if named else [])
+    for problem in found:
         # the reach holds the first load's deflection: 80 um and 2 um
-        assert "say 82 um toward it" in found[0].what
-
-
-def test_two_pads_tell_no_centre():
-    assert check_placement(campaign(aside=0.5)[1:3]) == []
-    assert check_placement([]) == []
-
-
-def test_readings_set_to_zero_before_each_run_tell_no_place():
-    zeroed = []
-    for pad in range(1, 6):
-        out = vectors(float(ANGLES[pad - 1]), np.array([REACH]))[0]
-        zeroed.append(record(pad, shift=(1e-6 * pad, -2e-6) - out))
-    assert check_placement(zeroed) == []
+        assert re.search("toward pad 3.* say 82 um toward it", problem.what)
+    # two pads tell no centre
+    assert check_placement([one for one in records if one.pad > 3]) == check_placement([]) == []
 
 
 @pytest.mark.parametrize(
@@ -392,53 +390,94 @@ def read(run):
     return read_dry_run(run, float(ANGLES[0]))
 
 
-def test_a_sound_run_gives_its_holds_and_blocks():
-    found = read(Run())
-    assert [round(h.level, -1) for h in found.holds] == [1000.0, 2000.0, 3000.0]
-    assert (found.pad, found.angle, found.quantisation) == (1, ANGLES[0], 0.0)
-    assert found.lost < 2e-3
-    slope = np.polyfit(found.blocks.load, found.blocks.deflection, 1)[0]
-    assert slope == pytest.approx(SCALE, rel=1e-3)
-    assert found.pickup is not None
-    assert found.pickup.channels == tuple(CHANNELS)
+def repeating(run, share, quantity="displacement"):
+    """Repeat a share of the readings."""
+    same = np.arange(4000) % 20 < 20 * share
+    setattr(run, quantity, getattr(run, quantity)[np.maximum.accumulate(np.where(same, 0, np.arange(4000)))])
 
 
-def spoilt(kind):
-    run = Run(n=4000 if kind != "short" else 49)
-    if kind == "lost":
-        run.force[:2001] = np.nan
-    if kind == "still":
-        run.displacement[:] = run.displacement[0]
-    if kind == "unpushed":
-        run.force = vectors(ANGLES[0], np.full(4000, 300.0)) + np.random.default_rng(1).standard_normal((4000, 2))
-    if kind == "few":
-        run = Run(n=60)
-    return run
+def stuck(run, samples, quantity="displacement"):
+    values = getattr(run, quantity)
+    values[1000 : 1000 + samples] = values[1000]
+
+
+PROBES, CELLS = ["channel X1A", "channel X1B"], ["channel L1H", "channel L1V"]
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
+    ("share", "samples", "still"),
+    [(0.0, 49, []), (0.0, 51, PROBES), (0.0, 700, PROBES),
+     # with two of five readings repeated a stretch of nine is to be expected; ten times that is none of chance
+     (0.4, 80, []), (0.4, 140, PROBES), (0.4, 700, PROBES),
+     # where more than half repeat, the converter's step hides the noise, and standing still says nothing
+     (0.6, 700, [])],
+)  # fmt: skip
+@pytest.mark.parametrize("cells", [0, 400])
+def test_channels_that_stand_still_are_named_with_time_and_share(share, samples, still, cells):
+    run = Run()
+    repeating(run, share)
+    stuck(run, samples)
+    stuck(run, cells, "force")
+    still = [*(CELLS if cells else []), *still]
+    if not still:
+        live_run(run)
+        return
+    with pytest.raises(RigDataError) as caught:
+        live_run(run)
+    assert sorted(p.place for p in caught.value.problems) == sorted(still)
+    share = {"channel X": samples, "channel L": cells}
+    for problem in caught.value.problems:
+        assert f"from 2.00 s on for {100 * share[problem.place[:9]] / 4000:.0f} % of the run" in problem.what
+
+
+def test_one_coarse_channel_lets_its_quantity_stand_still():
+    run = Run()
+    run.force = np.round(run.force / [4.0, 1e-9]) * [4.0, 1e-9]  # the horizontal cell repeats most readings
+    stuck(run, 700, "force")
+    run.channels = CHANNELS | {"T1": channel("temperature", None)}  # of other quantities nothing is asked
+    live_run(run)
+
+
+def few(run, n):
+    run.time, run.force, run.displacement = run.time[:n], run.force[:n], run.displacement[:n]
+
+
+def unpushed(run):
+    run.force = vectors(ANGLES[0], np.full(4000, 300.0)) + np.random.default_rng(1).standard_normal((4000, 2))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
     [
-        ("unpushed", "has a load that does not rise"),
-        ("short", "has 49 samples"),
-        ("lost", "of which 50 % are missing or glitches"),
-        ("still", "stands still"),
-        ("few", "gives only . usable averages of 0.1 s"),
+        (unpushed, "has a load that does not rise"),
+        (lambda run: few(run, 49), "has 49 samples"),
+        (lambda run: few(run, 60), "gives only . usable averages of 0.1 s"),
+        (lambda run: run.force[:2001].fill(np.nan), "of which 50 % are missing or glitches"),
+        (lambda run: stuck(run, 4000), "stands still"),
     ],
 )
-def test_runs_that_hold_too_little_are_refused(kind, said):
+def test_runs_that_hold_too_little_are_refused(spoil, said):
+    run = Run()
+    spoil(run)
     with pytest.raises(RigDataError, match=said):
-        read(spoilt(kind))
+        read(run)
 
 
-def test_shuffled_time_stamps_are_put_in_order():
+def test_a_run_has_its_holds_and_blocks_whatever_order_its_stamps_have_and_ends_with_the_shorter_vector():
     run = Run()
     plain = read(run)
-    run.time[[1000, 1001]] = run.time[[1001, 1000]]
-    for name in ("force", "displacement"):
-        getattr(run, name)[[1000, 1001]] = getattr(run, name)[[1001, 1000]]
-    again = read(run)
-    np.testing.assert_allclose(again.blocks.load, plain.blocks.load, rtol=1e-9)
+    assert [round(h.level, -1) for h in plain.holds] == [1000.0, 2000.0, 3000.0]
+    assert (plain.pad, plain.angle, plain.quantisation) == (1, ANGLES[0], 0.0)
+    assert plain.lost < 2e-3
+    assert np.polyfit(plain.blocks.load, plain.blocks.deflection, 1)[0] == pytest.approx(SCALE, rel=1e-3)
+    assert plain.pickup.channels == tuple(CHANNELS)
+    for values in (run.time, run.force, run.displacement):
+        values[[1000, 1001]] = values[[1001, 1000]]
+    np.testing.assert_allclose(read(run).blocks.load, plain.blocks.load, rtol=1e-9)
+    for lost, quantity in ((300, "force"), (500, "displacement")):
+        run = Run()
+        setattr(run, quantity, getattr(run, quantity)[:-lost])
+        assert read(run).blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - lost / 500.0, abs=0.15)
 
 
 def test_steps_of_a_converter_that_no_noise_reaches_are_known():
@@ -447,72 +486,6 @@ def test_steps_of_a_converter_that_no_noise_reaches_are_known():
     clean = vectors(ANGLES[0], REACH + SCALE * (run.force @ vectors(ANGLES[0], [1.0])[0]).round(-2))
     run.displacement = np.round(clean / step) * step
     assert read(run).quantisation == pytest.approx(step / math.sqrt(6.0), rel=1e-6)
-
-
-@pytest.mark.parametrize(("samples", "named"), [(49, False), (51, True), (700, True)])
-def test_a_channel_that_stands_still_is_named_with_time_and_share(samples, named):
-    run = Run()
-    run.displacement[1000 : 1000 + samples] = run.displacement[1000]
-    if not named:
-        live_run(run)
-        return
-    with pytest.raises(RigDataError) as caught:
-        live_run(run)
-    assert [p.place for p in caught.value.problems] == ["channel X1A", "channel X1B"]
-    said = caught.value.problems[0].what
-    assert f"from 2.00 s on for {100 * samples / 4000:.0f} % of the run" in said
-
-
-def test_a_computed_record_may_stand_still():
-    run = Run()
-    run.displacement = np.round(run.displacement / 2e-6) * 2e-6
-    run.displacement[1000:1700] = run.displacement[1000]
-    live_run(run)
-
-
-def repeating(share, stuck, n=4000):
-    """A run whose probes repeat a share of their readings, and stand still for a while."""
-    run = Run(n)
-    same = np.arange(n) % 20 < 20 * share
-    last = np.maximum.accumulate(np.where(same, 0, np.arange(n)))
-    run.displacement = run.displacement[last]
-    run.displacement[1000 : 1000 + stuck] = run.displacement[1000]
-    return run
-
-
-@pytest.mark.parametrize(
-    ("share", "stuck", "named"), [(0.4, 700, True), (0.6, 700, False), (0.4, 80, False), (0.4, 140, True)]
-)
-def test_repeated_readings_make_longer_stretches_plausible(share, stuck, named):
-    """With two of five readings repeated a stretch of nine is to be expected; ten times that is none of chance.
-
-    Where more than half repeat, the converter's step hides the noise, and standing still says nothing.
-    """
-    run = repeating(share, stuck)
-    if named:
-        with pytest.raises(RigDataError) as caught:
-            live_run(run)
-        assert {p.place for p in caught.value.problems} == {"channel X1A", "channel X1B"}
-    else:
-        live_run(run)
-
-
-def test_what_probes_cannot_tell_cells_still_can():
-    run = repeating(0.6, 700)
-    run.force[2000:2400] = run.force[2000]
-    with pytest.raises(RigDataError) as caught:
-        live_run(run)
-    assert [p.place for p in caught.value.problems] == ["channel L1H", "channel L1V"]
-
-
-def test_the_shorter_vector_ends_the_record():
-    run = Run()
-    plain = read(run)
-    run.force = run.force[:-300]
-    short = read(run)
-    assert short.blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 0.6, abs=0.15)
-    run.displacement, run.force = run.displacement[:-500], Run().force
-    assert read(run).blocks.time[-1] == pytest.approx(plain.blocks.time[-1] - 1.0, abs=0.15)
 
 
 @pytest.mark.parametrize("top", [1000.0, 4000.0])

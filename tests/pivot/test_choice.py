@@ -151,34 +151,23 @@ def test_a_law_that_no_other_pad_likes_has_no_shape_to_share(share, asked):
     assert (informed_law(law, [(fit, share), (fitted("linear"), 1.0 - share)]) is not None) is asked
 
 
-def test_both_priors_count_alike_and_the_better_fit_stays(monkeypatch):
-    own = LAWS["power"].prior_precision
-    pads = [[with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")] for _ in range(2)]
-    weights = [np.array([0.8, 0.2])] * 2
-    for evidence, winner in ((2.0, 0.66), (-2.0, 0.7)):
-        again = with_information(np.array([[900.0]]), own, [0.66], share_evidence=evidence)
-        monkeypatch.setattr(law_fit, "fit_law", lambda *_, again=again, **__: again)
-        shared = with_shared_shape(pads, weights, [None, None])
-        assert shared[0][0].shape[0] == winner
-        assert shared[0][0].log_evidence == pytest.approx(math.log(0.5 * (1.0 + math.exp(evidence))))
-        assert shared[0][1] is pads[0][1]
-
-
-@pytest.mark.parametrize(("behind", "asked"), [(HOPELESS - 1.0, True), (HOPELESS + 1.0, False)])
-def test_a_hopeless_law_is_not_fitted_again(behind, asked, monkeypatch):
-    own = LAWS["power"].prior_precision
-    poor = with_information(np.array([[900.0]]), own, [0.7], share_evidence=-behind)
-    pads = [[poor, fitted("linear")], [with_information(np.array([[900.0]]), own, [0.7]), fitted("linear")]]
-    calls = []
-
-    def refit(law, contact, data, start):
-        calls.append(data)
-        return poor if data == "first" else pads[1][0]
-
-    monkeypatch.setattr(law_fit, "fit_law", refit)
-    shared = with_shared_shape(pads, [np.array([0.5, 0.5])] * 2, ["first", "second"])
-    assert ("first" in calls) is asked
-    assert shared[0][0].log_evidence == pytest.approx(-behind)
+@pytest.mark.parametrize(
+    ("told", "behind", "shape", "evidence"),
+    [
+        (2.0, 0.0, 0.66, math.log(0.5 * (1.0 + math.exp(2.0)))),  # both priors count alike, the better fit stays
+        (-2.0, 0.0, 0.7, math.log(0.5 * (1.0 + math.exp(-2.0)))),
+        (2.0, HOPELESS + 1.0, 0.7, -HOPELESS - 1.0),  # a hopeless law is not fitted again
+    ],
+)
+def test_both_priors_count_alike_and_the_better_fit_stays(monkeypatch, told, behind, shape, evidence):
+    own, many = LAWS["power"].prior_precision, np.array([[900.0]])
+    first, other = (with_information(many, own, [0.7], share_evidence=size) for size in (-behind, 0.0))
+    again = with_information(many, own, [0.66], share_evidence=told)
+    monkeypatch.setattr(law_fit, "fit_law", lambda *_, **__: again)
+    pads = [[first, fitted("linear")], [other, fitted("linear")]]
+    shared = with_shared_shape(pads, np.array([[0.8, 0.2]] * 2), [None, None])
+    assert (shared[0][0].shape[0], shared[0][0].log_evidence) == pytest.approx((shape, evidence))
+    assert shared[0][1] is pads[0][1]
 
 
 NAMES = ("hertz-point", "point-in-series", "power")
@@ -201,9 +190,3 @@ def test_a_pad_that_shows_half_its_law_takes_the_shape_from_the_others():
     series = NAMES.index("point-in-series")
     assert abs(shared[4][series].shape[0] - 0.12) < abs(found[4][series].shape[0] - 0.12)
     assert posterior_weights(shared)[4][NAMES.index("hertz-point")] < weights[4][NAMES.index("hertz-point")]
-
-
-def test_evidence_is_that_of_the_prior_given():
-    one, law = blocks_of_a_sphere(0.3), LAWS["point-in-series"]
-    sharp = dataclasses.replace(law, prior_mean=np.array([0.3]), prior_precision=np.array([[400.0]]))
-    assert law_fit.fit_law(sharp, False, one).log_evidence > law_fit.fit_law(law, False, one).log_evidence

@@ -9,14 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rigdata.channel_statistics import ChannelStatistics
 from rigdata.problem import RigDataError
-from tests.pivot.test_assemble import ANGLES, CHANNELS, REACH, SCALE, channel, record, vectors
+from tests.pivot.test_assemble import ANGLES, REACH, SCALE, channel, vectors
 from tests.pivot.test_assemble import Run as FirstPad
-from tpjb_ident.phasors.slow_samples import _repeated, live_run
+from tpjb_ident.phasors.slow_samples import live_run
 from tpjb_ident.pivot.fit import fit_pivots
 from tpjb_ident.pivot.laws import LAWS
-from tpjb_ident.pivot.refusals import check_placement
 
 LEVELS = 500.0 * np.arange(1, 9)
 
@@ -122,39 +120,6 @@ def test_a_shaft_that_stands_elsewhere_is_refused_too():
     assert "run dry-5: the shaft stands" in problem.what
 
 
-def test_runs_that_stand_less_orderly_are_allowed_more():
-    """Five robust standard deviations of where the campaign's own runs stand beside their pads."""
-
-    def placed(odd):
-        """Two runs per pad, as far to one side as to the other; one of pad 3 by `odd`."""
-        out = []
-        for pad, aside in [(p, s * 0.08) for p in range(1, 6) for s in (1, -1)] + [(3, odd)]:
-            angle = ANGLES[pad - 1]
-            shift = REACH * aside * np.array([-math.sin(angle), math.cos(angle)])
-            out.append(record(pad, shift=shift, name=f"{pad}{aside:+}"))
-        return [p.run for p in check_placement(out)]
-
-    assert placed(0.35) == []
-    assert placed(0.9) == ["3+0.9"]
-
-
-def test_repeated_readings_are_counted_beside_the_longest_stretch():
-    """Three equal readings are two repeats, and one stretch; what is left is two more of seven."""
-    seen = ChannelStatistics()
-    seen.add(np.array([1.0, 1, 1, 2, 3, 3, 4, 4, 5, 6]))
-    assert _repeated(seen) == pytest.approx(2 / 7)
-    alone = ChannelStatistics()
-    alone.add(np.array([1.0, 2, 2, 2, 3]))
-    assert _repeated(alone) == 0.0
-
-
-def test_one_coarse_channel_lets_its_quantity_stand_still():
-    run = FirstPad()
-    run.force = np.round(run.force / [4.0, 1e-9]) * [4.0, 1e-9]  # the horizontal cell repeats most readings
-    run.force[1000:1700] = run.force[1000]
-    live_run(run)
-
-
 @dataclasses.dataclass(frozen=True)
 class Readings:
     """Readings of a run's channels in memory."""
@@ -182,13 +147,3 @@ def test_a_dead_probe_is_left_out_where_two_others_tell_the_plane(dead, left):
     values["X1B"] = values["X1C"] = np.full(400, 1.2)  # then nothing else tells the plane
     with pytest.raises(RigDataError, match="stands still"):
         live_run(Readings(channels, values))
-
-
-def test_channels_of_other_quantities_may_stand_still():
-    run = FirstPad()
-    run.channels = CHANNELS | {"T1": channel("temperature", None)}
-    asked = []
-    original = run.record
-    run.record = lambda name: asked.append(name) or original(name)
-    live_run(run)
-    assert sorted(asked) == sorted(CHANNELS)

@@ -136,18 +136,6 @@ def test_evidence_is_the_integral_over_the_shape():
         assert fit.log_evidence == pytest.approx(by_hand + offset, abs=0.03)
 
 
-def test_evidence_charges_for_what_need_not_be():
-    """Of two laws that fit alike the one with less room is likelier: Occam's factor, not the misfit."""
-    given = data(3e-6 + 4e-9 * LOAD)
-    plain, bent = (fit_law(LAWS[name], False, given) for name in ("linear", "power"))
-    assert plain.chi_square == pytest.approx(bent.chi_square, abs=1e-2)
-    # prior spread over posterior spread of the exponent, and how far the prior's mean is from a straight line
-    own = LAWS["power"]
-    factor = 0.5 * math.log(own.prior_precision[0, 0] * bent.covariance[3, 3])
-    far = -0.5 * own.prior_precision[0, 0] * (1.0 - own.prior_mean[0]) ** 2
-    assert bent.log_evidence - plain.log_evidence == pytest.approx(factor + far, abs=0.02)
-
-
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
 def test_loads_in_another_unit_are_the_same_pivot(unit):
     """W and W_r alike: scale changes by its unit, shapes and evidence by nothing."""
@@ -220,27 +208,6 @@ def test_a_pad_that_is_not_pressed_gives_nothing():
         fit.log_softness(np.array([-50.0]), False)[1], fit.log_softness(np.zeros(1), False)[1]
     )
     assert reading(fit, np.array([-50.0]), np.ones(1))[0] == fit.theta[0]
-
-
-@pytest.mark.parametrize("name", ["power", "bilinear", "spline"])
-def test_logarithms_have_the_derivatives_that_are_said(name):
-    law = LAWS[name]
-    fit = fit_law(law, True, noisy(9, gap=1e-6))
-    theta = fit.theta.copy()
-    theta[3 : 3 + len(law.parameters)] = law.prior_mean + 0.1
-    fit = dataclasses.replace(fit, theta=theta)
-    loads = np.array([300.0, 1500.0, 4200.0])
-    for value, gradient in (
-        (lambda f: np.log(f.compliance(loads)), fit.log_softness(loads, secant=False)[1]),
-        (lambda f: np.log(f.deflection(loads)), fit.log_softness(loads, secant=True)[1]),
-    ):
-        assert gradient.shape == (3, len(theta))
-        for k in range(len(theta)):
-            up, down = theta.copy(), theta.copy()
-            up[k] += 1e-6
-            down[k] -= 1e-6
-            numeric = (value(dataclasses.replace(fit, theta=up)) - value(dataclasses.replace(fit, theta=down))) / 2e-6
-            np.testing.assert_allclose(gradient[:, k], numeric, rtol=2e-3, atol=2e-4)
 
 
 @pytest.mark.parametrize("start", [(1e-4, 0.0, -25.0, 0.3), (-1e-4, 0.0, -17.0, 1.2), (0.0, 0.0, -19.0, 5.0)])
@@ -318,13 +285,6 @@ def test_laws_far_outside_their_range_stay_laws():
     np.testing.assert_allclose(bend, [1 + (math.e - 1) / (1 + math.exp(-10.0)), 1.0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_at_the_reference_load_every_law_but_the_bend_has_unit_compliance(name):
-    law = LAWS[name]
-    value = law.psi(np.ones(1), law.prior_mean)[0]
-    assert value == pytest.approx(1.0, abs=1e-12)
-
-
 def test_what_the_data_do_not_tell_is_as_wide_as_its_prior():
     """A straight line in a hundred micrometres of noise says nothing of a contact gap, nor of the load it closes at."""
     fit = fit_law(LAWS["power"], True, data(4e-9 * LOAD, sigma=1e-4, friction=(0.01, 0.02)))
@@ -335,45 +295,26 @@ def test_what_the_data_do_not_tell_is_as_wide_as_its_prior():
     assert math.exp(fit.theta[-1]) == pytest.approx(500.0, rel=0.01)
 
 
-@pytest.mark.parametrize("load", [0.2, 0.9, 1.7])
-def test_the_smallest_loads_are_taken_as_they_are(load):
-    fit = fit_law(LAWS["power"], False, noisy(8))
-    u, p, scale = load / REFERENCE, fit.shape[0], math.exp(fit.theta[2])
-    at = np.array([load])
-    assert fit.compliance(at)[0] == pytest.approx(scale * u ** (p - 1.0), rel=1e-9)
-    assert fit.deflection(at)[0] == pytest.approx(scale * REFERENCE * u**p / p, rel=1e-9)
-    assert fit.log_softness(at, secant=False)[1][0, 3] == pytest.approx(math.log(u), rel=1e-9)
-    assert fit.log_softness(at, secant=True)[1][0, 3] == pytest.approx(math.log(u) - 1.0 / p, rel=1e-9)
-    assert reading(fit, at, np.zeros(1))[0] == pytest.approx(fit.theta[0] + fit.deflection(at)[0], rel=1e-12)
-
-
-def test_a_straight_line_is_found_with_the_error_of_a_straight_line():
-    fit = fit_law(LAWS["linear"], False, data(3e-6 + 4e-9 * LOAD, sigma=1e-9, friction=(0.0, 1e-9)))
-    assert fit.theta[0] == pytest.approx(3e-6, abs=1e-12)
-    assert np.exp(fit.theta[2]) == pytest.approx(4e-9, rel=1e-6)
-    design = np.column_stack([np.ones(24), LOAD])
-    own = 1e-18 * np.linalg.inv(design.T @ design)
-    assert fit.covariance[0, 0] == pytest.approx(own[0, 0], rel=1e-4)
-    assert fit.covariance[2, 2] * (4e-9) ** 2 == pytest.approx(own[1, 1], rel=1e-3)
-    assert fit.chi_square == pytest.approx(0.0, abs=1e-3)
-    assert fit.freedom == 24 - 3
-
-
-def test_readings_have_the_derivatives_that_are_said():
-    both, way = np.r_[LOAD, LOAD[::-1]], np.r_[np.ones(24), -np.ones(24)]
-    given = data(1e-6 + 4e-9 * both**0.95, both, way, sigma=1e-9, friction=(0.0, 0.02))
-    fit = fit_law(LAWS["power"], True, given)
+@pytest.mark.parametrize("name", ["power", "bilinear", "spline"])
+def test_readings_and_logarithms_have_the_derivatives_that_are_said(name):
+    law, way = LAWS[name], np.r_[np.ones(24), -np.ones(24)]
+    fit = fit_law(law, True, noisy(9, gap=1e-6))
     theta = fit.theta.copy()
-    theta[1], theta[-2] = 0.04, 2e-6
-    fit = dataclasses.replace(fit, theta=theta)
-    _, jacobian = fit.reading_gradient(both, way)
-    for j, size in enumerate(np.maximum(np.abs(theta), 1e-6) * 1e-5):
-        up, down = theta.copy(), theta.copy()
-        up[j] += size
-        down[j] -= size
-        ends = [reading(dataclasses.replace(fit, theta=t), both, way) for t in (up, down)]
-        numeric = (ends[0] - ends[1]) / (2 * size)
-        np.testing.assert_allclose(jacobian[:, j], numeric, rtol=1e-4, atol=1e-6 * np.abs(numeric).max())
+    theta[1], theta[-2], theta[3 : 3 + len(law.parameters)] = 0.04, 2e-6, law.prior_mean + 0.1
+    fit, both, loads = dataclasses.replace(fit, theta=theta), np.r_[LOAD, LOAD[::-1]], np.array([300.0, 1500.0, 4200.0])
+    for function in (
+        lambda f: f.reading_gradient(both, way),
+        lambda f: f.log_softness(loads, secant=False),
+        lambda f: f.log_softness(loads, secant=True),
+    ):
+        _, gradient = function(fit)
+        for k, size in enumerate(np.maximum(np.abs(theta), 1e-6) * 1e-5):
+            ends = [
+                function(dataclasses.replace(fit, theta=theta + side * np.eye(len(theta))[k]))[0]
+                for side in (size, -size)
+            ]
+            numeric = (ends[0] - ends[1]) / (2 * size)
+            np.testing.assert_allclose(gradient[:, k], numeric, rtol=5e-3, atol=1e-4 * max(np.abs(numeric).max(), 1e-6))
     # contact loss is what the reading lacks of the pivot's own deflection
-    lack = theta[0] + fit.deflection(LOAD) - reading(dataclasses.replace(fit, theta=theta), LOAD, np.zeros(24))
+    lack = theta[0] + fit.deflection(LOAD) - reading(fit, LOAD, np.zeros(24))
     np.testing.assert_allclose(lack, theta[-2] * np.exp(-LOAD / np.exp(theta[-1])), rtol=1e-9)

@@ -72,23 +72,24 @@ def test_white_noise_is_found_as_variance_times_time(duration):
     assert found.flicker < 0.15 * 4e-16
 
 
-def test_what_the_signal_spans_is_no_noise():
-    """Any level and slope, in columns of any unit."""
+SLOPES = 1e-5 * np.random.default_rng(1).standard_normal((4, 2))
+
+
+@pytest.mark.parametrize(
+    ("changed", "unit"),
+    [
+        (lambda s, k: replace(s, values=s.values + s.mean @ SLOPES[k], mean=s.mean * [1e6, -1e-9]), 1.0),
+        (lambda s, k: replace(s, time=s.time + 900.0), 1.0),
+        (lambda s, k: replace(s, values=1e3 * s.values), 1e3),
+    ],
+    ids=["what the signal spans", "clock", "unit"],
+)
+def test_what_is_no_noise_changes_nothing(changed, unit):
     series = white_series(4, 6)
-    rng = np.random.default_rng(1)
-    lifted = [
-        NoiseSeries(s.time, s.duration, s.values + s.mean @ (1e-5 * rng.standard_normal(2)), s.mean * [1e6, -1e-9])
-        for s in series
-    ]
-    a, b = estimate_noise(series, 1e-8), estimate_noise(lifted, 1e-8)
-    np.testing.assert_allclose([b.white, b.flicker, b.drift], [a.white, a.flicker, a.drift], rtol=1e-5)
-
-
-def test_clocks_and_the_order_of_series_do_not_matter():
-    series = white_series(3, 7)
-    later = [NoiseSeries(s.time + 900.0, s.duration, s.values, s.mean) for s in series[::-1]]
-    a, b = estimate_noise(series, 1e-8), estimate_noise(later, 1e-8)
-    np.testing.assert_allclose([b.white, b.flicker, b.drift], [a.white, a.flicker, a.drift], rtol=1e-6)
+    a = estimate_noise(series, 1e-8)
+    b = estimate_noise([changed(s, k) for k, s in enumerate(series)][::-1], unit * 1e-8)
+    expected = [a.white * unit**2, a.flicker * unit**2, a.drift * unit]
+    np.testing.assert_allclose(numbers(b), expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("rate", [1e-9, 3e-8, 1e-6])
@@ -159,14 +160,6 @@ def test_levels_are_recovered():
     for name in ("white", "flicker", "drift"):
         ratio = np.median([getattr(f, name) for f in found]) / getattr(TRUE, name)
         assert 0.6 < ratio < 1.6, name
-
-
-def test_units_do_not_matter():
-    series = drawn_series(6, 2)
-    scaled = [NoiseSeries(s.time, s.duration, 1e3 * s.values, s.mean) for s in series]
-    one, other = estimate_noise(series, 1e-8), estimate_noise(scaled, 1e-5)
-    assert other.drift == pytest.approx(1e3 * one.drift, rel=1e-6)
-    assert other.white == pytest.approx(1e6 * one.white, rel=1e-6)
 
 
 @dataclass

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +75,10 @@ def test_a_law_without_error_has_no_band_among_the_points_and_a_logarithmic_one_
 def test_an_error_of_the_scale_is_that_of_the_stiffness():
     one = curve((law(errors=(1e-7, 0.01, 0.03)),))
     np.testing.assert_allclose(one.relative_stiffness_se(INSIDE), 0.03, rtol=1e-12)
+    # and moves all loads alike; beyond the points each has an error of its own
+    np.testing.assert_allclose(one.relative_stiffness_covariance(INSIDE), 0.03**2, rtol=1e-9)
+    joint = one.relative_stiffness_covariance(far := np.array([1000.0, 4000.0, 15000.0]))
+    np.testing.assert_allclose(np.sqrt(np.diag(joint)), one.relative_stiffness_se(far), rtol=1e-12)
     lo, hi = one.stiffness_band(INSIDE)
     np.testing.assert_allclose(np.log(hi * SCALE), 1.959963984540054 * 0.03, rtol=1e-9)
     np.testing.assert_allclose(lo * hi, SCALE**-2.0, rtol=1e-12)
@@ -311,17 +314,5 @@ def test_a_drift_from_up_to_down_is_an_error_of_the_whole_loop():
 def test_no_loop_without_two_branches_over_common_loads(load, branch):
     n = len(load)
     assert measure_loop(np.array(load), 1e-9 * np.array(load), np.zeros((n, n)), np.array(branch)) is None
-
-
-def test_a_pivot_that_gives_nothing_has_no_loss_factor():
-    load, branch = np.array([200.0, 1000.0, 1000.0, 200.0]), np.array([1, 1, -1, -1])
-    assert measure_loop(load, np.zeros(4), np.zeros((4, 4)), branch) is None
-    assert replace(curve(), pad=3).pad == 3
-
-
-def test_covariance_between_loads_holds_the_standard_errors_and_a_scale_moves_all_loads_alike():
-    one, far = curve((law(errors=(0.0, 0.0, 0.03)),)), np.array([1000.0, 2500.0, 4000.0, 15000.0])
-    joint = one.relative_stiffness_covariance(far)
-    np.testing.assert_allclose(np.sqrt(np.diag(joint)), one.relative_stiffness_se(far), rtol=1e-12)
-    inside = one.relative_stiffness_covariance(INSIDE)
-    np.testing.assert_allclose(inside, 0.03**2, rtol=1e-9)
+    # nor of a pivot that gives nothing
+    assert measure_loop(np.array([200.0, 1e3, 1e3, 200.0]), np.zeros(4), np.zeros((4, 4)), UP_DOWN[1:5]) is None

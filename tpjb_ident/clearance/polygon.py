@@ -63,7 +63,7 @@ def find_centre(angles: FloatArray, distances: FloatArray, covariance: FloatArra
     gain: FloatArray = np.zeros((3, len(angles)))
     solution: FloatArray = np.zeros(3)
     for _ in range(400):
-        gain = np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights)
+        gain = np.asarray(np.linalg.solve(design.T @ (design * weights[:, None]), design.T * weights), dtype=float)
         previous, solution = solution, gain @ distances
         if np.max(np.abs(solution - previous)) < 1e-12:
             break
