@@ -78,15 +78,14 @@ def _check_turn(run: Run, load: FloatArray, position: FloatArray) -> None:
     """Refuse a load that does not go around, and a shaft that goes elsewhere than the load."""
     step = max(1, len(load) // 400)
     whole = len(load) // step * step
-    load_mean, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) for part in (load, position))
-    angle = np.unwrap(np.arctan2(load_mean[:, 1], load_mean[:, 0]))
+    pushed, place = (part[:whole].reshape(-1, step, 2).mean(axis=1) @ [1.0, 1j] for part in (load, position))
+    angle = np.unwrap(np.angle(pushed))
     if np.ptp(angle) < _TURN_NEEDED:
         what = f"turns its load through {np.degrees(np.ptp(angle)):.0f} deg only"
         raise _refused(run, what, "Sweep the load once around, 360 deg or more")
-    place = place - 0.5 * (place.max(axis=0) + place.min(axis=0))
-    in_load_frame = (place[:, 0] + 1j * place[:, 1]) * np.exp(-1j * angle)
-    lag = np.angle(np.sum(in_load_frame))
-    coherence = abs(np.mean(in_load_frame)) / max(np.hypot(*place.T).mean(), 1e-300)
+    place = place - 0.5 * (place.real.max() + place.real.min() + 1j * (place.imag.max() + place.imag.min()))
+    in_load_frame = np.mean(place * np.exp(-1j * angle))
+    lag, coherence = np.angle(in_load_frame), abs(in_load_frame) / max(np.abs(place).mean(), 1e-300)
     if abs(lag) > np.radians(30.0) or coherence < 0.7:
         what = f"has a shaft that does not follow its load ({np.degrees(lag):+.0f} deg away, coherence {coherence:.2f})"
         cure = "Check order, axes and polarity of the displacement and force channels"
@@ -101,14 +100,12 @@ def _carried(load: FloatArray, angles: FloatArray, touched: BoolArray) -> FloatA
     single = np.flatnonzero(count == 1)
     pad = np.argmax(touched[single], axis=1)
     carried[single, pad] = np.sum(load[single] * n[pad], axis=1)
-    for i in range(len(angles)):
-        j = (i + 1) % len(angles)
-        pair = np.flatnonzero((count == 2) & touched[:, i] & touched[:, j])
-        share = np.linalg.solve(n[[i, j]].T, load[pair].T)
+    for first in range(len(angles)):
+        pads = np.array([first, (first + 1) % len(angles)])
+        pair = np.flatnonzero((count == 2) & touched[:, pads].all(axis=1))
+        share = np.linalg.solve(n[pads].T, load[pair].T).T
         # past a pad's own direction its neighbour would have to pull: the pad carries all, friction holds the shaft
-        alone_i, alone_j = share[1] < 0.0, share[0] < 0.0
-        carried[pair, i] = np.where(alone_i, load[pair] @ n[i], np.maximum(share[0], 0.0))
-        carried[pair, j] = np.where(alone_j, load[pair] @ n[j], np.maximum(share[1], 0.0))
+        carried[np.ix_(pair, pads)] = np.where(share[:, ::-1] < 0.0, load[pair] @ n[pads].T, np.maximum(share, 0.0))
     return carried
 
 

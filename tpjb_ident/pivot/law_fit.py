@@ -93,13 +93,16 @@ class LawFit:
         return np.asarray(np.exp(self.theta[SCALE]) * shape(np.ravel(u), self.shape)[0]).reshape(np.shape(u))
 
     def log_softness(self, load: FloatArray, secant: bool) -> tuple[FloatArray, FloatArray]:
-        """Logarithm (n,) of deflection (`secant`) or compliance at loads (n,) [N], its derivative (n, p) by `theta`."""
+        """Logarithm (n,) of deflection (`secant`) or compliance at loads (n,) [N], its derivative (n, p) by `theta`.
+
+        But for a constant, which is that of the reference load.
+        """
         shape = self.law.phi if secant else self.law.psi
         value, derivative = shape(np.maximum(load, 0.0) / self.reference_load, self.shape)
         gradient = np.zeros((len(load), len(self.theta)))
         gradient[:, SCALE] = 1.0
         gradient[:, _shape(self.law)] = derivative / np.maximum(value, 1e-300)[:, None]
-        return np.log(self.deflection(load) if secant else self.compliance(load)), gradient
+        return self.theta[SCALE] + np.log(value), gradient
 
     def reading_gradient(self, load: FloatArray, branch: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Expected reading (n,) [m] at applied loads (n,) [N], contact loss included, its derivative (n, p)."""

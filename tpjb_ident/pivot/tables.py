@@ -75,35 +75,22 @@ def pivot_table(
     grid = load_grid(curves) if loads is None else np.asarray(loads, dtype=float)
     if np.any(~(grid > 0.0)):
         raise ArgumentError("loads must be positive: at zero load there is no stiffness to speak of")
-    return pd.concat([_rows(curve, grid, formula, level) for curve in curves], ignore_index=True)
-
-
-def _rows(curve: PivotCurve, loads: FloatArray, formula: Formula | None, level: float) -> pd.DataFrame:
-    import pandas as pd
-
-    stiffness, (lo, hi) = curve.stiffness(loads), curve.stiffness_band(loads, level)
-    secant, (secant_lo, secant_hi) = curve.secant(loads), curve.secant_band(loads, level)
-    columns: dict[str, object] = {
-        "pad": curve.pad,
-        "force_N": loads,
-        "deflection_m": curve.deflection(loads),
-        TANGENT: stiffness,
-        f"{TANGENT}_lo": lo,
-        f"{TANGENT}_hi": hi,
-        SECANT: secant,
-        f"{SECANT}_lo": secant_lo,
-        f"{SECANT}_hi": secant_hi,
-        "law": curve.law.name,
-        "extrapolated": curve.is_extrapolated(loads),
-        "contact_complete": loads >= curve.onset_load,
-    }
-    if formula is not None:
-        printed = np.array([formula(curve.pad, float(load)) for load in loads])
-        columns |= {
-            f"formula_{SECANT}": printed[:, 0],
-            "formula_tangent_N_per_m": printed[:, 1],
-        }
-    return pd.DataFrame(columns)
+    frames = []
+    for curve in curves:
+        columns: dict[str, object] = {"pad": curve.pad, "force_N": grid, "deflection_m": curve.deflection(grid)}
+        for name, value, band in (
+            (TANGENT, curve.stiffness, curve.stiffness_band),
+            (SECANT, curve.secant, curve.secant_band),
+        ):
+            lo, hi = band(grid, level)
+            columns |= {name: value(grid), f"{name}_lo": lo, f"{name}_hi": hi}
+        extrapolated, complete = curve.is_extrapolated(grid), grid >= curve.onset_load
+        columns |= {"law": curve.law.name, "extrapolated": extrapolated, "contact_complete": complete}
+        if formula is not None:
+            printed = np.array([formula(curve.pad, float(load)) for load in grid])
+            columns |= {f"formula_{SECANT}": printed[:, 0], "formula_tangent_N_per_m": printed[:, 1]}
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
 
 
 def pads_table(curves: Sequence[PivotCurve]) -> pd.DataFrame:
