@@ -74,6 +74,8 @@ def _check_film(runs: PointRuns, stiffness: ComplexArray) -> None:
             observation.report.ask("scales", float(sizes.max() / sizes.min()), *names, larger=larger, smaller=smaller)
         return
     hint = explanation(repairs(probes), lambda repair: _film_like(stiffness @ np.linalg.inv(repair)), 1 / _MENDED)
+    if not hint and indefiniteness(stiffness.imag) < 1 / _DEFINITE:
+        return  # stiffness may be negative: added mass, cross-coupling
     is_grave = bool(hint) or np.linalg.eigvalsh(stiffness.imag + stiffness.imag.T)[0] < 0
     for observation in runs.observations:
         observation.report.ask("signs", 2.0 if is_grave else 1.0, *names, hint=hint)

@@ -16,8 +16,6 @@ from tpjb_ident.estimate.term import OUT_OF_STEP, Factor, Fitted, Parameter, exc
 _MILLISECOND = 1e-3
 #: Standard errors and phase [rad] from which cells come late, and not the accelerometers early.
 _CLEAR, _NOTABLE = 2.0, 0.02
-#: Share of the housing's motion that neither a delay nor a corner explains: then the phase has another cause.
-_UNEXPLAINED = 0.1
 
 
 class Delay(Factor):
@@ -48,9 +46,8 @@ class Delay(Factor):
         """Devices that are later than stated; cells that come late where accelerometers showed them out of step."""
         if self.rig.out_of_step:
             late = np.abs(fitted.value) > np.maximum(_CLEAR * fitted.deviation, _NOTABLE / _MILLISECOND / self._omega)
-            stays = late.any() or fitted.unexplained > _UNEXPLAINED
             contradictions = [condition for conditions in self.rig.contradicted.values() for condition in conditions]
-            return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and stays)
+            return tuple(condition for condition in contradictions if condition == OUT_OF_STEP and late.any())
         names = [self.parameters[k].name for k in exceeding(fitted, self.parameters)]
         if not names:
             return ()
