@@ -281,7 +281,7 @@ def test_laws_far_outside_their_range_stay_laws():
         assert (value > 0.0).all()
         assert (np.diff(value) <= 1e-12).all()
     assert LAWS["hertz-line"].psi(np.array([1e9]), np.array([0.45]))[0] == pytest.approx(0.02)
-    bend = LAWS["bilinear"].psi(np.array([1e-9, 1e6]), np.array([1.0, 0.0]))[0]
+    bend = LAWS["bilinear"].psi(np.array([1e-9, 1e6]), np.array([1.0, 0.0, math.log(0.1)]))[0]
     np.testing.assert_allclose(bend, [1 + (math.e - 1) / (1 + math.exp(-10.0)), 1.0], rtol=1e-9)
 
 

@@ -85,7 +85,7 @@ def test_line_contact_is_the_printed_rocker_formula():
         ("point-in-series", (1.0,), "linear"),
         ("point-in-series", (0.0,), "hertz-point"),
         ("power", (2 / 3,), "hertz-point"),
-        ("bilinear", (0.0, 0.3), "linear"),
+        ("bilinear", (0.0, 0.3, -2.5), "linear"),
     ],
 )
 def test_laws_turn_into_one_another(name, values, other):
@@ -96,7 +96,7 @@ def test_laws_turn_into_one_another(name, values, other):
 
 
 def test_a_bilinear_law_has_its_two_compliances_far_from_the_bend():
-    u, q = np.array([1e-3, 0.2, 3.0, 50.0]), np.array([np.log(3.0), 0.0])
+    u, q = np.array([1e-3, 0.2, 3.0, 50.0]), np.array([np.log(3.0), 0.0, np.log(0.1)])
     np.testing.assert_allclose(LAWS["bilinear"].psi(u, q)[0], [3, 3, 1, 1], rtol=2e-3)
     # after the bend the deflection is behind by what the soft part has given: (r - 1) b
     np.testing.assert_allclose(LAWS["bilinear"].phi(u, q)[0][2:] - u[2:], 2.0, rtol=1e-4)
@@ -112,3 +112,14 @@ def test_every_prior_lies_inside_its_bounds_and_is_proper():
         # a prior wider than its bounds would say nothing; one much narrower would decide for the data
         assert (spread < high - low).all()
         assert (spread > 0.05 * (high - low)).all() or law.name == "spline"
+
+
+@pytest.mark.parametrize("width", [0.02, 0.1, 0.3])
+def test_a_bilinear_law_s_slopes_are_those_of_its_shape(width):
+    """A seat or a shim that closes bends sharply, a soft one does not: the width is a number of the law."""
+    u, q = np.geomspace(0.05, 4.0, 60), np.array([np.log(0.3), 0.2, np.log(width)])
+    for shape in (LAWS["bilinear"].phi, LAWS["bilinear"].psi):
+        slopes = [(shape(u, q + step)[0] - shape(u, q - step)[0]) / 2e-6 for step in 1e-6 * np.eye(3)]
+        np.testing.assert_allclose(shape(u, q)[1], np.transpose(slopes), atol=2e-7)
+    steps = [LAWS["bilinear"].phi(u + step, q)[0] for step in (-1e-6, 1e-6)]
+    np.testing.assert_allclose((steps[1] - steps[0]) / 2e-6, LAWS["bilinear"].psi(u, q)[0], atol=1e-6)

@@ -13,7 +13,7 @@ hertz-point      u^(-1/3)                            point contact (sphere)
 power            u^(p-1)                             contact of any conformity
 linear           1                                   housing, shim, flexure
 point-in-series  (1-lam) u^(-1/3) + lam              sphere on a compliant housing
-bilinear         1 + (r-1)/{1 + exp[(u-b)/(b/10)]}   two contacts one after the other; a play before the
+bilinear         1 + (r-1)/{1 + exp[(u-b)/(w b)]}    two contacts one after the other; a play before the
                                                      first is the contact loss that every law may carry
 spline           exp(piecewise linear in ln u)       no physics: only monotone and smooth
 ===============  ==================================  ==================================================
@@ -115,30 +115,28 @@ def _line_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
     return 1.0 - q[0] * log, -log[:, None]
 
 
-_BEND_WIDTH = 0.1  # of the bend between two compliances, as a share of its load b
-
-
 def _bilinear_phi(u: FloatArray, q: FloatArray) -> WithDerivative:
-    """Two compliances with a bend between them at u = b; r is the first over the second."""
-    r, b = np.exp(q)
-    soft, slope_u, _ = _bend(u, b)
+    """Two compliances, r the first over the second, with a bend between them at u = b, w of b wide."""
+    r, b, w = np.exp(q)
+    soft, step, _, z = _bend(u, b, w)
     # the bent part is b g(u / b) with g homogeneous: d/d(log b) = g b - u g'
-    return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * slope_u)])
+    wider = soft - b / (1.0 + np.exp(-1.0 / w)) - w * b * z * step
+    return u + (r - 1.0) * soft, np.column_stack([r * soft, (r - 1.0) * (soft - u * step), (r - 1.0) * wider])
 
 
 def _bilinear_psi(u: FloatArray, q: FloatArray) -> WithDerivative:
-    r, b = np.exp(q)
-    _, step, curve = _bend(u, b)
-    return 1.0 + (r - 1.0) * step, np.column_stack([r * step, -(r - 1.0) * u * curve])
+    r, b, w = np.exp(q)
+    _, step, curve, z = _bend(u, b, w)
+    columns = [r * step, -(r - 1.0) * u * curve, (r - 1.0) * z * step * (1.0 - step)]
+    return 1.0 + (r - 1.0) * step, np.column_stack(columns)
 
 
-def _bend(u: FloatArray, b: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Integral of the smooth step from 0 to u, the step, and its derivative."""
-    w = _BEND_WIDTH * b
-    z = np.clip((u - b) / w, -500.0, 500.0)
+def _bend(u: FloatArray, b: float, w: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Integral of the smooth step from 0 to u, the step, its derivative, and the distance from it in its widths."""
+    z = np.clip((u - b) / (w * b), -500.0, 500.0)
     step = 1.0 / (1.0 + np.exp(z))
-    integral = w * (np.logaddexp(0.0, b / w) - np.logaddexp(0.0, -z))
-    return integral, step, -step * (1.0 - step) / w
+    integral = w * b * (np.logaddexp(0.0, 1.0 / w) - np.logaddexp(0.0, -z))
+    return integral, step, -step * (1.0 - step) / (w * b), z
 
 
 NODES = np.log(np.array([0.08, 0.16, 0.3, 0.55, 1.0, 1.6, 2.4, 4.0]))  # ln(W / W_r); the one at 0 is the scale
@@ -225,7 +223,12 @@ _ALL = (
         functools.partial(_in_series, _power_psi),
         {"lam": (0.5, 0.25, 0.0, 1.0)},
     ),
-    _law("bilinear", _bilinear_phi, _bilinear_psi, {"log r": (0.0, 0.5, -2.0, 2.0), "log b": (0.0, 0.5, -1.6, 1.0)}),
+    _law(
+        "bilinear",
+        _bilinear_phi,
+        _bilinear_psi,
+        {"log r": (0.0, 0.5, -2.0, 2.0), "log b": (0.0, 0.5, -1.6, 1.0), "log w": (-2.5, 0.8, -4.6, -0.7)},
+    ),
     # monotone and smooth: its bends are held down by the prior (a random walk of the slope), which is what a smoothing
     # spline is (Wahba, 1990), and which also widens the band outside the points
     Law(
