@@ -1,9 +1,11 @@
-"""Small manifests as text, a table a mapping."""
+"""Small manifests as text, a table a mapping; campaigns of them in a folder or in one HDF5 file."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 Table = Mapping[str, object]
 
@@ -32,4 +34,31 @@ def _lines(keys: Table) -> list[str]:
 
 
 def _value(value: object) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):  # inline tables
+        return f"[{', '.join('{' + ', '.join(_lines(table)) + '}' for table in value)}]"
     return json.dumps(value, ensure_ascii=False)
+
+
+def write_files(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Path:
+    """Write a campaign of this manifest and these files into a folder; the folder."""
+    for name, content in {"campaign.toml": text, "b.toml": 'name = "b"\n', **(files or {})}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+    return folder
+
+
+def write_hdf5(
+    path: Path, text: str, columns: Mapping[str, Any], rate: object = None, run: str = "c-1", **storage: Any
+) -> Path:
+    """Write a campaign of one run into an HDF5 file, its columns stored as `storage` says; the path."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.attrs["manifest"], file.attrs["bearing"] = text, 'name = "b"\n'
+        group = file.create_group(f"runs/{run}")
+        if rate is not None:
+            group.attrs["sample_rate_hz"] = rate
+        for name, values in columns.items():
+            group.create_dataset(name, data=values, **storage)
+    return path

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.io import savemat
 
@@ -17,8 +16,8 @@ from rigdata.readers import series
 from rigdata.readers.base import FORMATS
 from rigdata.readers.file_reader import FileReader, ReadingCache, read_series
 from rigdata.readers.series import Contents, Series, equidistant, is_time, seconds, with_unique_names
-from tests.foreign_files import write_mdf, write_tdms, write_uff
-from tests.manifests import PROBE, SET_POINT, manifest
+from tests.foreign_files import write_columns, write_data_set, write_groups, write_mat73
+from tests.manifests import PROBE, SET_POINT, manifest, write_files
 from tpjb_ident.check.campaign import check_campaign
 
 RATE, COUNT = 1000.0, 2000
@@ -27,85 +26,50 @@ X = np.sin(2 * math.pi * 25 * TIME) - 0.3
 F = 2.0 * np.cos(2 * math.pi * 25 * TIME)
 SLOW = TIME[::100]
 T = 40.0 + SLOW
-
 CHANNELS = {
     "X1A": PROBE | {"axis": "45 deg", "unit": "V", "sensitivity": "7.78 mV/um", "polarity": -1},
     "L1H": {"quantity": "force", "axis": "0 deg", "unit": "kN"},
     "T1": {"quantity": "temperature", "unit": "degC"},
 }
-
-
-def write_loggers_tdms(path: Path) -> None:
-    fast, slow = ({"wf_increment": step, "wf_start_offset": 0.0} for step in (1 / RATE, 100 / RATE))
-    channels = [("fast", "X1A", X, {**fast, "unit_string": "V"}), ("fast", "L1H", F, {**fast, "unit_string": "kN"})]
-    write_tdms(path, [*channels, ("slow", "T1", T, slow), ("slow", "remark", ["a text"], {})])
-
-
-def write_loggers_uff(path: Path) -> None:
-    write_uff(path, {"X1A": (1 / RATE, X), "L1H": (1 / RATE, F), "T1": (100 / RATE, T)})
-
-
-def write_loggers_mdf(path: Path) -> None:
-    write_mdf(path, [(TIME, {"X1A": ("V", X), "L1H": ("kN", F)}), (SLOW, {"T1": ("degC", T)})])
-
-
+GROUPS = (TIME, {"X1A": ("V", X), "L1H": ("kN", F)}), (SLOW, {"T1": ("degC", T)})
 ALL = {"t": TIME, "X1A": X, "L1H": F, "T1": np.interp(TIME, SLOW, T)}
 
 
-def write_mat5(path: Path) -> None:
-    savemat(path, {**ALL, "note": "text"}, oned_as="column")
-
-
-def write_mat73(path: Path) -> None:
-    # the library behind MATLAB's save -v7.3 is HDF5; MATLAB puts 512 bytes of its own text in front
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in ALL.items():
-            file.create_dataset(name, data=values[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
-        text = file.create_dataset("note", data=np.frombuffer(b"t\0e\0", dtype="uint16"))
-        text.attrs["MATLAB_class"] = np.bytes_("char")
-    with path.open("r+b") as stream:
-        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\x02IM")
-
-
-def write_parquet(path: Path) -> None:
-    pd.DataFrame({**ALL, "who": "me"}).to_parquet(path, index=False)
+def write_tdms(path: Path) -> None:
+    write_groups(path, GROUPS[0], (SLOW, GROUPS[1][1] | {"remark": ("", ["a text"])}))
 
 
 def write_catman(path: Path) -> None:
-    """Write a table as catman exports it: two clocks, tabs, decimal comma, the slow part padded with blanks."""
-    lines = ["CATMAN", "Kanäle: 5", "", "Zeit  1 - Standardrate [s]\tX1A [V]\tL1H [kN]\tZeit  2 - langsam [s]\tT1 [°C]"]
-    for i in range(COUNT):
-        cells = [f"{TIME[i]:.4f}", f"{X[i]:.6f}", f"{F[i]:.6f}"]
-        cells += [f"{SLOW[i]:.2f}", f"{T[i]:.4f}"] if i < len(SLOW) else ["", ""]
-        lines.append("\t".join(cells).replace(".", ","))
-    path.write_bytes(("\r\n".join(lines) + "\r\n").encode("cp1252"))
+    """Two clocks, the slow part padded with blanks, below a title."""
+    columns = {"Zeit  1 - Standardrate [s]": TIME, "X1A [V]": X, "L1H [kN]": F}
+    write_columns(path, columns | {"Zeit  2 - langsam [s]": SLOW, "T1 [°C]": T})
+    path.write_bytes("CATMAN\r\nKanäle: 5\r\n\r\n".encode("cp1252") + path.read_bytes())
 
 
 WRITERS = {
-    "one.tdms": write_loggers_tdms,
-    "one.unv": write_loggers_uff,
-    "one.mf4": write_loggers_mdf,
-    "one.mat": write_mat5,
-    "new.mat": write_mat73,
-    "one.parquet": write_parquet,
+    "one.tdms": write_tdms,
+    "one.unv": lambda path: write_groups(path, *GROUPS),
+    "one.mf4": lambda path: write_groups(path, *GROUPS),
+    "one.mat": lambda path: write_columns(path, ALL | {"note": "text"}),
+    "new.mat": lambda path: write_mat73(path, ALL | {"note": "te"}),
+    "one.parquet": lambda path: write_columns(path, ALL | {"who": ["me"] * COUNT}),
     "one.asc": write_catman,
 }
-
-
 #: Formats that hold one table, with a thermometer at every sample.
 ONE_RATE = ("one.mat", "new.mat", "one.parquet")
 #: MDF takes a second for each file, since its library is loaded in a process of its own.
 SLOWLY_READ = {"one.mf4": pytest.mark.slow}
 
 
+def read(path: Path) -> list[Series]:
+    return read_series(path, path.name)
+
+
 @pytest.fixture(params=[pytest.param(name, marks=SLOWLY_READ.get(name, ())) for name in WRITERS])
 def campaign(request, tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")  # what other people's writers warn of is not ours to judge
-        WRITERS[request.param](tmp_path / request.param)
+    WRITERS[request.param](tmp_path / request.param)
     one = {"id": "one", "file": request.param, "kind": "dynamic", "excitation_frequency": "25 Hz", **SET_POINT}
-    (tmp_path / "campaign.toml").write_text(manifest(CHANNELS, one), encoding="utf-8")
-    return tmp_path
+    return write_files(tmp_path, manifest(CHANNELS, one))
 
 
 def test_every_format_comes_through_the_same_record(campaign):
@@ -121,13 +85,9 @@ def test_every_format_comes_through_the_same_record(campaign):
     np.testing.assert_allclose(warm.values, 313.15 + np.minimum(warm.time, SLOW[-1]), atol=1e-3)
     np.testing.assert_array_equal(run.record("X1A", 10, 20).values, record.values[10:20])
     assert not [p for p in check_campaign(campaign) if "cannot be read" in p.what]
-
-
-def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
-    text = (campaign / "campaign.toml").read_text(encoding="utf-8").replace("channels.X1A", "channels.X1a")
-    (campaign / "campaign.toml").write_text(text, encoding="utf-8")
+    text = (campaign / "campaign.toml").read_text(encoding="utf-8")
     with pytest.raises(RigDataError, match="Did you mean 'X1A'"):
-        load_campaign(campaign).run("one").record("X1a")
+        load_campaign(write_files(campaign, text.replace("channels.X1A", "channels.X1a"))).run("one").record("X1a")
 
 
 @pytest.mark.slow
@@ -144,46 +104,53 @@ def test_a_misspelt_channel_is_answered_with_the_nearest(campaign):
 def test_a_broken_file_is_refused_by_name(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(RigDataError) as caught:
-        read_series(tmp_path / name, name)
+        read(tmp_path / name)
     assert name in str(caught.value)
 
 
 def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
-    import sys
-
     (tmp_path / "a.tdms").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "nptdms", None)
     monkeypatch.delitem(sys.modules, "rigdata.readers.formats.loggers", raising=False)
     with pytest.raises(RigDataError, match=r'pip install "tpjb-ident\[tdms\]"'):
-        read_series(tmp_path / "a.tdms", "a.tdms")
+        read(tmp_path / "a.tdms")
 
 
-def test_links_out_of_a_matlab_file_are_refused(tmp_path):
-    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+def linked(path: Path) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
         file["x"] = h5py.ExternalLink("/etc/passwd", "/x")
-    with pytest.raises(RigDataError, match="is a link"):
-        read_series(tmp_path / "a.mat", "a.mat")
 
 
-@pytest.mark.parametrize("suffix", sorted(FORMATS))
-def test_an_empty_file_is_called_empty(tmp_path, suffix):
-    (tmp_path / f"a{suffix}").write_bytes(b"")
-    with pytest.raises(RigDataError, match="is empty"):
-        read_series(tmp_path / f"a{suffix}", f"a{suffix}")
+FREQUENCY = np.arange(16.0)
+NO_RECORDS = {
+    "link.mat": (linked, "is a link"),
+    "a.mat": (
+        lambda path: savemat(path, {"gain": 2.0, "note": "bearing 3"}),
+        "no vector of at least 8 numbers, only gain, note",
+    ),
+    "a.uff": (
+        lambda path: write_data_set(path, FREQUENCY, FREQUENCY * (1 + 1j), func_type=4, id1="H"),
+        "no record over time, only 1 x function type 4",
+    ),
+    "a.tmds": (lambda path: path.write_text("x"), "did you mean .tdms"),
+    "a.tdm": (lambda path: path.write_text("x"), "did you mean .tdms"),
+    "a.xlsx": (lambda path: path.write_text("x"), "export it as .csv"),
+    **{f"empty{suffix}": (lambda path: path.write_bytes(b""), "is empty") for suffix in sorted(FORMATS)},
+}
 
 
-def test_a_matlab_file_without_vectors_says_what_it_holds(tmp_path):
-    savemat(tmp_path / "a.mat", {"gain": 2.0, "note": "bearing 3"})
-    with pytest.raises(RigDataError, match="no vector of at least 8 numbers, only gain, note"):
-        read_series(tmp_path / "a.mat", "a.mat")
+@pytest.mark.parametrize("name", NO_RECORDS)
+def test_what_holds_no_record_says_why(tmp_path, name):
+    write, says = NO_RECORDS[name]
+    write(tmp_path / name)
+    with pytest.raises(RigDataError, match=says):
+        read(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", ["one.tdms", "one.parquet", "one.unv"])
 def test_long_channels_wait_in_files_and_read_as_short_ones_do(tmp_path, monkeypatch, name):
     path = tmp_path / name
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        WRITERS[name](path)
+    WRITERS[name](path)
     short = FileReader(path, path.name, "r", {})
     monkeypatch.setattr(series, "IN_MEMORY", 1000)
     equidistant.cache_clear()
@@ -203,13 +170,20 @@ def test_a_campaign_keeps_few_columns_however_many_runs_it_has(tmp_path):
     assert cache.nbytes <= 3 * 8 * COUNT
 
 
-def arranged(series):
-    return FileReader(Path("f"), "f", "r")._arranged(Contents(series))
+def test_a_cache_lets_go_of_old_runs():
+    cache = ReadingCache(limit=2000)
+    made = []
+    for i in [0, 1, 2, 3, 4, 4, 3, 0]:
+        cache.get((i,), lambda i=i: made.append(i) or np.zeros(100))
+    assert made == [0, 1, 2, 3, 4, 0]
+
+
+def arranged(*channels: Series):
+    return FileReader(Path("f"), "f", "r")._arranged(Contents(channels))
 
 
 def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
-    same = [Series("b", "", np.zeros(5)), Series("c", "", np.zeros(5))]
-    layout = arranged([Series("a", "", np.zeros(4)), *same])
+    layout = arranged(*(Series(name, "", np.zeros(4 if name == "a" else 5)) for name in "abc"))
     assert layout.grids[0].channels == ["b", "c"]
     assert "has 4 samples and no times, the others have 5" in str(layout.faults["a"])
 
@@ -217,7 +191,7 @@ def test_a_channel_of_another_length_without_times_is_a_fault_of_that_channel():
 def test_slow_channels_stay_at_their_own_times():
     fast = Series("a", "V", np.arange(11.0), 0.1 * np.arange(11))
     slow = Series("b", "K", np.array([0.0, 1.0]), np.array([0.2, 0.8]))
-    layout = arranged([slow, fast])
+    layout = arranged(slow, fast)
     first, second = layout.grids
     assert (first.length, first.rate, second.length) == (11, 10.0, 2)
     np.testing.assert_array_equal(layout.times[second.clock], slow.time)
@@ -226,13 +200,13 @@ def test_slow_channels_stay_at_their_own_times():
 
 @pytest.mark.parametrize(("groups", "names"), [(("g1", "g2"), ["g1.a", "g2.a"]), (("", ""), ["a", "a_2"])])
 def test_channels_of_one_name_get_their_groups_name_or_a_number(groups, names):
-    series = with_unique_names([Series("a", "", np.zeros(3), group=group) for group in groups])
-    assert [channel.name for channel in series] == names
+    alike = with_unique_names([Series("a", "", np.zeros(3), group=group) for group in groups])
+    assert [channel.name for channel in alike] == names
 
 
 def test_a_text_of_any_suffix_is_a_table(tmp_path):
     (tmp_path / "a.xyz").write_text("t;x\n0;1\n1;2\n2;3\n", encoding="utf-8")
-    (column,) = read_series(tmp_path / "a.xyz", "a.xyz")
+    (column,) = read(tmp_path / "a.xyz")
     assert (column.name, column.values.tolist(), column.rate) == ("x", [1.0, 2.0, 3.0], 1.0)
 
 
@@ -241,6 +215,32 @@ def test_a_rate_is_asked_for_where_the_file_knows_none(tmp_path):
     with pytest.raises(RigDataError, match="sample_rate"):
         FileReader(tmp_path / "a.mat", "a.mat", "r", {}).rate()
     assert FileReader(tmp_path / "a.mat", "a.mat", "r", {}, stated_rate=500.0).time(0, 3)[2] == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("rows", [False, True])
+def test_a_matrix_is_named_by_the_texts_beside_it(tmp_path, rows):
+    data = np.stack([TIME, X, -X], axis=1)
+    names, units = np.array(["Time", "X1A", "L1H"], dtype=object), np.array(["ms", "V", "mV"], dtype=object)
+    savemat(tmp_path / "a.mat", {"Data": data.T if rows else data, "ChannelNames": names, "ChannelUnits": units})
+    x, force = read(tmp_path / "a.mat")
+    assert [(s.name, s.unit) for s in (x, force)] == [("X1A", "V"), ("L1H", "mV")]
+    np.testing.assert_allclose(x.values, X)
+    assert x.rate == pytest.approx(1e3 * RATE)
+
+
+def test_a_matrix_in_a_file_of_version_seven_three_is_named_likewise(tmp_path):
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["Data"] = np.stack([TIME, X, -X])  # MATLAB's columns are rows here
+        cells = []
+        for i, name in enumerate(["Time", "X1A", "L1H"]):
+            text = file.create_dataset(f"#refs#/{i}", data=np.array([[ord(c)] for c in name], dtype=np.uint16))
+            text.attrs["MATLAB_class"] = np.bytes_("char")
+            cells.append(text.ref)
+        file.create_dataset("ChannelNames", data=np.array([cells], dtype=object).T, dtype=h5py.ref_dtype)
+    x, force = read(tmp_path / "a.mat")
+    assert (x.name, force.name) == ("X1A", "L1H")
+    np.testing.assert_allclose(x.values, X)
+    assert x.rate == pytest.approx(RATE)
 
 
 TIMES = ("Zeit", "TIME [s]", "Time  1 - default sample rate", "t", "t [ms]", "Temps")
@@ -252,12 +252,10 @@ def test_times_by_name(name):
     assert is_time(name) == (name in TIMES)
 
 
-def test_times_in_other_units():
-    for name, unit in (("Zeit", "[ms]"), ("time_ms", ""), ("time (ms)", ""), ("t [ms]", "")):
-        np.testing.assert_allclose(seconds(Series(name, unit, np.array([1.0, 2.0]))), [1e-3, 2e-3])
-    np.testing.assert_allclose(seconds(Series("t", "", np.array([1.0, 2.0]))), [1.0, 2.0])
-
-
-def test_a_signalling_nan_among_times_is_a_missing_time():
+@pytest.mark.parametrize(
+    ("name", "unit", "factor"),
+    [("Zeit", "[ms]", 1e-3), ("time_ms", "", 1e-3), ("time (ms)", "", 1e-3), ("t [ms]", "", 1e-3), ("t", "", 1.0)],
+)
+def test_times_in_other_units_and_a_signalling_nan_is_a_missing_time(name, unit, factor):
     times = np.array([0, 0x7FF0000000000001, 0x4000000000000000], dtype="u8").view("f8")
-    np.testing.assert_array_equal(seconds(Series("t", "ms", times)), [0.0, np.nan, 0.002])
+    np.testing.assert_allclose(seconds(Series(name, unit, times)), [0.0, np.nan, 2.0 * factor])
