@@ -8,7 +8,7 @@ import pytest
 
 from rigdata import RigDataError, load_campaign
 from rigdata.manifest.manifest import Manifest, parse_manifest
-from tests.manifests import PROBES, SET_POINT, manifest
+from tests.manifests import PROBES, SET_POINT, manifest, write_files, write_hdf5
 
 PROBE = {"quantity": "displacement", "axis": "45 deg", "unit": "V", "sensitivity": "7.78 mV/um", "uncertainty": "1 %"}
 CHANNELS = {"X1A": PROBE, "X1B": PROBE | {"axis": "135 deg"}, "T1": {"quantity": "temperature", "unit": "degC"}}
@@ -37,10 +37,9 @@ def test_shaft_housing_planes_and_temperatures(tmp_path):
     }
     runs = [RUNS[0], RUNS[1] | {"rotation": "counter-clockwise", "temperature": "46 degC"}]
     tables = {"shaft": {"rotation": "clockwise"}, "housing": {"mass": "30 kg", "mount": "floating"}}
-    (tmp_path / "campaign.toml").write_text(manifest(CHANNELS | {"X1A": probe}, *runs, **tables))
     rows = "X1A,X1B,T1\n" + "0.5,0.5,40\n" * 5 + "0.5,0.5,\n" + "0.5,0.5,41\n" * 5
-    (tmp_path / "x.csv").write_text(rows)
-    campaign = load_campaign(tmp_path)
+    text = manifest(CHANNELS | {"X1A": probe}, *runs, **tables)
+    campaign = load_campaign(write_files(tmp_path, text, {"x.csv": rows}))
     assert (campaign.rotation, campaign.mount) == ("clockwise", "floating")
     assert [run.rotation for run in campaign.runs] == ["clockwise", "counter-clockwise"]
     first, second = campaign.runs
@@ -54,8 +53,7 @@ def test_shaft_housing_planes_and_temperatures(tmp_path):
     assert channel.temperature_coefficient == pytest.approx(-2e-4)
     assert channel.temperature_coefficient_uncertainty == pytest.approx(1e-4)
     text = manifest(CHANNELS, *runs, acquisition={"sample_rate": "1 kHz"}, **tables)
-    (tmp_path / "campaign.toml").write_text(text)
-    assert load_campaign(tmp_path).run("d-1").mean_temperature() == pytest.approx(313.65)
+    assert load_campaign(write_files(tmp_path, text)).run("d-1").mean_temperature() == pytest.approx(313.65)
 
 
 def test_defaults():
@@ -67,35 +65,29 @@ def test_defaults():
 
 
 @pytest.mark.parametrize(
-    ("tables", "says"),
+    ("table", "keys", "says"),
     [
-        ({"shaft": {"rotation": "clockwize"}}, "Did you mean 'clockwise'?"),
-        ({"shaft": {"rotations": "clockwise"}}, "Did you mean 'rotation'?"),
-        ({"housing": {"mass": "1 kg", "mount": "floats"}}, "Did you mean 'floating'?"),
+        ("shaft", {"rotation": "clockwize"}, "Did you mean 'clockwise'?"),
+        ("shaft", {"rotations": "clockwise"}, "Did you mean 'rotation'?"),
+        ("housing", {"mass": "1 kg", "mount": "floats"}, "Did you mean 'floating'?"),
+        ("X1A", {"plane": "12 N"}, "not one of length"),
+        ("X1A", {"plane": 12}, "no unit"),
+        ("X1A", {"plan": "12 mm"}, "Did you mean 'plane'?"),
+        ("X1A", {"temperature_coefficient": "0.02 %"}, "not one of per kelvin"),
+        ("X1A", {"temperature_coeficient": "0.02 %/K"}, "Did you mean 'temperature_coefficient'?"),
+        ("X1A", {"temperature_coefficient_uncertainty": "-0.01 %/K"}, "not below 0"),
+        ("X1A", {"temperature_reference": "-300 degC"}, "not below 0"),
+        ("X1A", {"sample_rate": "0 Hz"}, "above 0"),
+        ("X1A", {"sample_rat": "1 Hz"}, "Did you mean 'sample_rate'?"),
+        ("X1A", {"for": "p-*"}, "not a list of tables"),
+        ("X1A", {"for": [3]}, "not a table"),
     ],
 )
-def test_wrong_tables_name_the_nearest(tables, says):
-    refused(says, **tables)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "says"),
-    [
-        ("plane", "12 N", "not one of length"),
-        ("plane", 12, "no unit"),
-        ("plan", "12 mm", "Did you mean 'plane'?"),
-        ("temperature_coefficient", "0.02 %", "not one of per kelvin"),
-        ("temperature_coeficient", "0.02 %/K", "Did you mean 'temperature_coefficient'?"),
-        ("temperature_coefficient_uncertainty", "-0.01 %/K", "not below 0"),
-        ("temperature_reference", "-300 degC", "not below 0"),
-        ("sample_rate", "0 Hz", "above 0"),
-        ("sample_rat", "1 Hz", "Did you mean 'sample_rate'?"),
-        ("for", "p-*", "not a list of tables"),
-        ("for", [3], "not a table"),
-    ],
-)
-def test_wrong_entries_of_a_channel(key, value, says):
-    refused("[channels.X1A]" if says != "not a table" else "", says, channels=CHANNELS | {"X1A": PROBE | {key: value}})
+def test_wrong_entries_are_named_with_their_table_and_the_nearest(table, keys, says):
+    if table != "X1A":
+        refused(f"[{table}]", says, **{table: keys})
+    else:
+        refused("channels.X1A", says, channels=CHANNELS | {"X1A": PROBE | keys})
 
 
 def test_two_planes_are_taken_and_three_are_not():
@@ -133,7 +125,7 @@ def test_the_last_entry_counts_key_by_key():
     assert read.channels["X1A"].axis == pytest.approx(np.radians(45))
 
 
-def test_another_sensitivity_or_uncertainty_is_another_calibration():
+def test_another_sensitivity_or_uncertainty_and_another_channel_are_another_calibration():
     read = parsed(
         f'{FOR}runs = ["p-1"]\nsensitivity = "7.87 mV/um"\n'
         f'{FOR}runs = ["p-2"]\nuncertainty = "2 %"\n'
@@ -143,6 +135,8 @@ def test_another_sensitivity_or_uncertainty_is_another_calibration():
     assert own == read.described["c-1"]["X1A"].calibration
     others = {read.described[run]["X1A"].calibration for run in ("p-1", "p-2")}
     assert len(others | {own, read.channels["X1B"].calibration}) == 4
+    in_micrometres = parsed(channels=PROBES).channels
+    assert in_micrometres["X1A"].calibration != in_micrometres["X1B"].calibration
 
 
 @pytest.mark.parametrize(
@@ -178,44 +172,32 @@ def test_patterns_without_end_are_refused():
     refused("more than 1000 patterns", extra=f'{FOR}runs = ["*-1"]\n' * 2000)
 
 
-def test_a_run_reads_as_it_is_described(tmp_path):
-    (tmp_path / "runs").mkdir()
-    for name in ("d-1", "p-1"):
-        (tmp_path / f"runs/{name}.csv").write_text("X1A,X1B\n" + "1.0,2.0\n" * 5)
-    runs = [run | {"file": f"runs/{run['id']}.csv"} for run in RUNS[:2]]
-    channels = {name: channel for name, channel in CHANNELS.items() if name != "T1"}
-    text = manifest(channels, *runs, acquisition={"sample_rate": "1 kHz"})
+@pytest.mark.parametrize("stored", [False, True])
+def test_a_run_reads_as_it_is_described(tmp_path, stored):
+    channels = {name: CHANNELS[name] for name in PROBES}
+    text = manifest(channels, *RUNS[:2], acquisition={"sample_rate": "1 kHz"})
     text += f'{FOR}runs = ["p-*"]\nsensitivity = "1 mV/um"\naxis = "90 deg"\n'
     text += '[[channels.X1B.for]]\nruns = ["p-1"]\nquantity = "ignore"\n'
-    (tmp_path / "campaign.toml").write_text(text)
-    campaign = load_campaign(tmp_path)
-    with h5py.File(tmp_path / "c.h5", "w") as file:
-        file.attrs["manifest"], file.attrs["bearing"] = text, "x"
-        for run in ("d-1", "p-1"):
-            file[f"runs/{run}/X1A"], file[f"runs/{run}/X1B"] = np.ones(5), np.full(5, 2.0)
-    for read in (campaign, load_campaign(tmp_path / "c.h5")):
-        plain, other = read.runs
-        assert plain.record("X1A").values[0] == pytest.approx(1.0 / 7780.0)
-        assert other.record("X1A").values[0] == pytest.approx(1e-3)
-        assert other.record("X1A").axis == pytest.approx(np.pi / 2)
-        assert (list(plain.channels), list(other.channels)) == (["X1A", "X1B"], ["X1A"])
-        assert [device.channels for device in other.devices] == [("X1A",)]
-        assert (
-            other.channels["X1A"].calibration != read.channels["X1A"].calibration == plain.channels["X1A"].calibration
-        )
+    path = write_files(tmp_path, text, {"x.csv": "X1A,X1B\n" + "1.0,2.0\n" * 5})
+    if stored:
+        path = write_hdf5(tmp_path / "c.h5", text, {"X1A": np.ones(5), "X1B": np.full(5, 2.0)}, run="d-1")
+        with h5py.File(path, "r+") as file:
+            file["runs/p-1"] = file["runs/d-1"]
+    read = load_campaign(path)
+    plain, other = read.runs
+    assert plain.record("X1A").values[0] == pytest.approx(1.0 / 7780.0)
+    assert other.record("X1A").values[0] == pytest.approx(1e-3)
+    assert other.record("X1A").axis == pytest.approx(np.pi / 2)
+    assert (list(plain.channels), list(other.channels)) == (["X1A", "X1B"], ["X1A"])
+    assert [device.channels for device in other.devices] == [("X1A",)]
+    own = read.channels["X1A"].calibration
+    assert other.channels["X1A"].calibration != own == plain.channels["X1A"].calibration
 
 
 def test_a_channel_that_is_like_another_has_its_own_runs_and_plane():
     model = PROBE | {"plane": "12 mm", "for": [{"runs": ["p-1"], "axis": "1 deg"}]}
-    text = manifest({"X1B": {"like": "X1A", "quantity": "displacement", "axis": "135 deg"}}, *RUNS)
-    inline = 'for = [{runs = ["p-1"], axis = "1 deg"}]'
-    lines = [f'{key} = "{value}"' for key, value in model.items() if key != "for"]
-    read = parse_manifest(text + "\n".join(["[channels.X1A]", *lines, inline]) + "\n")
+    copy = {"like": "X1A", "quantity": "displacement", "axis": "135 deg"}
+    read = parsed(channels={"X1B": copy, "X1A": model})
     assert (read.channels["X1A"].plane, read.channels["X1B"].plane) == (0.012, 0.0)
     assert read.described["p-1"]["X1A"].axis == pytest.approx(np.radians(1.0))
     assert read.described["p-1"]["X1B"].axis == pytest.approx(np.radians(135.0))
-
-
-def test_engineering_units_have_calibrations_of_their_own_channel():
-    read = parsed(channels=PROBES)
-    assert read.channels["X1A"].calibration != read.channels["X1B"].calibration

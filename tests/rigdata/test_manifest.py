@@ -6,12 +6,10 @@ import math
 import tomllib
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from rigdata.manifest.fields import ACQUISITION, CHANNEL, HOUSING, RUN
 from rigdata.manifest.manifest import MAX_MANIFEST, parse_manifest
-from rigdata.problem import Problem, RigDataError
+from rigdata.problem import RigDataError
 from rigdata.units import SI_UNITS, parse_quantity
 from tests.rigdata.manifest_tables import markdown
 
@@ -143,6 +141,7 @@ def test_the_example_of_the_format():
         ("polarity = -1", "polarity = true", [LINE, "without quotes"]),
         ('uncertainty = "1 %"', 'uncertainty = "-1 %"', [LINE]),
         ('uncertainty = "1 %"', 'uncertainty = "150 %"', [LINE, "below 100 %"]),
+        ('"1 %"', "1" + "0" * 400, ["finite"]),
         ("position = 0.75", "position = 1.75", ["0 to 1"]),
         ("pad = 1\nposition", "pad = 0\nposition", ["whole number from 1"]),
         ('id = "p-1-up"', 'id = "d-05000-25-03"', ["used twice", "run no. 1"]),
@@ -177,11 +176,10 @@ def test_every_problem_at_once():
         .replace('kind = "dynamic"', 'kind = "dynamik"')
         .replace('sample_rate = "500 Hz"', 'sample_rate = "500"')
     )
-    found = "\n".join(problems_of(text))
-    for part in ("'mas'", "mass is missing", "polarity: 3 is unknown", "dynamik", "has no unit"):
-        if part != "mass is missing":  # not needed while no run is known to be dynamic
-            assert part in found
-    assert len(problems_of(text)) >= 4
+    problems = problems_of(text)
+    assert len(problems) >= 4
+    for part in ("'mas'", "polarity: 3 is unknown", "dynamik", "has no unit"):
+        assert part in "\n".join(problems)
 
 
 def test_a_calibration_that_is_not_used_is_said():
@@ -218,62 +216,13 @@ def test_toml_bombs(line):
     assert all(len(p) < 1000 for p in problems_of(text))
 
 
-def test_uncertainty_of_hundreds_of_digits():
-    assert "finite" in problems_of(GOOD.replace('"1 %"', "1" + "0" * 400))[0]
-
-
-def test_huge_manifests_are_refused_unparsed():
+def test_huge_manifests_are_refused_unparsed_and_thousands_of_faults_stay_bounded():
     assert "larger than" in problems_of("#" * (MAX_MANIFEST + 1))[0]
-
-
-def test_thousands_of_faults_stay_bounded():
-    text = GOOD + "".join(f"[channels.C{i}]\n" for i in range(1200))
-    assert 900 < len(problems_of(text)) <= 1000
+    assert 900 < len(problems_of(GOOD + "".join(f"[channels.C{i}]\n" for i in range(1200)))) <= 1000
 
 
 def test_control_and_right_to_left_characters_do_not_reach_the_message():
-    found = "\n".join(problems_of(GOOD.replace('kind = "dynamic"', 'kind = "dyn\\u202eamic\\u0007"')))
-    assert "\u202e" not in found
-    assert "\u0007" not in found
-
-
-LINES = GOOD.splitlines()
-
-
-@given(st.data())
-@settings(max_examples=60, deadline=None)
-def test_mutated_manifests_parse_or_tell_their_problems(data):
-    """Lines dropped, doubled, swapped or with a piece replaced: a manifest or named problems, nothing else."""
-    lines = list(LINES)
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(lines) - 1))
-        kind = data.draw(st.sampled_from(["drop", "double", "swap", "value", "garbage", "piece"]))
-        if kind == "drop" and len(lines) > 1:
-            del lines[at]
-        elif kind == "double":
-            lines.insert(at, lines[at])
-        elif kind == "swap":
-            other = data.draw(st.integers(0, len(lines) - 1))
-            lines[at], lines[other] = lines[other], lines[at]
-        elif kind == "value" and "=" in lines[at]:
-            values = st.sampled_from(["-1", "0", "nan", "inf", "1e308", '""', '"1e308 N"', "[]", "{}", "true", '"0 V"'])
-            lines[at] = lines[at].split("=")[0] + "= " + data.draw(values)
-        elif kind == "garbage":
-            lines[at] = data.draw(st.text(max_size=30))
-        else:
-            cut = data.draw(st.integers(0, len(lines[at])))
-            lines[at] = lines[at][:cut] + data.draw(st.text(max_size=3)) + lines[at][cut + 1 :]
-    problems: tuple[Problem, ...] = ()
-    try:
-        manifest = parse_manifest("\n".join(lines))
-    except RigDataError as error:
-        problems = error.problems
-    else:
-        assert manifest.runs
-        assert all(c.gain > 0 for c in manifest.channels.values())
-        return
-    assert problems
-    assert all(p.what and p.cure and p.file for p in problems)
+    assert not set("\u202e\u0007") & set("".join(problems_of(GOOD.replace("dynamic", "dyn\\u202eamic\\u0007"))))
 
 
 def test_every_key_is_in_the_docs(checkout):
