@@ -13,9 +13,7 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
-    Sensor,
     VirtualRig,
-    VirtualRigError,
     locus_points,
     operating_points,
 )
@@ -115,16 +113,3 @@ def test_truth_holds_the_apparent_coefficients_and_the_gap_voltages():
     np.testing.assert_allclose(point["C"], C)
     np.testing.assert_allclose(point["K_apparent"], K / 1.1)
     assert truth["gap_voltage_V"] == {s.name: s.zero for s in instruments.of("displacement")}
-
-
-def test_instruments_refuse_what_cannot_be():
-    probe = Sensor.probe("A", 0.0)
-    with pytest.raises(VirtualRigError, match="must differ"):
-        Instruments((probe, probe))
-    with pytest.raises(VirtualRigError, match="in pairs"):
-        Instruments((probe,))
-    with pytest.raises(VirtualRigError, match="no channel 'B'"):
-        RIGID.named("B")
-    truth = RigTruth.constant(K, C, pivot_angles=(0.0, 1.5, 3.0, 4.5))
-    with pytest.raises(VirtualRigError, match="pads 1 to 4"):
-        VirtualRig(truth, RigPlan(locus=locus_points(1)), Instruments.like_paper(5))

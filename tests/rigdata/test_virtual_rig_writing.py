@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from rigdata.virtual_rig import (
     Noise,
     RigPlan,
     RigTruth,
+    Sensor,
     VirtualRig,
     VirtualRigError,
     locus_points,
@@ -134,6 +136,17 @@ def test_float32_holds_16_bit_readings_exactly(campaign_of):
 
 
 SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=lambda point: np.zeros(2))
+PROBE = Sensor.probe("A", 0.0)
+
+
+def swept(angles: tuple[float, ...]) -> object:
+    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=angles, clearance=(8e-5,) * 3)
+    return VirtualRig(truth, RigPlan(clearance=(ClearanceSweep(),)), Instruments.like_paper(3)).simulate("c-1")
+
+
+def four_pads_five_thermometers() -> object:
+    truth = RigTruth.constant(np.eye(2) * 1e8, np.eye(2), pivot_angles=(0.0, 1.5, 3.0, 4.5))
+    return VirtualRig(truth, RigPlan(locus=locus_points(1)), Instruments.like_paper(5))
 
 
 @pytest.mark.parametrize(
@@ -159,6 +172,16 @@ SINGULAR = RigTruth.constant(np.ones((2, 2)) * 1e8, np.zeros((2, 2)), position=l
         (lambda: replace(Noise.none(), bits=64), "between 4 and 32 bits"),
         (lambda: Glitches(share=2.0), "between 0 and 1"),
         (lambda: ClearanceSweep(push=0.0), "must be positive"),
+        (lambda: swept((0.0, 1.0, 2.0)), "fall out"),
+        (lambda: swept((-math.pi / 2, math.pi / 2, math.pi / 2)), "fall out"),
+        (
+            lambda: rig(truth=replace(TRUTH, pivot_deflection=lambda pad, load: 1e-6)).simulate("p-1-up"),
+            r"pivot_deflection\(1, load\) must be finite with shape",
+        ),
+        (lambda: Instruments((PROBE, PROBE)), "must differ"),
+        (lambda: Instruments((PROBE,)), "in pairs"),
+        (lambda: Instruments.like_paper().named("B"), "no channel 'B'"),
+        (four_pads_five_thermometers, "pads 1 to 4"),
     ],
 )
 def test_impossible_numbers_are_refused_where_they_are_given(make, message):
