@@ -30,10 +30,15 @@ def bootstrap(tmp_path, monkeypatch):
     return module
 
 
-def pretend_ready(module, extras=("test",)):
-    module.PYTHON.parent.mkdir(parents=True)
-    module.PYTHON.write_text("")
-    module.MARKER.write_text(json.dumps({"key": module._key(), "extras": list(extras)}))
+@pytest.fixture
+def made(bootstrap, monkeypatch):
+    """How often a ready environment was made again."""
+    bootstrap.PYTHON.parent.mkdir(parents=True)
+    bootstrap.PYTHON.write_text("")
+    bootstrap.MARKER.write_text(json.dumps({"key": bootstrap._key(), "extras": ["test"]}))
+    calls = []
+    monkeypatch.setattr(bootstrap, "_make", calls.append)
+    return calls
 
 
 @pytest.mark.parametrize("entry", ENTRIES)
@@ -62,25 +67,16 @@ def test_an_old_python_gets_a_sentence(entry, version):
     assert "Traceback" not in done.stderr
 
 
-def test_a_ready_environment_is_left_alone(bootstrap, monkeypatch):
-    pretend_ready(bootstrap)
-    monkeypatch.setattr(bootstrap, "_make", lambda wanted: pytest.fail("was made again"))
-    assert bootstrap.ensure({"test"}) == bootstrap.PYTHON
-
-
-@pytest.mark.parametrize("change", ["pyproject", "extras", "python", "marker"])
-def test_it_is_made_again_when_something_changed(bootstrap, monkeypatch, change):
-    pretend_ready(bootstrap)
+@pytest.mark.parametrize("change", ["nothing", "pyproject", "extras", "python", "marker"])
+def test_it_is_made_again_when_something_changed_and_left_alone_otherwise(bootstrap, made, change):
     if change == "pyproject":
         (bootstrap.ROOT / "pyproject.toml").write_text("[project]\n")
     elif change == "python":
         bootstrap.PYTHON.unlink()
     elif change == "marker":
         bootstrap.MARKER.write_text("{")
-    made = []
-    monkeypatch.setattr(bootstrap, "_make", made.append)
-    bootstrap.ensure({"test", "lint"} if change == "extras" else {"test"})
-    assert len(made) == 1
+    assert bootstrap.ensure({"test", "lint"} if change == "extras" else {"test"}) == bootstrap.PYTHON
+    assert len(made) == (change != "nothing")
 
 
 @pytest.mark.parametrize(
@@ -96,15 +92,12 @@ def test_it_is_made_again_when_something_changed(bootstrap, monkeypatch, change)
 def test_whatever_the_machine_has_is_used(bootstrap, monkeypatch, works, uv, expected):
     venv, host = str(bootstrap.PYTHON), sys.executable
 
-    def answer(*command):
-        name = {
-            (venv, "-m", "pip", "--version"): "venv pip",
-            (venv, "-m", "ensurepip", "--default-pip"): "ensurepip",
-            (host, "-m", "pip", "--python", venv, "--version"): "host pip",
-        }.get(command, "other")
-        return name == works
-
-    monkeypatch.setattr(bootstrap, "_works", answer)
+    names = {
+        (venv, "-m", "pip", "--version"): "venv pip",
+        (venv, "-m", "ensurepip", "--default-pip"): "ensurepip",
+        (host, "-m", "pip", "--python", venv, "--version"): "host pip",
+    }
+    monkeypatch.setattr(bootstrap, "_works", lambda *command: names.get(command, "other") == works)
     monkeypatch.setattr(bootstrap.shutil, "which", lambda name: uv if name == "uv" else None)
     if expected is None:
         with pytest.raises(bootstrap.SetupError, match="apt install python3-venv"):
@@ -116,10 +109,7 @@ def test_whatever_the_machine_has_is_used(bootstrap, monkeypatch, works, uv, exp
 @pytest.mark.parametrize(
     ("log", "says"),
     [
-        (
-            "WARNING: Retrying ... NewConnectionError: ...\nERROR: No matching distribution found",
-            "PyPI cannot be reached",
-        ),
+        ("WARNING: Retrying ... NewConnectionError: ...\nERROR: No matching distribution", "PyPI cannot be reached"),
         ("error: Failed to fetch: `https://...`", "PyPI cannot be reached"),
         ("Collecting x\nERROR: No space left on device\nnote: x", "No space left on device"),
     ],

@@ -84,28 +84,21 @@ def test_what_is_harmless_is_none(source):
     assert not dangers(source)
 
 
+WRITING = {"write_text", "write_bytes", "unlink", "rename", "replace_file", "rmtree", "touch"}
+
+
 def test_raw_data_are_opened_for_reading_only():
     """In rigdata nothing but the virtual rig opens a file to write, or an HDF5 file other than with "r"."""
     found = []
     for path, text in texts().items():
         if not path.startswith("rigdata/") or path.startswith("rigdata/virtual_rig/"):
             continue
-        for node in imports_and_calls(text):
-            if isinstance(node, ast.Call):
-                function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-                values = [
-                    a.value for a in [*node.args, *(k.value for k in node.keywords)] if isinstance(a, ast.Constant)
-                ]
-                modes = [v for v in values if isinstance(v, str) and v.strip("rwaxbt+") == "" and v]
-                writes = function in {
-                    "write_text",
-                    "write_bytes",
-                    "unlink",
-                    "rename",
-                    "replace_file",
-                    "rmtree",
-                    "touch",
-                }
-                if writes or (function in {"open", "File"} and any(set(m) & set("wax+") for m in modes)):
-                    found.append(f"{path}:{node.lineno} {function}")
+        for node in (node for node in imports_and_calls(text) if isinstance(node, ast.Call)):
+            function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            given = [*node.args, *(keyword.value for keyword in node.keywords)]
+            values = [a.value for a in given if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+            modes = [value for value in values if value and value.strip("rwaxbt+") == ""]
+            opens_to_write = function in {"open", "File"} and any(set(mode) & set("wax+") for mode in modes)
+            if function in WRITING or opens_to_write:
+                found.append(f"{path}:{node.lineno} {function}")
     assert not found

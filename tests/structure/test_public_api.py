@@ -10,26 +10,19 @@ import numpy as np
 import pytest
 
 import tpjb_ident as ti
+from model.errors import ModelError
 from tpjb_ident.errors import TpjbError
 
 ROOT = Path(__file__).parents[2]
-PROMISED = [
-    "estimate_dynamic_stiffness",
-    "r_matrix",
-    "load_campaign",
-    "load_bearing",
-    "predict",
-    "Effect",
-    "load_pivots",
-    "load_effects",
-    "identify",
-    "fit_pivots",
-    "measure_locus",
-    "measure_clearance",
-    "compare_campaign",
-    "check_campaign",
-    "write_report",
-]
+_NAMES = """
+    estimate_dynamic_stiffness r_matrix load_campaign load_bearing predict Effect load_pivots load_effects identify
+    fit_pivots measure_locus measure_clearance compare_campaign check_campaign write_report
+"""
+PROMISED = _NAMES.split()
+
+
+def said_by(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("name", PROMISED)
@@ -44,12 +37,8 @@ def test_an_unknown_name_gets_the_nearest():
 
 
 def test_import_is_light():
-    code = (
-        "import sys, tpjb_ident\n"
-        "print([m for m in ('numpy', 'pandas', 'matplotlib', 'numba', 'model', 'rigdata') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    heavy = ("numpy", "pandas", "matplotlib", "numba", "model", "rigdata")
+    assert said_by(f"import sys, tpjb_ident; print([m for m in {heavy} if m in sys.modules])").stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize("form", ["package", "module", "namespace"])
@@ -65,7 +54,7 @@ def test_another_model_on_the_path_is_refused_by_name(tmp_path, form):
         "import tpjb_ident as ti\n"
         "ti.load_bearing"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = said_by(code)
     if form == "namespace":  # a regular package anywhere on the path beats a bare folder: nothing is hidden
         assert done.returncode == 0, done.stderr
     else:
@@ -86,7 +75,7 @@ def test_a_package_that_bears_the_name_of_a_function_is_called_whatever_was_impo
         "print(first(ti.diagnose), first(ti.export))\n"
         "try:\n    ti.diagnose(5)\nexcept ValueError as error:\n    print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = said_by(code)
     assert done.stdout.splitlines() == [
         "['campaign', 'bearing'] ['source', 'to']",
         "diagnose: campaign: must be a Campaign or the path of one, got int.",
@@ -101,15 +90,14 @@ def test_a_path_does_where_a_campaign_is_wanted(small_campaign):
     assert "MN/m" in result.summary()
     assert "kxx, MN/m" in result._repr_html_()
     assert result.to_dataframe()["kxx_N_per_m"].notna().all()
-    with pytest.raises(ValueError, match="identify: campaign: must be a Campaign or the path of one, got int"):
-        ti.identify(5)
+    assert ti.check_campaign(ti.load_campaign(small_campaign)) == ti.check_campaign(small_campaign)
 
 
 def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
-    found = ti.predict(str(rocker_file), load=5000.0, speed=138.0, excitation=157.0, thermal="isothermal")
-    assert found.converged
-    with pytest.raises(ValueError, match="bearing: must be a Bearing or the path of a bearing file, got int"):
-        ti.predict(5, load=5000.0, speed=138.0)
+    assert ti.predict(str(rocker_file), load=5000.0, speed=138.0, excitation=157.0, thermal="isothermal").converged
+
+
+ROCKER = str(ROOT / "model" / "bearings" / "rocker.toml")
 
 
 @pytest.mark.parametrize(
@@ -123,38 +111,22 @@ def test_a_path_does_where_a_bearing_is_wanted(rocker_file):
         (lambda: ti.write_pivots("p.toml", [4], "x"), "write_pivots: curves: must hold what fit_pivots gives, got int"),
         (lambda: ti.write_report(3, 4), "write_report: folder: must be a path, got int"),
         (lambda: ti.write_report("r", 4), "write_report: comparison: must be what compare_campaign gives, got int"),
-        (lambda: ti.export(3, "csv", "r"), "source: must be a result, a table or the path of one, got int"),
+        (lambda: ti.export(3, "csv", "r"), "export: source: must be a result, a table or the path of one, got int"),
+        (lambda: ti.identify(5), "identify: campaign: must be a Campaign or the path of one, got int"),
+        (lambda: ti.predict(5, load=5e3, speed=138.0), "predict: bearing: must be a Bearing or the path of"),
+        (lambda: ti.predict(ROCKER, 5000.0), "predict: "),
+        (lambda: ti.plan(ROCKER, []), "plan: .*no dynamic runs"),
+        (lambda: ti.plan(3, ()), "plan: "),
+        (lambda: ti.r_matrix(3, 4), "r_matrix: "),
+        (lambda: ti.diagnose(3), "diagnose: "),
+        (lambda: ti.check_campaign(3), "check_campaign: "),
+        (lambda: ti.estimate_dynamic_stiffness(np.eye(2), np.eye(2), -1.0), "estimate_dynamic_stiffness: "),
     ],
 )
 def test_what_cannot_be_taken_is_refused_in_our_own_words(call, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(TpjbError, match=says):
+    with pytest.raises((TpjbError, ModelError), match=f"^{says}") as caught:
         call()
+    name, _, rest = str(caught.value).partition(": ")
+    assert not rest.startswith(name)  # it stands there once
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.slow
-def test_an_open_campaign_is_checked_as_its_path_is(small_campaign):
-    assert ti.check_campaign(ti.load_campaign(small_campaign)) == ti.check_campaign(small_campaign)
-
-
-def test_a_plan_from_python(rocker_file):
-    import math
-
-    point = ti.OperatingPoint(5000.0, -math.pi / 2, 2 * math.pi * 22, 2 * math.pi * 25)
-    with pytest.raises(ValueError, match="no dynamic runs"):
-        ti.plan(rocker_file, [])
-    assert point.excitation_hz == 25.0
-
-
-@pytest.mark.parametrize(
-    ("name", "arguments"),
-    [
-        ("r_matrix", (3, 4)), ("diagnose", (3,)), ("export", (3, "csv", "x")), ("check_campaign", (3,)),
-        ("estimate_dynamic_stiffness", (np.eye(2), np.eye(2), -1.0)), ("load_pivots", (3,)), ("plan", (3, ())),
-        ("predict", ("model/bearings/rocker.toml", 5000.0)), ("identify", (3,)),
-    ],
-)  # fmt: skip
-def test_what_is_refused_begins_with_the_name_of_the_function_once(name, arguments):
-    with pytest.raises(ValueError, match=rf"^{name}: (?!{name})"):
-        getattr(ti, name)(*arguments)
