@@ -54,7 +54,7 @@ def write_hdf5(
     """Write a campaign of one run into an HDF5 file, its columns stored as `storage` says; the path."""
     import h5py
 
-    with h5py.File(path, "w") as file:
+    with h5py.File(path, "w", libver=storage.pop("libver", None)) as file:
         file.attrs["manifest"], file.attrs["bearing"] = text, 'name = "b"\n'
         group = file.create_group(f"runs/{run}")
         if rate is not None:

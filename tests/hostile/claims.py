@@ -16,7 +16,7 @@ SAMPLES = 2**29
 CHANNELS = ("X1A", "X1B")
 
 
-def hdf5_campaign(folder: Path, manifest: str, runs: int = 8, samples: int = SAMPLES) -> Path:
+def hdf5_campaign(folder: Path, manifest: str, runs: int, samples: int) -> Path:
     """Datasets in chunks of which none is stored: each below what a channel may be, in all 64 GB."""
     import h5py
 
@@ -31,14 +31,14 @@ def hdf5_campaign(folder: Path, manifest: str, runs: int = 8, samples: int = SAM
     return path
 
 
-def mat73(folder: Path, chunk: int = 2**16) -> Path:
+def mat73(folder: Path) -> Path:
     """A MATLAB 7.3 file: four vectors of 8 GB each."""
     import h5py
 
     path = folder / "claims.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name in "abcd":
-            file.create_dataset(name, (1, 2**30), "f8", chunks=(1, chunk), compression="gzip")
+            file.create_dataset(name, (1, 2**30), "f8", chunks=(1, 2**16), compression="gzip")
     data = bytearray(path.read_bytes())
     data[:19] = b"MATLAB 7.3 MAT-file"
     path.write_bytes(data)
@@ -67,7 +67,7 @@ def mat5(folder: Path) -> Path:
     return path
 
 
-def parquet(folder: Path, rows: int = 2**26) -> Path:
+def parquet(folder: Path) -> Path:
     """Columns of one value, a few bytes each: 2 GB."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -75,7 +75,7 @@ def parquet(folder: Path, rows: int = 2**26) -> Path:
     path = folder / "claims.parquet"
     table = pa.table({name: np.zeros(2**20) for name in ("a", "b", "c")})
     with pq.ParquetWriter(path, table.schema) as writer:
-        for _ in range(rows >> 20):
+        for _ in range(2**6):
             writer.write_table(table)
     return path
 

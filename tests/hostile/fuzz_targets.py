@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import math
 import shlex
@@ -13,31 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.foreign_files import write_mdf, write_tdms, write_uff
+from tests.foreign_files import write_columns, write_groups, write_mat73
+from tests.manifests import PROBES, manifest, write_hdf5
 
 ROOT = Path(__file__).resolve().parents[2]
-CSV_MANIFEST = """\
-schema = "tpjb-rig/1"
-id = "t"
-bearing = "b.toml"
-[acquisition]
-sample_rate = "10 Hz"
-[channels.X1A]
-quantity = "displacement"
-axis = "0 deg"
-unit = "um"
-[channels.X1B]
-quantity = "displacement"
-axis = "90 deg"
-unit = "um"
-[channels.Zeit]
-quantity = "time"
-unit = "s"
-[[runs]]
-id = "c-1"
-file = "c-1.csv"
-kind = "clearance"
-"""
+RUN = {"id": "c-1", "file": "c-1.csv", "kind": "clearance"}
+RATE = {"sample_rate": "10 Hz"}
+CSV_MANIFEST = manifest(PROBES | {"Zeit": {"quantity": "time", "unit": "s"}}, RUN, acquisition=RATE)
 
 
 @dataclass(frozen=True)
@@ -61,7 +44,13 @@ def manifest_target(folder: Path) -> Target:
     from rigdata.problem import RigDataError
 
     seeds = (CSV_MANIFEST.encode(), _shortened(_demo_manifest()))
-    return Target("manifest", seeds, lambda data: _ignore(parse_manifest(_text(data))), (RigDataError,))
+
+    def feed(data: bytes) -> None:
+        read = parse_manifest(_text(data))
+        assert read.runs
+        assert all(channel.gain > 0 for channel in read.channels.values())
+
+    return Target("manifest", seeds, feed, (RigDataError,))
 
 
 def _ignore(result: object) -> None:
@@ -172,21 +161,14 @@ def _csv_seeds() -> tuple[bytes, ...]:
 
 def hdf5_target(folder: Path) -> Target:
     """A small HDF5 campaign, fuzzed as bytes: opened, every channel read."""
-    import h5py
-
     import rigdata
 
-    path = folder / "seed.h5"
+    text = manifest(PROBES | {"T": {"quantity": "time", "unit": "s"}}, RUN, acquisition=RATE)
+    columns = {name: np.sin(0.1 * np.arange(40) + k).astype("f4") for k, name in enumerate(PROBES)}
     seeds = []
-    for options in ({"compression": "gzip", "chunks": (16,)}, {}):
-        with h5py.File(path, "w", libver="earliest" if options else "latest") as file:
-            file.attrs["manifest"] = CSV_MANIFEST.replace("[channels.Zeit]", "[channels.T]")
-            file.attrs["bearing"] = 'name = "b"\n'
-            group = file.create_group("runs/c-1")
-            group.attrs["sample_rate_hz"] = 100.0
-            for k, name in enumerate(("X1A", "X1B")):
-                group.create_dataset(name, data=np.sin(0.1 * np.arange(40) + k).astype("f4"), **options)
-        seeds.append(path.read_bytes())
+    for storage in ({"compression": "gzip", "chunks": (16,)}, {}):
+        libver = "earliest" if storage else "latest"
+        seeds.append(write_hdf5(folder / "seed.h5", text, columns, 100.0, libver=libver, **storage).read_bytes())
     fuzzed = folder / "fuzzed.h5"
 
     def feed(data: bytes) -> None:
@@ -204,45 +186,26 @@ def foreign_target(folder: Path, suffix: str) -> Target:
     from rigdata.problem import RigDataError
     from rigdata.readers.file_reader import read_series
 
-    ending = ".mat" if suffix == ".mat73" else suffix
-    path = folder / f"fuzzed{ending}"
+    path = folder / ("fuzzed.mat" if suffix == ".mat73" else f"fuzzed{suffix}")
     seed = folder / f"seed{suffix}"
-    _write_foreign(seed)
+    time = np.arange(120) / 100.0
+    values = np.sin(time)
+    if suffix == ".mat73":
+        write_mat73(seed, {"time": time, "s/X1A": values})
+    elif suffix in (".mat", ".parquet"):
+        write_columns(seed, {"time": time, "X1A": values, "X1B": 2 * values})
+    elif suffix == ".asc":
+        slow = {"Time  2 - slow [s]": np.arange(4.0), "T1 [degC]": 20.0 + np.arange(4)}
+        write_columns(seed, {"Time  1 - fast [s]": time[:12], "X1A [um]": values[:12]} | slow)
+    else:
+        slow = [(time[:5], {"T1": ("degC", values[:5])})] * (suffix == ".mf4")
+        write_groups(seed, (time[:20], {"X1A": ("um", values[:20])}), *slow)
 
     def feed(data: bytes) -> None:
         path.write_bytes(data)
         read_series(path, path.name)
 
     return Target(suffix.lstrip("."), (seed.read_bytes(),), feed, (RigDataError,))
-
-
-def _write_foreign(path: Path) -> None:
-    time = np.arange(120) / 100.0
-    values = np.sin(time)
-    if path.suffix == ".mat":
-        from scipy.io import savemat
-
-        savemat(path, {"time": time, "X1A": values, "X1B": 2 * values})
-    elif path.suffix == ".mat73":
-        import h5py
-
-        with h5py.File(path, "w", userblock_size=512) as file:  # MATLAB's own text stands in the first 512 bytes
-            for name, column in (("time", time), ("s/X1A", values)):
-                file.create_dataset(name, data=column[None, :])
-    elif path.suffix == ".mf4":
-        write_mdf(path, [(time[:20], {"X1A": ("um", values[:20])}), (time[:5], {"T1": ("degC", values[:5])})])
-    elif path.suffix == ".asc":
-        rows = [f"{i / 10:.1f}\t{i * 0.5:.3f}\t" + (f"{i:.1f}\t{20.0 + i:.2f}" if i < 4 else "\t") for i in range(12)]
-        head = ["Time  1 - fast [s]\tX1A [um]\tTime  2 - slow [s]\tT1 [degC]"]
-        path.write_text("\n".join(["rig", *head, *rows, ""]), encoding="cp1252")
-    elif path.suffix == ".parquet":
-        import pandas as pd
-
-        pd.DataFrame({"time": time, "X1A": values}).to_parquet(path)
-    elif path.suffix == ".tdms":
-        write_tdms(path, [("g", "X1A", values, {"wf_increment": 0.01})])
-    else:
-        write_uff(path, {"X1A": (0.01, values)})
 
 
 def _coefficient_tables() -> tuple[bytes, ...]:
@@ -338,33 +301,13 @@ COMMAND_LINES = (
 )
 
 
-_COMMAND_MODULES = (
-    "rich.console",
-    "rich.table",
-    "rich.progress",
-    "rich.panel",
-    "pyarrow.parquet",
-    "pandas",
-    "numba",
-    "scipy.interpolate",
-    "scipy.optimize",
-    "scipy.sparse.linalg",
-    "statsmodels.api",
-    "h5py",
-    "matplotlib.figure",
-    "matplotlib.backends.backend_svg",
-    "jinja2",
-    "model.predict",
-    "tpjb_ident.clearance.sweep",
-    "tpjb_ident.identification.identify",
-    "tpjb_ident.pivot",
-    "tpjb_ident.compare",
-    "tpjb_ident.diagnosis",
-    "tpjb_ident.runtime.executors",
-    "tpjb_ident.clearance.locus",
-    "tpjb_ident.exports",
-    "rigdata.survey.draft",
-)
+_LATE = """
+    rich.console rich.table rich.progress rich.panel pyarrow.parquet pandas numba scipy.interpolate scipy.optimize
+    scipy.sparse.linalg statsmodels.api h5py matplotlib.figure matplotlib.backends.backend_svg jinja2 model.predict
+    tpjb_ident.clearance.sweep tpjb_ident.identification.identify tpjb_ident.pivot tpjb_ident.compare
+    tpjb_ident.diagnosis tpjb_ident.runtime.executors tpjb_ident.clearance.locus tpjb_ident.exports
+    rigdata.survey.draft
+"""
 
 
 def command_target(folder: Path) -> Target:
@@ -400,28 +343,20 @@ def command_target(folder: Path) -> Target:
 
     for thermal in ("isothermal", "adiabatic"):  # compiled here and not in the first case of every child
         feed(f"predict rocker.toml --thermal {thermal} --out o".encode())
-    return Target("command line", tuple(c.encode() for c in COMMAND_LINES), feed, (), _COMMAND_MODULES)
+    return Target("command line", tuple(c.encode() for c in COMMAND_LINES), feed, (), tuple(_LATE.split()))
+
+
+FOREIGN = ("mat", "mat73", "parquet", "tdms", "uff", "mf4", "asc")
+MAKERS: dict[str, Callable[[Path], Target]] = {
+    "manifest": manifest_target, "bearing": bearing_target, "pivots": pivots_target, "effects": effects_target,
+    "csv": csv_target, "hdf5": hdf5_target, "table": table_target, "record": record_target, "cli": command_target,
+    **{name: functools.partial(foreign_target, suffix=f".{name}") for name in FOREIGN},
+}  # fmt: skip
+TARGETS = tuple(MAKERS)
 
 
 def make_target(name: str, folder: Path) -> Target:
     """Target by name, working in `folder`."""
-    makers: dict[str, Callable[[Path], Target]] = {
-        "manifest": manifest_target,
-        "bearing": bearing_target,
-        "pivots": pivots_target,
-        "effects": effects_target,
-        "csv": csv_target,
-        "hdf5": hdf5_target,
-        "table": table_target,
-        "record": record_target,
-        "cli": command_target,
-    }
-    if name in makers:
-        return makers[name](folder)
-    if name in FOREIGN:
-        return foreign_target(folder, "." + name)
-    sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")
-
-
-FOREIGN = ("mat", "mat73", "parquet", "tdms", "uff", "mf4", "asc")
-TARGETS = ("manifest", "bearing", "pivots", "effects", "csv", "hdf5", "table", "record", "cli", *FOREIGN)
+    if name not in MAKERS:
+        sys.exit(f"no target {name!r}; there are {', '.join(TARGETS)}")
+    return MAKERS[name](folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 
 import h5py
@@ -37,18 +38,15 @@ def hostile(tmp_path_factory, small_campaign):
     """The small campaign with tags, formulas and marks in id, description, run names and channel names."""
     path = tmp_path_factory.mktemp("hostile") / "a<b>&'\"=1+1.h5"
     shutil.copy(small_campaign, path)
+    entries = {"name": f"=1+1 {TAGS}", "id": f"=1+1 {TAGS}", "description": f"{TAGS} \u202e =HYPERLINK(1)"}
     with h5py.File(path, "r+") as file:
-        text = file.attrs["manifest"]
-        bearing = file.attrs["bearing"].splitlines()
-        at = next(i for i, line in enumerate(bearing) if line.startswith("name"))
-        bearing[at] = f"name = '=1+1 {TAGS}'"
-        file.attrs["bearing"] = "\n".join(bearing) + "\n"
-        text = text.replace('id = "small <b>&"', f"id = '=1+1 {TAGS}'")
-        lines = text.splitlines()
-        at = next(i for i, line in enumerate(lines) if line.startswith("description"))
-        lines[at] = f"description = '{TAGS} \u202e =HYPERLINK(1)'"
-        file.attrs["manifest"] = "\n".join(lines) + "\n"
-        assert TAGS in file.attrs["manifest"].splitlines()[1]
+        for attribute, keys in (("manifest", ("id", "description")), ("bearing", ("name",))):
+            text = file.attrs[attribute]
+            for key in keys:
+                line = f"{key} = '{entries[key]}'"
+                text, count = re.subn(rf"^{key} = .*$", lambda _, line=line: line, text, count=1, flags=re.M)
+                assert count == 1
+            file.attrs[attribute] = text
     return path
 
 

@@ -10,55 +10,58 @@ from pathlib import Path
 
 import pytest
 
-from tests.manifests import PROBE, manifest
+from tests.manifests import PROBE, SWEEP, manifest, write_files
 from tpjb_ident.cli import main
 
 HEAD = {"id": "Prüfstand µ", "bearing": "none.toml"}
-SWEEP = {"id": "c-1", "file": "c-1.csv", "kind": "clearance"}
 MANIFEST = manifest({"X1A": PROBE}, SWEEP, head=HEAD, acquisition={"sample_rate": "10 Hz"})
+RECORD = "X1A\n" + "".join(f"{i % 7}.5\n" for i in range(40))
 
 
 @pytest.fixture
 def campaign(tmp_path):
-    folder = tmp_path / "campaign"
-    folder.mkdir()
-    (folder / "campaign.toml").write_text(MANIFEST, encoding="utf-8")
-    (folder / "c-1.csv").write_text("X1A\n" + "".join(f"{i % 7}.5\n" for i in range(40)), encoding="utf-8")
-    return folder
+    return write_files(tmp_path / "campaign", MANIFEST, {"runs/c-1.csv": RECORD})
+
+
+def stream(encoding: str) -> io.TextIOWrapper:
+    return io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+
+
+def told(out: io.TextIOWrapper) -> str:
+    """What was written to a stream."""
+    out.flush()
+    return out.buffer.getvalue().decode(out.encoding)
 
 
 @pytest.fixture
 def ends(monkeypatch):
     def run(out, *words):
-        errors = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+        errors = stream("ascii")
         monkeypatch.setattr(sys, "argv", ["tpjb", *map(str, words)])
         monkeypatch.setattr(sys, "stdout", out)
         monkeypatch.setattr(sys, "stderr", errors)
         with pytest.raises(SystemExit) as end:
             main()
         monkeypatch.undo()
-        errors.flush()
-        return end.value.code, errors.buffer.getvalue().decode("ascii")
+        return end.value.code, told(errors)
 
     return run
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp932", "cp437"])
 def test_a_terminal_without_the_sign_shows_another(ends, campaign, encoding):
-    out = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    out = stream(encoding)
     code, errors = ends(out, "show", campaign)
-    out.flush()
     assert code in (0, None), errors
-    assert "stand " in out.buffer.getvalue().decode(encoding)
+    assert "stand " in told(out)
 
 
 def test_json_is_what_it_was_whatever_the_stream_can_hold(ends, campaign):
     documents = []
     for encoding in ("utf-8", "ascii"):
-        out = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+        out = stream(encoding)
         ends(out, "show", campaign, "--json")
-        out.flush()
-        documents.append(json.loads(out.buffer.getvalue().decode(encoding)))
+        documents.append(json.loads(told(out)))
     assert documents[0] == documents[1]
     assert any("Prüfstand µ" in line for line in documents[0]["said"])
 
@@ -67,16 +70,14 @@ def test_json_is_what_it_was_whatever_the_stream_can_hold(ends, campaign):
 def test_names_of_broken_bytes_are_printed_recorded_and_found_again(ends, campaign, tmp_path):
     odd = campaign.rename(tmp_path / os.fsdecode(b"b\xff"))
     target = tmp_path / os.fsdecode(b"out\xff")
-    out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    out = stream("utf-8")
     code, errors = ends(out, "check", odd, "--out", target, "--json")
-    out.flush()
     assert code in (0, 2, 3), errors
     assert "bug" not in errors
-    assert Path(json.loads(out.buffer.getvalue().decode())["results"]) == target
+    assert Path(json.loads(told(out))["results"]) == target
     record = json.loads((target / "run.json").read_text(encoding="utf-8"))
     assert (target / record["commands"]["check"]["inputs_at"]["campaign"]).resolve() == odd
-    again = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
-    assert ends(again, "verify", target)[0] in (0, None)
+    assert ends(stream("utf-8"), "verify", target)[0] in (0, None)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.foreign_files import write_tdms
+from tests.foreign_files import write_columns, write_groups
 
 PADS = np.radians([-90.0, -18.0, 54.0, 126.0, 198.0])
 CLEARANCES = np.array([80e-6, 82e-6, 79e-6, 81e-6, 80e-6])
@@ -209,42 +209,30 @@ def _times_of_day(path: Path, time: np.ndarray, fast: Table, other: Table) -> No
 def _tdms(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """Two devices: probes of one, everything else of another at half the rate; units as properties."""
     units = {"Gap": "um", "Load": "N", "Acc": "m/s^2", "Oil": "degC", "Speed": "rpm"}
-    step = float(time[1] - time[0])
-    segment = []
-    for group, table, every in (("PXI", fast, 1), ("Rack", other, 2)):
-        for name, values in table.items():
-            properties = {"wf_increment": step * every, "wf_start_offset": 0.0, "unit_string": units[name.split()[0]]}
-            segment.append((group, name, values[::every], properties))
-    write_tdms(path.with_suffix(".tdms"), segment)
+    groups = []
+    for table, every in ((fast, 1), (other, 2)):
+        channels = {name: (units[name.split()[0]], values[::every]) for name, values in table.items()}
+        groups.append((time[::every], channels))
+    write_groups(path.with_suffix(".tdms"), *groups)
 
 
 def _matlab(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """One vector a channel, its unit after an underscore, a scalar Fs."""
-    from scipy.io import savemat
-
-    savemat(path.with_suffix(".mat"), {**fast, **other, "Fs": 1.0 / float(time[1] - time[0])})
+    write_columns(path.with_suffix(".mat"), {**fast, **other, "Fs": 1.0 / float(time[1] - time[0])})
 
 
 def _lvm(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """LabVIEW's text with a row of units, spelt out."""
-    columns = fast | other
     units = {"Prox": "um", "LC": "Newtons", "Acc": "g", "TC1": "Deg F", "Tach": "RPM"}
-    labels = [units[name.replace("_", " ").split()[0]] for name in columns]
-    count = len(columns)
-    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tNo",
-            "***End_of_Header***\t", "", f"Channels\t{count}"]  # fmt: skip
-    heading = {"Samples": str(len(time)), "X_Dimension": "Time", "X0": "0", "Delta_X": f"{time[1] - time[0]:.6f}"}
-    head += ["\t".join([key, *[cell] * count]) for key, cell in heading.items()]
-    head += ["\t".join(["Y_Unit_Label", *labels]), "***End_of_Header***", "\t".join(["X_Value", *columns, "Comment"])]
-    rows = ["\t".join(["", *(f"{value:.8g}" for value in row)]) for row in zip(*columns.values(), strict=True)]
-    path.with_suffix(".lvm").write_text("\r\n".join([*head, *rows]) + "\r\n", newline="")
+    channels = {}
+    for name, values in (fast | other).items():
+        channels[name] = (units[name.replace("_", " ").split()[0]], values)
+    write_groups(path.with_suffix(".lvm"), (time, channels))
 
 
 def _parquet(path: Path, time: np.ndarray, fast: Table, other: Table) -> None:
     """A data frame, units in the names of its columns."""
-    import pandas as pd
-
-    pd.DataFrame({"time (s)": time, **fast, **other}).to_parquet(path.with_suffix(".parquet"), index=False)
+    write_columns(path.with_suffix(".parquet"), {"time (s)": time, **fast, **other})
 
 
 def _named(dynamic: str, dry: str, sweep: str) -> Callable[[Planned], str]:
